@@ -139,7 +139,7 @@ def rig_page() -> str:
     lines = [RIG_HEAD]
     done: set[type] = set()
     for section in sections():
-        if section.family is None:
+        if section.family is Slider:
             lines += [f"## `[{section.name}]`", "", summary(Slider), "", *table(Slider)]
             continue
         key, default = selector(section.family)

@@ -6,7 +6,7 @@ from typing import Any
 
 from steadyslip.experiments.spec import TABLES as FIT_TABLES
 from steadyslip.files.specifications.schema import DIALECT, partial, protocol_schema, rig_schema
-from steadyslip.maps.plan.spec import TABLE as MAP_TABLE
+from steadyslip.maps.plan.map_file import TABLE as MAP_TABLE
 
 
 def json_schema() -> dict[str, Any]:

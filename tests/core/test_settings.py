@@ -16,10 +16,10 @@ from steadyslip.experiments.fitting.settings import FitSettings
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.settings import RecordSettings
 from steadyslip.experiments.spec import TABLES as FIT_TABLES, spec_from_text
-from steadyslip.files.specifications.read import read_specification
+from steadyslip.files.specifications.read import read_contents
 from steadyslip.files.specifications.write import settings_to_text
+from steadyslip.maps.plan.map_file import TABLE as MAP_TABLE
 from steadyslip.maps.plan.measures import Measure
-from steadyslip.maps.plan.spec import TABLE as MAP_TABLE
 
 RIG = ss.rig_to_text(ss.lab_rig())
 EVERY = (*FIT_TABLES, MAP_TABLE)
@@ -77,7 +77,7 @@ def record_of(draw, family):
 def test_every_table_comes_back_from_its_text(section, data):
     table = data.draw(record_of(section.family))
     text = settings_to_text(section, table)
-    found = read_specification(RIG + text, "test", (), EVERY)
+    found = read_contents(RIG + text, "test", (), EVERY)
     faults = [p for p in found.problems if p.name != "map"]  # missing where it is not the one written
     assert faults == []
     again = found.further[section.name]

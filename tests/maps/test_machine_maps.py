@@ -9,7 +9,7 @@ import steadyslip as ss
 from charts import made
 from machines import same_block, two_blocks, two_mass
 from steadyslip.linear.stable_values import nearest_value
-from steadyslip.maps.plan.spec import map_from_text
+from steadyslip.maps.plan.map_file import map_from_text
 
 SHEAR = Path(__file__).parents[2] / "examples" / "machines" / "two-surfaces.toml"
 GAINS, SCREWS = np.array([0.5, 1.0, 3.0, 8.0]), np.array([20.0, 100.0, 400.0])

@@ -14,7 +14,7 @@ def _speak(context: typer.Context, rig: Path) -> Path:
     from steadyslip.core.errors import ParameterError
     from steadyslip.core.format import display_units
     from steadyslip.files.specifications.read import text_of
-    from steadyslip.files.specifications.written import units_of
+    from steadyslip.files.specifications.template import units_of
 
     with suppress(ParameterError):  # whoever reads the rig says what is wrong with the file
         context.with_resource(display_units(units_of(text_of(rig))))

@@ -24,7 +24,7 @@ from steadyslip.experiments.measured.read import read_record
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.settings import RecordSettings
 from steadyslip.files.specifications.layout import Section
-from steadyslip.files.specifications.read import Specification, read_specification, read_tables, text_of
+from steadyslip.files.specifications.read import RigFileContents, read_contents, read_tables, text_of
 from steadyslip.files.specifications.toml import Table
 from steadyslip.laws import contact as contact_laws, friction as friction_laws
 from steadyslip.laws.contact import ContactLaw
@@ -150,10 +150,10 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
 def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec:
     """Read the text of such a file; see `read_spec`."""
     filled = _Filled()
-    return _spec(read_specification(text, source, changes, TABLES, filled.complete), filled)
+    return _spec(read_contents(text, source, changes, TABLES, filled.complete), filled)
 
 
-def _spec(found: Specification, filled: _Filled) -> Spec:
+def _spec(found: RigFileContents, filled: _Filled) -> Spec:
     record, settings = found.further.get("record"), found.further.get("fit")
     settings = settings if isinstance(settings, FitSettings) else FitSettings()
     missing = filled.missing - found.changed

@@ -8,8 +8,8 @@ from typing import Any
 
 from steadyslip.core.areas import outside
 from steadyslip.core.records import with_values
+from steadyslip.files.specifications.template import ParameterSource, RigTemplate, rig_template
 from steadyslip.files.specifications.write import rig_to_text
-from steadyslip.files.specifications.written import Given, Written, written
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
@@ -30,7 +30,7 @@ class OwnFile:
 
     pieces: list[Any]
     rig: Slider | Machine = field(repr=False)
-    given: Mapping[str, Given]
+    given: Mapping[str, ParameterSource]
 
     def told(self, name: str) -> dict[str, Any]:
         """How the file gives a parameter: ``own``, its unit as it is written, SI units to one of it, its text there.
@@ -54,10 +54,10 @@ class OwnFile:
 
 def own_file(rig: Slider | Machine, names: Sequence[str], text: str) -> OwnFile:
     """The file of a rig that a page saves, by the places of parameters among `names`; `text` may be empty."""
-    found = written(text, rig, names) if text else None
+    found = rig_template(text, rig, names) if text else None
     if found is None or not found.pieces:
-        return OwnFile(_template(rig, names), rig, {} if found is None else found.given)
-    return OwnFile(_pieces(rig, names, found), rig, found.given)
+        return OwnFile(_template(rig, names), rig, {} if found is None else found.sources)
+    return OwnFile(_pieces(rig, names, found), rig, found.sources)
 
 
 def outside_of(rig: Slider | Machine, unit: str) -> tuple[float, str]:
@@ -65,7 +65,7 @@ def outside_of(rig: Slider | Machine, unit: str) -> tuple[float, str]:
     return outside(unit, rig.area) if isinstance(rig, Slider) else (1.0, unit)
 
 
-def _pieces(rig: Slider | Machine, names: Sequence[str], found: Written) -> list[Any]:
+def _pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate) -> list[Any]:
     pieces: list[Any] = []
     for kind, words in found.pieces:
         if kind == "text":

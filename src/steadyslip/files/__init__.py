@@ -1,4 +1,4 @@
-"""Everything that is read or written: bounded input, whole output, sealed results; `specifications` of rigs, protocols.
+"""Reading and writing of files: bounded input, complete output, sealed results; `specifications` of rigs and protocols.
 
-Knows how files are made safe, and records; not what is computed from them.
+Makes files safe and translates records; independent of what is computed from them.
 """

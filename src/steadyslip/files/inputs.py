@@ -1,4 +1,4 @@
-"""Files that come from outside: regular ones of bounded size, opened without waiting for anybody."""
+"""Safe reading of files from outside: regular files of bounded size, opened without blocking."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from steadyslip.core.errors import NotAvailable
 
 MOST_TEXT = 2**20
-"""Bytes of a file that somebody typed: a rig, a protocol, a map, a fit."""
+"""Largest size of a typed file (rig, protocol, map, fit), bytes: far beyond any, small enough to parse at once."""
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -22,12 +22,12 @@ _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
 
 
 class UnreadableFile(NotAvailable):
-    """A file cannot be read.
+    """Error: a file cannot be read.
 
     Attributes
     ----------
     reason : str
-        Why, without the file's name: ``no such file``, ``it is a pipe; give a regular file``, ...
+        Reason without the file's name: ``no such file``, ``it is a pipe; give a regular file``, ...
     """
 
     def __init__(self, name: str, reason: str) -> None:
@@ -36,20 +36,20 @@ class UnreadableFile(NotAvailable):
 
 
 def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, private: bool = False) -> bytes:
-    """The content of a regular file.
+    """Content of a regular file.
 
-    The file is opened first and looked at then, so that nothing can take its place in between; opening a pipe does
-    not wait for its other end, and no more is read than is allowed, whatever the file's size is said to be.
+    The file is opened first and checked then, so that nothing can replace it in between. Opening a pipe does not block,
+    and no more bytes are read than allowed, whatever size the file system reports.
 
     Parameters
     ----------
     path : path
     most : int
-        Greatest allowed size in bytes.
+        Largest allowed size in bytes.
     links : bool
-        Whether `path` itself may be a symbolic link.
+        True if `path` itself may be a symbolic link.
     private : bool
-        Whether to refuse a file that anybody else can change.
+        True to refuse a file that anybody else can change.
 
     Raises
     ------
@@ -78,12 +78,12 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
     finally:
         os.close(descriptor)
     content = parts[0] if len(parts) == 1 else b"".join(parts)
-    _check_size(name, len(content), most)  # it grew, or its file system knows no sizes
+    _check_size(name, len(content), most)  # the file may have grown, or its file system reports no sizes
     return content
 
 
 def check_file(path: str | PathLike[str], most: int) -> int:
-    """The size of a file; refuses what `read_bytes` would, before another library opens it by its name.
+    """Size of a file in bytes, after the checks of `read_bytes`; for files that another library will open by name.
 
     Raises
     ------
@@ -100,12 +100,12 @@ def check_file(path: str | PathLike[str], most: int) -> int:
 
 
 def inside(root: Path, key: str) -> Path:
-    """The file below a folder that `key`, names joined by ``/``, says; it need not be there.
+    """Path of the file below a folder for a `key`, names joined by ``/``; it need not exist.
 
     Raises
     ------
     UnreadableFile
-        If that leads out of the folder, or through a symbolic link.
+        If the key leads out of the folder, or through a symbolic link.
     """
     path = root
     for part in key.split("/"):
@@ -118,12 +118,12 @@ def inside(root: Path, key: str) -> Path:
 
 
 def check_room(path: Path) -> Path:
-    """The path of a file that is to be written.
+    """Path of a file to be written, unchanged.
 
     Raises
     ------
     UnreadableFile
-        If there is a folder in its place.
+        If it is a folder.
     """
     if path.is_dir():
         raise UnreadableFile(str(path), "it is a folder, where a file belongs; remove it")
@@ -131,7 +131,7 @@ def check_room(path: Path) -> Path:
 
 
 def check_kind(name: str, found: os.stat_result) -> None:
-    """Refuse what is not a regular file.
+    """Raise an error unless a file is regular.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def check_kind(name: str, found: os.stat_result) -> None:
 
 
 def is_private(found: os.stat_result) -> bool:
-    """Whether a file or folder is this user's, and nobody else may write to it; always so where there are no owners."""
+    """True if a file or folder belongs to this user and nobody else may write to it, or if the system has no owners."""
     if not hasattr(os, "getuid"):
         return True
     return found.st_uid == os.getuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
@@ -160,7 +160,7 @@ def _reason(error: OSError | ValueError) -> str:
 
 
 def _shown(size: int) -> str:
-    """A number of bytes for people."""
+    """Number of bytes as text, in bytes, kiB, MiB or GiB."""
     for unit in ("bytes", "kiB", "MiB"):
         if size < 10_000:
             return f"{size} {unit}"

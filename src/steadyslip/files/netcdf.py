@@ -1,8 +1,8 @@
-"""The classic netCDF format (CDF-1 and CDF-2), read as data: every size is checked before anything is made of it.
+"""Reader of the classic netCDF format (CDF-1 and CDF-2), which checks every size before it allocates.
 
-The format is a list of dimensions, attributes and variables, then the numbers of each variable in one piece, all big
-endian (NetCDF Users Guide, appendix B). Record dimensions, which we do not write, are refused. Nothing that is read
-takes more room than the file itself.
+A file is a list of dimensions, attributes and variables, then the numbers of each variable in one piece, all
+big-endian (NetCDF Users Guide, appendix B). Record dimensions, which this program does not write, are refused. Arrays
+never take more memory than the file has bytes.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ Array = np.ndarray
 T = TypeVar("T")
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
 _TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}
-_MOST = 100_000  # entries of all lists
-_LONGEST = 1000  # numbers of an attribute
-_DEEPEST = 32  # dimensions of a variable
+_MOST = 100_000  # most entries of all lists together; chosen by trial, far more than any file of ours has
+_LONGEST = 1000  # numbers of an attribute; ours have one
+_DEEPEST = 32  # dimensions of a variable; NumPy's limit up to version 1
 
 
 class FormatError(ValueError):
-    """The content is not what the format allows."""
+    """Error: the content is not valid in the format."""
 
 
 @dataclass(frozen=True)
 class FileVariable:
-    """An array in a file.
+    """Array in a file.
 
     Attributes
     ----------
     dims : tuple of str
     shape : tuple of int
     dtype : str
-        As NumPy has it, big endian; ``S1`` for text.
+        As in NumPy, big-endian; ``S1`` for text.
     attributes : dict
     """
 
@@ -48,12 +48,12 @@ class FileVariable:
     content: memoryview = field(repr=False)
 
     def numbers(self) -> Array:
-        """A copy in the machine's own byte order."""
+        """Copy of the array in native byte order."""
         stored = np.frombuffer(self.content, self.dtype).reshape(self.shape)
         return stored.astype(stored.dtype.newbyteorder("="))
 
     def texts(self) -> list[str]:
-        """Rows of a table of characters."""
+        """Rows of a character array as text."""
         width = self.shape[1]
         rows = (self.content[i * width : (i + 1) * width] for i in range(self.shape[0]))
         return [_text(row) for row in rows]
@@ -61,7 +61,7 @@ class FileVariable:
 
 @dataclass(frozen=True)
 class File:
-    """What a file holds.
+    """Content of a netCDF file.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class File:
 
 
 def read(content: bytes | memoryview) -> File:
-    """Take a file apart.
+    """Parse a netCDF file.
 
     Raises
     ------
@@ -88,11 +88,11 @@ def read(content: bytes | memoryview) -> File:
 
 
 class _Reader:
-    """Goes through a header from its beginning to its end."""
+    """Parser of a header, from its beginning to its end."""
 
     def __init__(self, content: memoryview) -> None:
         self.content, self.place = content, 0
-        self.filled, self.listed = 0, 0  # so that what is named often is not read often
+        self.filled, self.listed = 0, 0  # bytes of variables and entries of lists so far, both bounded
 
     def file(self) -> File:
         magic = bytes(self.take(4))
@@ -106,7 +106,7 @@ class _Reader:
         return File(dims, attributes, self.entries(_VARIABLES, self.variable))
 
     def take(self, count: int) -> memoryview:
-        """The next bytes; what fills up to a multiple of four is passed over."""
+        """Next bytes; padding up to a multiple of four is skipped."""
         end = self.place + count
         if count < 0 or end > len(self.content):
             raise FormatError("ends too early")
@@ -121,7 +121,7 @@ class _Reader:
         return _text(self.take(self.number()))
 
     def entries(self, tag: int, entry: Callable[[], T]) -> dict[str, T]:
-        """A list of named things."""
+        """List of named entries."""
         found: dict[str, T] = {}
         kind, count = self.number(), self.number()
         self.listed += count
@@ -166,7 +166,7 @@ class _Reader:
         own = [self.dims[place] for place in places]
         attributes = self.entries(_ATTRIBUTES, self.attribute)
         kind = self.type()
-        self.number()  # its size, which follows from the rest and may not fit here
+        self.number()  # size of the variable: redundant, and may overflow here
         begin = self.number(self.offset)
         shape = tuple(length for _, length in own)
         size = math.prod(shape) * np.dtype(kind).itemsize

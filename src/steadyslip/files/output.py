@@ -1,4 +1,4 @@
-"""Files of results: which endings there are, refused before anything is computed; files written whole."""
+"""Output files: allowed endings, checked before anything is computed; files replaced only when complete."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ FIGURES = (".png", ".svg", ".pdf")
 
 
 class OutputClosed(Exception):
-    """Nobody reads the standard output any more, as after ``| head``."""
+    """Error: nobody reads the standard output any more, as after ``| head``."""
 
 
 @contextmanager
 def answering() -> Iterator[None]:
-    """What is printed inside is out at the end.
+    """Context that flushes the standard output at its end and translates write errors.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def answering() -> Iterator[None]:
 
 
 def discard_output() -> None:
-    """Let what is still buffered go nowhere, so that nothing fails when Python ends."""
+    """Redirect the standard output to nowhere, so that no write error occurs when Python exits."""
     with suppress(OSError, ValueError, AttributeError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())
@@ -55,7 +55,7 @@ def discard_output() -> None:
 
 
 def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
-    """Refuse files that could not be written.
+    """Raise an error for files that cannot be written, before anything is computed.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
 
 
 def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]], figure: Callable[[], Any]) -> None:
-    """Write with the writer of a file's ending, or the figure, an Axes or an array of them.
+    """Write a file with the writer for its ending, or else as a figure (an Axes or an array of them).
 
     Raises
     ------
@@ -93,16 +93,15 @@ def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]],
 
 @contextmanager
 def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[str]:
-    """The name of a temporary file, which takes the place of `path` once it is written without fault.
+    """Context with the name of a temporary file that replaces `path` when it was written without error.
 
-    A link is followed, and what it leads to is replaced. A `private` file is for its owner alone, and takes the place
-    of a link.
+    A symbolic link is followed, and its target replaced. A `private` file can be read by its owner only, and replaces a
+    link.
 
     Raises
     ------
     NotAvailable
-        If the file cannot be written, or `path` is a device, a pipe or a folder: what is written whole takes the place
-        of what was there.
+        If the file cannot be written, or `path` is a device, pipe or folder, which must not be replaced.
     """
     target, temporary = Path(path) if private else Path(os.path.realpath(path)), ""
     _refuse_other_than_files(path, target)
@@ -113,7 +112,7 @@ def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[
         if not private:
             mask = os.umask(0)
             os.umask(mask)
-            os.chmod(temporary, 0o666 & ~mask)  # temporary files are the owner's alone
+            os.chmod(temporary, 0o666 & ~mask)  # mkstemp restricts it to the owner
         os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):
@@ -124,7 +123,7 @@ def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[
 
 
 def _refuse_other_than_files(path: str | PathLike[str], target: Path) -> None:
-    """Nothing but a file may be replaced; a name such as /dev/stdout is none, wherever it leads."""
+    """Raise an error unless the target is a file or absent; a name such as /dev/stdout is none, wherever it leads."""
     named = Path(os.path.abspath(path))
     place = any(named.is_relative_to(folder) for folder in _NO_FILES) and not named.is_relative_to("/dev/shm")
     if place or (target.exists() and not target.is_file()):
@@ -145,7 +144,7 @@ def write_text(path: str | PathLike[str], text: str) -> None:
 
 
 def write_columns(path: str | PathLike[str], columns: Mapping[str, np.ndarray], form: str) -> None:
-    """Write numbers as comma-separated text under their titles, each in a `form` such as ``%.12g``.
+    """Write arrays as comma-separated text under their titles, in a number format such as ``%.12g``.
 
     Raises
     ------
@@ -160,7 +159,7 @@ def write_columns(path: str | PathLike[str], columns: Mapping[str, np.ndarray], 
 
 
 def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
-    """Write an xarray.Dataset as netCDF; a file of that name is replaced only once the new one is whole.
+    """Write an xarray.Dataset as netCDF; an existing file is replaced only when the new one is complete.
 
     Raises
     ------

@@ -1,12 +1,12 @@
-"""Files that this program writes to read them again: a kind, a version of its layout, a checksum over everything.
+"""Sealed files, which this program writes and reads again: with kind, version of the layout and checksum.
 
-A sealed file ends in one line of text behind its content::
+A sealed file ends in one line of text after its content::
 
-    steadyslip run 2 <what it is of> <sha256 of all before>
+    steadyslip run 2 <sha256 of the purpose> <sha256 of all before>
 
-so that it is still what its ending says to other programs, which do not look behind their own content. Reading
-checks size, kind, version and checksum before anything else sees a byte. The seal finds damage and mistakes; it is no
-signature, so what is inside is checked as well.
+Other programs can still open it by its ending, because they ignore what follows their own content. Reading checks
+size, kind, version and checksum first. The seal finds damage and mistakes; it is no signature, so the content is
+checked as well.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from steadyslip.files.inputs import read_bytes
 from steadyslip.files.output import whole_file
 
 _LINE = re.compile(rb"\nsteadyslip ([a-z]{1,20}) ([0-9]{1,6}) ([0-9a-f]{64}) ([0-9a-f]{64})\n\Z")
-_LONGEST = 180  # bytes of that line
-_DIGEST = 65  # its last ones
+_LONGEST = 180  # upper bound of the length of that line, bytes: at most 170
+_DIGEST = 65  # bytes of its last field
 
 
 @dataclass(frozen=True)
 class FileKind:
-    """One kind of file.
+    """Kind of sealed file.
 
     Attributes
     ----------
     name : str
-        One word in small letters.
+        One word in lower case.
     version : int
-        Of the layout; files of another one are refused.
+        Version of the layout; other versions are refused.
     most : int
-        Greatest size in bytes.
+        Largest size in bytes.
     remedy : str
-        What to do instead of reading a file that cannot be read.
+        Advice in the error message for a file that cannot be read.
     """
 
     name: str
@@ -50,7 +50,7 @@ class FileKind:
 
 
 def seal(content: bytes, kind: FileKind, of: str = "") -> bytes:
-    """The content of a sealed file; `of` is what it must be of to be accepted."""
+    """Sealed content; `of` is the purpose, which has to be the same when it is read."""
     line = f"\nsteadyslip {kind.name} {kind.version} {_name(of)} ".encode()
     digest = hashlib.sha256(content)
     digest.update(line)
@@ -58,12 +58,12 @@ def seal(content: bytes, kind: FileKind, of: str = "") -> bytes:
 
 
 def unseal(raw: bytes, path: str | PathLike[str], kind: FileKind, of: str = "") -> memoryview:
-    """What was sealed.
+    """Content of a sealed file, after all checks.
 
     Raises
     ------
     NotAvailable
-        If `raw` is not a sealed file of this kind and version, is of something else, or is not what was written.
+        If `raw` is not a sealed file of this kind, version and purpose, or was changed.
     """
 
     def refusal(reason: str) -> NotAvailable:
@@ -90,12 +90,12 @@ def unseal(raw: bytes, path: str | PathLike[str], kind: FileKind, of: str = "") 
 def write_sealed(
     path: str | PathLike[str], content: bytes, kind: FileKind, of: str = "", *, private: bool = False
 ) -> None:
-    """Write a sealed file; a file of that name is replaced only once the new one is whole.
+    """Write a sealed file; an existing file is replaced only when the new one is complete.
 
     Raises
     ------
     NotAvailable
-        If it cannot be written, or is larger than what would be read again.
+        If it cannot be written, or is too large to be read again.
     """
     sealed = seal(content, kind, of)
     if len(sealed) > kind.most:
@@ -106,18 +106,18 @@ def write_sealed(
 
 
 def read_sealed(path: str | PathLike[str], kind: FileKind, of: str = "", *, private: bool = False) -> memoryview:
-    """What `write_sealed` wrote; `private` refuses a file that anybody else can change.
+    """Content of a file written by `write_sealed`; `private` refuses a file that anybody else can change.
 
     Raises
     ------
     NotAvailable
-        If it cannot be read, and as `unseal`.
+        If it cannot be read, or fails a check of `unseal`.
     """
     return unseal(read_bytes(path, kind.most, private=private), path, kind, of)
 
 
 def fingerprint(data: Any) -> str:
-    """A checksum of plain data as JSON, whatever the order of names and however it is laid out."""
+    """SHA-256 (hex) of plain data as JSON, independent of the order of keys."""
     return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 

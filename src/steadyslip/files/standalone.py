@@ -1,4 +1,4 @@
-"""A document of its own: HTML in one file, which can be written, opened and shown in a notebook."""
+"""HTML documents in one file, which can be written, opened in a browser and shown in a notebook."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FRAME = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;
 
 @dataclass(frozen=True)
 class Standalone:
-    """A document in one file, which asks for nothing from outside.
+    """HTML document in one file, which loads nothing from outside.
 
     Attributes
     ----------
@@ -42,12 +42,12 @@ class Standalone:
         write_text(path, self.html)
 
     def open(self) -> Path:
-        """Show it in the browser; the file it is in.
+        """Show the document in the browser; returns the path of its temporary file.
 
         Raises
         ------
         NotAvailable
-            If no browser can be started; the file is there all the same, and named.
+            If no browser can be started; the message has the path of the file, which exists.
         """
         with tempfile.NamedTemporaryFile(
             "w", suffix=".html", prefix="steadyslip-", delete=False, encoding="utf-8"
@@ -66,12 +66,12 @@ class Standalone:
         return path
 
     def _repr_html_(self) -> str:
-        """In a frame of its own, for notebooks."""
+        """HTML of a frame with the document, for notebooks."""
         return f'<iframe title="{html.escape(self.title)}" {FRAME} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
 def write_page(result: Any, path: Path, kind: str, **options: Any) -> None:
-    """Write the document of a result, called by its kind (``Run``) and the name of the file where that says more.
+    """Write the document of a result, titled with its kind (``Run``) and the file's name unless these are the same.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Results in files: named columns and a few attributes in one sealed netCDF file (`steadyslip.files.sealed`).
+"""Results as files: named columns and a few attributes in one sealed netCDF file (`steadyslip.files.sealed`).
 
-Whoever writes a kind of file declares its attributes and columns; reading compares names, types, dimensions, sizes
-and units with that before an array is made. The seal has found damage by then; what is left to find is a file that
-somebody made.
+The module that writes a kind of file declares its attributes and columns; reading compares names, types, dimensions,
+sizes and units with these before it makes an array. Damage is found by the seal; these checks are against files that
+somebody crafted.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from steadyslip.files.netcdf import File, FileVariable, FormatError, read
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
 Array = np.ndarray
-_SIZES = "sizes"  # attribute: the format has no empty dimensions, so that variables along them are left out
+_SIZES = "sizes"  # attribute with all dimensions: the format has no empty ones, so variables along them are left out
 _PART = re.compile(r"part([1-9][0-9]{0,4})\.(.+)", re.DOTALL)  # name in the table of a name in one of its parts
 
 
 @dataclass(frozen=True)
 class ColumnRule:
-    """What a variable must be.
+    """Declaration of a column.
 
     Attributes
     ----------
     dims : tuple of str
     unit : str
-        SI; empty if it has none to state.
+        SI unit; empty for none.
     text : bool
-        Whether it holds words instead of numbers.
+        True for words, False for numbers.
     """
 
     dims: tuple[str, ...]
@@ -44,7 +44,7 @@ class ColumnRule:
 
 
 def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: Sequence[Any] = ()) -> None:
-    """Write an xarray.Dataset of floats and words; a file of that name is replaced only once the new one is whole.
+    """Write an xarray.Dataset of floats and words; an existing file is replaced only when the new one is complete.
 
     Parameters
     ----------
@@ -73,13 +73,13 @@ def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: 
 
 
 def _whole(dataset: Any) -> Any:
-    """With all sizes in an attribute, without columns that have no room."""
+    """Dataset with all sizes in an attribute, and without empty columns, which the format does not have."""
     kept = dataset.drop_vars([name for name, variable in dataset.variables.items() if not variable.size])
     return kept.assign_attrs({_SIZES: json.dumps(dict(dataset.sizes))})
 
 
 def _apart(file: File) -> list[File]:
-    """What is in a file besides its parts, and its parts in their order."""
+    """Split a file into its own content and its parts, in order."""
     found: dict[int, File] = {0: File({}, {}, {})}
     for what in ("attributes", "variables"):
         for name, value in getattr(file, what).items():
@@ -94,7 +94,7 @@ def _apart(file: File) -> list[File]:
 
 
 class ExpectedTable:
-    """A file that is open: its attributes, and its columns once somebody says which they must be.
+    """Open file whose attributes are checked, and whose columns are checked against a declaration.
 
     Parameters
     ----------
@@ -141,11 +141,11 @@ class ExpectedTable:
         self.sizes: dict[str, int] = sizes
 
     def fault(self, what: str) -> NotAvailable:
-        """What to say of a file that was not written by this program."""
+        """Error for a file whose content is not as declared."""
         return NotAvailable(f"cannot read {str(self.path)!r}: as a {self.kind.name}, {what}; {self.kind.remedy}")
 
     def json(self, text: Any, form: Any) -> Any:
-        """Data of a declared form from JSON text; see `fits_form`.
+        """Data of a declared form (see `fits_form`) from JSON text.
 
         Raises
         ------
@@ -160,12 +160,12 @@ class ExpectedTable:
         return found
 
     def columns(self, expected: Mapping[str, ColumnRule]) -> dict[str, Any]:
-        """All columns, arrays of float64 or lists of words.
+        """All columns: arrays of float64 or lists of words.
 
         Raises
         ------
         NotAvailable
-            If there are others, or one is not as expected.
+            If there are others, or one is not as declared.
         """
         dims = {dim for column in expected.values() for dim in column.dims}
         self._compare("dimensions", self.sizes, dims)
@@ -206,10 +206,10 @@ _TYPES = {str: "text", int: "a whole number", float: "a number"}
 
 
 def fits_form(value: Any, form: Any) -> bool:
-    """Whether plain data have a form.
+    """True if JSON data have a declared form.
 
-    That is a type, ``[form]`` for a list, ``(form, form)`` for a list of so many, ``{name: form}`` for exactly these
-    names, ``{str: form}`` for any, or ``{form, None}`` for what may be missing. Whole numbers are floats too.
+    A form is a type, ``[form]`` for a list, ``(form, form)`` for a list of that length, ``{name: form}`` for exactly
+    these names, ``{str: form}`` for any names, or ``{form, None}`` for an optional value. Integers are valid floats.
     """
     if isinstance(value, int) and abs(value) >= 2**63:
         return False

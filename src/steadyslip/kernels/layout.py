@@ -266,6 +266,7 @@ class Routines(NamedTuple):
     """Straight-line functions of one model, each ``(record, number, array) -> None``.
 
     The driver takes Python functions, or their addresses when it is compiled.
+
     Attributes
     ----------
     step : one step of every lane

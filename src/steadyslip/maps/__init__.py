@@ -9,8 +9,8 @@ from __future__ import annotations
 from steadyslip.maps.plan.axes import Grid, Samples
 from steadyslip.maps.plan.edges import Edge, LogMargin, OnsetKind, SafetyFactor, StableValues
 from steadyslip.maps.plan.map import Map
+from steadyslip.maps.plan.map_file import map_from_text, read_map
 from steadyslip.maps.plan.measures import Events, KickThreshold, Measure, measure
-from steadyslip.maps.plan.spec import map_from_text, read_map
 from steadyslip.maps.refine import Refined, refine
 from steadyslip.maps.sensitivity import Sensitivity, sensitivity
 from steadyslip.maps.view.result import MapResult, open_map

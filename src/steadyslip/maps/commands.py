@@ -13,7 +13,7 @@ from steadyslip.files.output import FIGURES, check_output, write_by_ending
 from steadyslip.files.standalone import write_page
 from steadyslip.maps.plan.axes import Axis, Generated
 from steadyslip.maps.plan.map import Map
-from steadyslip.maps.plan.spec import read_map
+from steadyslip.maps.plan.map_file import read_map
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import POINTS, Sensitivity, sensitivity, usual_numbers
 from steadyslip.maps.store.arrays import check_path

@@ -1,7 +1,7 @@
-"""Motion in time: single runs with their events, and ensembles.
+"""Motion in time: single runs with their events, and ensembles of runs.
 
-rig + protocol -> jobs (arrays) -> kernels in lanes -> history or ensemble. Knows nothing of stability: what is linear
-of a motion it does not ask.
+A rig and a protocol become jobs (arrays), kernels integrate them, and the result is a history or an ensemble. Nothing
+here depends on linear stability.
 """
 
 from steadyslip.motion.events import ContactEvent, ContactSlip, Event, SlipEvent

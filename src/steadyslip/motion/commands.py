@@ -1,4 +1,4 @@
-"""A run from a rig file and the words of a command line, and the files that it is written to."""
+"""Run of a rig file with the options of a command line, and the files it is written to."""
 
 from __future__ import annotations
 
@@ -43,24 +43,24 @@ def run_file(
     ----------
     path : path
     changes : iterable of str
-        As for `read_rig`.
+        As in `read_rig`.
     pieces : iterable of str
-        Pieces in words, as for `piece_from_text`, after those of the file.
+        Pieces as text, as for `piece_from_text`, after those of the file.
     start : iterable of str
         Starting values as ``name=number`` in SI units.
     until : str, optional
-        End with its unit; that of the file unless given.
+        End of the run with its unit; by default that of the file.
     samples : int, optional
-        Number of evenly spaced times to report at; the solver's own steps unless given.
+        Number of evenly spaced times to report at; by default the solver's own steps.
     method, rtol
         As in `simulate`.
     contact : str, optional
-        Of a machine: the contact whose phase plane is to be drawn of the run.
+        Contact of a machine whose phase plane will be drawn; checked before the run.
 
     Raises
     ------
     ParameterError
-        If anything is wrong; everything is listed.
+        If anything is wrong; lists every problem.
     """
     rig, protocol = read_experiment(path, changes, pieces, until)
     check_contact(rig, contact)
@@ -104,7 +104,7 @@ def progress_of(protocol: Protocol) -> Iterator[Callable[[float], None]]:
 
 
 def _pieces(texts: Iterable[str], area: float | None, machine: Machine | None) -> list[Piece]:
-    """Pieces in words, or all problems."""
+    """Parse pieces; raises all problems together."""
     found, problems = [], []
     for text in texts:
         try:
@@ -117,7 +117,7 @@ def _pieces(texts: Iterable[str], area: float | None, machine: Machine | None) -
 
 
 def _seconds(text: str) -> float:
-    """A time in words or a number of seconds."""
+    """Time (s) from text with a unit or a number of seconds."""
     try:
         number: float | str = float(text)
     except ValueError:
@@ -147,9 +147,9 @@ def _starting_values(texts: Iterable[str]) -> dict[str, float]:
 def write_history(
     history: History, path: Path, kind: str = "history", source: Path | None = None, contact: str | None = None
 ) -> None:  # fmt: skip
-    """Write a run as netCDF, as columns, as a document or as a figure, by the ending of the name.
+    """Write a run as netCDF, CSV, HTML document or figure, chosen by the ending of the name.
 
-    A document gives the hash of the `source`, the file that the run was made of.
+    A document contains the hash of `source`, the rig file of the run.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""At which contact of a machine a run ended that was to go on."""
+"""Contact at which a run of a machine ended early."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ LOST, BLOWN_UP = "contact lost", "blow-up"
 
 
 def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any) -> Array:
-    """The contact that is least pressed beside steady sliding where contact is lost, the fastest in a blow-up.
+    """Contact that is least pressed relative to steady sliding where contact is lost, the fastest in a blow-up.
 
     Parameters
     ----------
     point : OperatingPoint
         The rigs of k runs, or of one.
     status : str
-        How they ended, in the words of `steadyslip.motion.status`.
+        Status of the runs, one of `steadyslip.motion.status.WORDS`.
     stresses, rates : sequence of array_like
         Normal stress (Pa) and slip rate (m/s) of every contact at the end, (k,) each.
 
     Returns
     -------
     ndarray of int (k,)
-        Number of the contact; −1 for other ends, and of a block with one contact, which has no name.
+        Index of the contact; −1 for other statuses, and for a block with one contact, which has no name.
     """
     count = np.broadcast_shapes((1,), *(np.shape(one) for one in stresses))
     if status not in (LOST, BLOWN_UP) or not point.model.contacts[0].name:

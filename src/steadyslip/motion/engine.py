@@ -1,4 +1,4 @@
-"""Runs kernels: one trajectory with everything recorded, or many in lanes on all cores."""
+"""Execution of kernels: one trajectory with its steps recorded, or many in lanes on all cores."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Recorded, Row,
 from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.motion.jobs import Jobs
 
-LANES = 24  # three vectors of eight doubles, see compiled.kernel
-CHUNK = 2048  # jobs per call: keeps the arrays small and Ctrl-C prompt
-QUOTA = 20_000  # passes between looks at the clock and at Ctrl-C, some tens of milliseconds
-# statuses that no kernel gives
+LANES = 24  # three vectors of eight doubles (`printers.llvm` fills the processor with several chains)
+CHUNK = 2048  # jobs per call: keeps arrays small and Ctrl-C prompt; chosen by trial
+QUOTA = 20_000  # steps per call, some tens of ms; between calls Ctrl-C and progress are served
+# statuses beyond those of kernels
 INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATUSES) + 4)
 
 
 @dataclass
 class Outcome:
-    """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only; `tables` it was given.
-    `size` is the length of the state, `balances` how many unknowns balances fix.
+    """Result of a kernel for some jobs; `log` and `recorded` are empty except for a single run; `tables` is its input.
 
-    ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`.
+    ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`; `size` is the length
+    of the state, `balances` the number of unknowns that balances fix.
     """
 
     status: np.ndarray
@@ -44,35 +44,35 @@ class Outcome:
 
     @property
     def steps(self) -> np.ndarray:
-        """Taken and refused, (jobs, 2)."""
+        """Accepted and rejected steps, (jobs, 2)."""
         return self.final[:, Final.ACCEPTED : Final.POINT]
 
     @property
     def point(self) -> np.ndarray:
-        """Where each ended, (jobs, 1 + state + further unknowns)."""
+        """Final points, (jobs, 1 + state + further unknowns)."""
         return self.final[:, Final.POINT :]
 
     @property
     def unknowns(self) -> np.ndarray:
-        """Those of the balances where each ended, (jobs, unknowns)."""
+        """Final unknowns of the balances, (jobs, unknowns)."""
         own = np.hstack([self.point[:, :1], self.point[:, 1 + self.size :]])
         return np.asarray(own[:, : self.balances])
 
     @property
     def state(self) -> np.ndarray:
-        """Where each ended, (jobs, state)."""
+        """Final states, (jobs, state)."""
         return self.final[:, Final.STATE : Final.STATE + self.size]
 
 
 class Call:
-    """The arrays of one chain of calls to a kernel."""
+    """Arrays of a series of calls to a kernel."""
 
     def __init__(self, machine: Runner, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
         layout = self.layout = machine.kernel.layout
         lanes = layout.lanes
         self.advance = machine.code.advance
         self.tables, self.times = tables, times
-        if any(len(table) not in (1, size) for table in tables):  # machine code would read what is not there
+        if any(len(table) not in (1, size) for table in tables):  # machine code does not check its bounds
             raise ValueError(f"tables of {', '.join(str(len(table)) for table in tables)} rows for {size} jobs")
         self.work = np.zeros(layout.rows * lanes)
         self.ids = np.zeros(lanes, dtype=np.int64)
@@ -85,8 +85,8 @@ class Call:
         self.log = np.zeros((0, LOG_COLUMNS))
         self.recorded = np.zeros((0, Recorded.POINT + point_size(layout)))
 
-    def go(self, quota: int) -> int:
-        """0 done, 1 a buffer is full, 2 quota used up."""
+    def run_steps(self, quota: int) -> int:
+        """Continue for at most `quota` steps; returns 0 if done, 1 if a buffer is full, 2 if the quota is used up."""
         found: int = self.advance(
             self.work, self.ids, self.cursor, *self.tables, self.times, self.status, self.final, self.tally,
             self.samples, self.log, self.recorded, quota,
@@ -97,8 +97,8 @@ class Call:
         """Time that the job of the only lane has reached, s."""
         return clock(self.work, float(self.work[Row.TAU]))
 
-    def cut_off(self) -> None:
-        """Where the job of the only lane is, as its end: it will not go on."""
+    def store_interrupted(self) -> None:
+        """Store the current state of the only lane as its end, after an interruption."""
         layout, y = self.layout, np.empty(output_size(self.layout))
         copy_state(self.work, layout, y)
         self.final[0, : Final.POINT] = [self.time(), *self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED]]]
@@ -119,7 +119,7 @@ def run_single(
     jobs: Jobs, machine: Runner, times: np.ndarray, watch: bool, record: bool,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
-    """One trajectory, with its events and, if asked, its own steps. Ctrl-C ends it early, with what there is."""
+    """Integrate one trajectory, with events and, if asked, its own steps; Ctrl-C ends it with what there is."""
     return run_tables(machine, jobs.tables(machine, 0, 1, watch, record), times, progress)
 
 
@@ -127,9 +127,9 @@ def run_tables(
     machine: Runner, tables: tuple[np.ndarray, ...], times: np.ndarray,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
-    """`run_single` from the kernel's own arrays; what to watch and record stands in the settings.
+    """Integrate one trajectory from the kernel's arrays; the settings contain what to watch and record.
 
-    `progress` is told the time reached, in s, now and then.
+    `progress` is called now and then with the time reached, s.
     """
     settings = tables[2][0]
     call = Call(machine, tables, 1, times)
@@ -138,7 +138,7 @@ def run_tables(
     if settings[Setting.RECORD]:
         call.recorded = np.zeros((512, call.recorded.shape[1]))
     try:
-        while (reason := call.go(QUOTA * 10)) != 0:
+        while (reason := call.run_steps(QUOTA * 10)) != 0:
             if reason == 1:
                 call.log = np.concatenate([call.log, np.zeros_like(call.log)])
                 call.recorded = np.concatenate([call.recorded, np.zeros_like(call.recorded)])
@@ -146,16 +146,16 @@ def run_tables(
                 progress(call.time())
     except KeyboardInterrupt:
         if call.status[0] == 0:
-            call.cut_off()
+            call.store_interrupted()
     return call.outcome()
 
 
 def run_chunk(
     jobs: Jobs, machine: Runner, start: int, stop: int, times: np.ndarray, watch: bool, stopped: threading.Event
 ) -> Outcome:
-    """Some jobs in lanes, until done or asked to stop."""
+    """Integrate some jobs in lanes, until they are done or `stopped` is set."""
     call = Call(machine, jobs.tables(machine, start, stop, watch, False), stop - start, times)
-    while call.go(QUOTA) != 0 and not stopped.is_set():
+    while call.run_steps(QUOTA) != 0 and not stopped.is_set():
         pass
     return call.outcome()
 
@@ -168,7 +168,7 @@ def run_many(
     advanced: Callable[[int], None] | None = None,
     lanes: int = LANES,
 ) -> bool:
-    """Do `work` on consecutive chunks of jobs on all cores; False if Ctrl-C ended it early.
+    """Call `work` for consecutive chunks of jobs on all cores; returns False if Ctrl-C ended it early.
 
     At most two chunks per thread wait at any time, so that memory does not grow with the number of jobs.
     """
@@ -186,7 +186,7 @@ def run_many(
                     pending[pool.submit(work, start, stop, stopped)] = stop - start
                 if not pending:
                     return True
-                done, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)  # so that Ctrl-C is seen
+                done, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)  # a timeout lets Ctrl-C through
                 for future in done:
                     future.result()
                     if advanced is not None:
@@ -203,7 +203,7 @@ def run_many(
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""What happened in a run: moments, and the slip events that they delimit."""
+"""Events of a run, and the slip events between them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steadyslip.kernels.runner import LOG_KINDS
 
 @dataclass(frozen=True)
 class Event(Displayed):
-    """A moment of a run.
+    """Moment of a run at which something happens.
 
     Attributes
     ----------
@@ -42,11 +42,11 @@ class Event(Displayed):
 
 @dataclass(frozen=True)
 class SlipEvent(Displayed):
-    """Slip ahead of the load point, so that the spring unloads, at twice its velocity or more.
+    """Slip ahead of the load point, which unloads the spring, with a peak of at least twice the load point's velocity.
 
-    The block is faster than the load point (and not arrested) throughout, and at the peak at least twice as fast
-    as the load point is then, or as the rig's drive while the load point rests, and as itself at the beginning.
-    It begins where the block passes the load point, or, where it had not slowed down to it, where it was slowest.
+    The block is faster than the load point (and not arrested) throughout. Its peak velocity is at least twice that of
+    the load point (of the rig's drive while the load point rests) and twice its own at the beginning. The event begins
+    where the block becomes faster than the load point, or at its lowest velocity if it was faster before.
 
     Attributes
     ----------
@@ -59,7 +59,8 @@ class SlipEvent(Displayed):
     peak_velocity, peak_time : float
         m/s and s.
     recurrence : float
-        Time since the event before began, s; NaN for the first, and after one that was going on at the start.
+        Time since the beginning of the event before, s; NaN for the first, and if the event before began before the
+        run.
     """
 
     begin: float
@@ -74,19 +75,19 @@ class SlipEvent(Displayed):
 
 @dataclass(frozen=True)
 class ContactEvent(Displayed):
-    """A moment of a run of a machine, at one of its contacts.
+    """Moment of a run of a machine at which something happens at one of its contacts.
 
     Attributes
     ----------
     kind : str
-        As of an `Event`.
+        As in `Event`.
     time : float
         s.
     contact : str
     velocity : float
-        At which it slips, m/s.
+        Slip rate, m/s.
     normal_force, friction_force, pull : float
-        N; `pull` is what its contact law sees as T.
+        N; `pull` is the spring force that the contact law takes (its stress T times the area).
     slip : float
         Distance slipped since the start of the run, m.
     """
@@ -103,7 +104,7 @@ class ContactEvent(Displayed):
 
 @dataclass(frozen=True)
 class ContactSlip(Displayed):
-    """A `SlipEvent` of one contact of a machine; slip rates count as shares of those in steady sliding.
+    """`SlipEvent` of one contact of a machine; velocities are compared as shares of their values in steady sliding.
 
     Attributes
     ----------
@@ -113,11 +114,12 @@ class ContactSlip(Displayed):
     slip : float
         m.
     force_drop : float
-        Fall of the pull, N.
+        Fall of the pull during the event, N.
     peak_velocity, peak_time : float
         m/s and s.
     recurrence : float
-        Time since the event before began, s; NaN for the first, and after one that was going on at the start.
+        Time since the beginning of the event before, s; NaN for the first, and if the event before began before the
+        run.
     """
 
     contact: str
@@ -138,7 +140,7 @@ AnySlip = SlipEvent | ContactSlip
 def events_of(
     log: np.ndarray, contacts: Sequence[str] = ("",), areas: Sequence[float] = (1.0,)
 ) -> tuple[AnyEvent, ...]:
-    """The kernel's log as records, in the order of time: it logs a beginning only when slip has become fast."""
+    """Events of a kernel's log, in order of time (begins of slip are logged only when it becomes a slip event)."""
     log = log[np.argsort(log[:, 1], kind="stable")]
     each = len(LOG_KINDS) - 2
     found: list[AnyEvent] = []
@@ -149,7 +151,7 @@ def events_of(
 
 
 def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> AnyEvent:
-    """A record of an event, from time, velocity, σ, τ, T and slip."""
+    """Event from its kind and (time, velocity, σ, τ, T, slip)."""
     if not contact:
         return Event(kind, *numbers)
     time, v, sigma, tau, pull, slip = numbers
@@ -157,7 +159,7 @@ def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> 
 
 
 def slip_events(events: Sequence[AnyEvent]) -> tuple[AnySlip, ...]:
-    """Complete slip events of a run; one that is still going on at the end is not among them."""
+    """Complete slip events of a run, without one that is still going on at the end."""
     contacts = list(dict.fromkeys(event.contact if isinstance(event, ContactEvent) else "" for event in events))
     found: list[AnySlip] = []
     for name in contacts:
@@ -167,7 +169,7 @@ def slip_events(events: Sequence[AnyEvent]) -> tuple[AnySlip, ...]:
 
 
 def _slips(events: Sequence[AnyEvent]) -> list[AnySlip]:
-    """Those of one contact."""
+    """Complete slip events of one contact."""
     found: list[AnySlip] = []
     begin: AnyEvent | None = None
     peak: AnyEvent | None = None

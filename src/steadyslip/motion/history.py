@@ -1,4 +1,4 @@
-"""A run as data: what is kept in files, and what a result is made of."""
+"""Data of a run: content of saved files and base of `History`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from steadyslip.protocol import Protocol
 
 @dataclass(frozen=True, eq=False)
 class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
-    """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
+    """Motion of a rig under a protocol; ``history["v"]`` is an array over ``history["t"]``.
 
-    Observables of a machine have the names of bodies and contacts before them, ``history["table.v"]``.
+    Names of a machine's observables begin with the body or contact, as in ``history["table.v"]``.
 
     Attributes
     ----------
@@ -32,10 +32,10 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
         solver's own steps are kept.
     units : dict of str to str
     events : tuple of Event or ContactEvent
-        In the order of time; the latter of a machine.
+        In the order of time; `ContactEvent` of a machine.
     status : str
         ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
-        ``out of range`` (of floating point: the samples end before) or ``interrupted``.
+        ``out of range`` (of floating point; samples stop before it) or ``interrupted``.
     end : float
         Time reached, s: of the blow-up, of the loss of contact, or the end of the protocol.
     method : str
@@ -43,10 +43,10 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     rtol : float
     steps, rejected : int
     velocities : tuple of float
-        Lowest and highest velocity of the run, m/s, which lie between samples as a rule; of a machine a dict, slip
-        rates by contact.
+        Lowest and highest velocity of the run, m/s, also between samples; of a machine, a dict of slip rates by
+        contact.
     version : str
-        Of the program that computed it.
+        Version of the program that computed it.
     """
 
     rig: Slider | Machine

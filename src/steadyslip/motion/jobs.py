@@ -1,4 +1,4 @@
-"""Runs to be made: an operating point, a protocol and starting values as the arrays that kernels take."""
+"""Translation of runs (operating point, protocol, starting values) to the arrays that kernels take."""
 
 from __future__ import annotations
 
@@ -35,23 +35,25 @@ from steadyslip.protocol import Protocol, Segments, pack
 from steadyslip.protocol.creep import FREE
 
 METHOD_WORDS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
-TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
-MOST_SOLVED = 8  # stages of a method, where the balance has to be solved in each
-BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
-APART = (
+TIGHT_RTOL = (
+    1e-5  # rtol up to which the explicit pair of order 8 is faster than that of order 5 (benchmarks/methods.py)
+)
+MOST_STAGES_SOLVED = 8  # most stages of a method in which balances are solved; compilation takes minutes for more
+BLOW_UP = np.exp(200.0)  # velocity over the drive's: bounded orbits reach e^14 and more (theory 7), none this
+ROUNDING_DECIDES = (
     "the forces on the block are so much larger than what its velocity makes of them that rounding decides how it "
     "moves; look for a parameter that is too small or too large by orders of magnitude (a, a damping, a friction level)"
 )
-NO_PLACE = (
+NEEDS_STIFFNESS = (
     "creep as a part of a run needs a stiffness between drive and body: a dashpot alone has no place from which the "
     "drive could go on; give it one, or let creep last for the whole run (creep-step without creep)"
 )
-CONTACT_SHARE = 1e-9  # of the steady normal stress: below, contact is lost
+CONTACT_SHARE = 1e-9  # share of the steady normal stress below which contact counts as lost: the laws end at 0
 
 
 @dataclass(frozen=True)
 class Options:
-    """How to integrate and what to watch.
+    """Options of integration.
 
     Attributes
     ----------
@@ -85,27 +87,27 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Jobs:
-    """Everything about a set of trajectories except the kernel that runs them.
+    """Arrays of a set of trajectories, for any kernel.
 
     Attributes
     ----------
     point : OperatingPoint
-        Of all rigs, flat.
+        Of all rigs, one-dimensional.
     segments : Segments
     initial : ndarray (jobs, continuous variables)
     velocity : ndarray (jobs,)
-        At the start, m/s.
+        Initial velocity, m/s.
     near : ndarray (jobs, searched), optional
-        What is left to solve for at the start (`Reduction.searched`), where it is known; NaN elsewhere.
+        Initial values of the variables to be solved for (`Reduction.searched`); NaN where unknown.
     reduction : Reduction
     eliminate : int or None
-        The memory variable that follows from the balance.
+        Memory variable that follows from the balance and is not integrated.
     options : Options
     size : int
     targets : Targets
         What the protocol acts on.
     let_go : OperatingPoint, optional
-        Of all rigs while the drive pulls with a force of its own, if it does so for some time.
+        Operating points while the drive is let go, if it is for some time.
     """
 
     point: OperatingPoint
@@ -122,22 +124,22 @@ class Jobs:
 
     @property
     def exists(self) -> np.ndarray:
-        """Whether there is steady sliding to start from."""
+        """True for rigs with steady sliding to start from."""
         return np.atleast_1d(np.asarray(self.point.exists))
 
     @property
     def posed(self) -> np.ndarray:
-        """Whether the equations determine the motion near steady sliding; see `steadyslip.model.posed.posed`."""
+        """True where the equations determine the motion near steady sliding; see `steadyslip.model.posed.posed`."""
         found = posed(self.point)
         return found if self.let_go is None else found & posed(self.let_go)
 
     @property
     def in_range(self) -> np.ndarray:
-        """Whether floating point holds the numbers of the rigs, and rounding does not decide how they move."""
+        """True where numbers are within floating point and rounding does not decide the motion."""
         return np.asarray(np.atleast_1d(in_range(self.point)) & resolved(self.point))
 
     def choice(self, lanes: int, dense: bool) -> Choice:
-        """The kernel that these jobs need."""
+        """Choice of the kernel for these jobs."""
         method = METHOD_WORDS[self.options.method] or automatic_method(self.reduction, self.options.rtol)
         harmonics = self.segments.amplitude.shape[-1]
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
@@ -147,7 +149,7 @@ class Jobs:
         return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate, *acting)
 
     def tables(self, machine: Runner, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
-        """Constants, initial, settings and segment rows of some jobs."""
+        """Constants, initial values, settings and segments of the jobs from `start` to `stop`."""
         point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
         velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
@@ -156,7 +158,7 @@ class Jobs:
             near = self.near[start:stop].T
             found = [np.where(np.isfinite(own), own, guess) for own, guess in zip(near, found, strict=False)] or found
         first, *others = found
-        ask = _kept_settings if point.size == 1 else _settings
+        ask = _cached_settings if point.size == 1 else _settings
         settings = ask(point, machine, self.reduction, self.options)
         settings = settings.repeat(max(len(settings), np.size(first)) // len(settings), axis=0)
         settings[:, Setting.GUESS] = first
@@ -167,7 +169,7 @@ class Jobs:
 
 
 def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, options: Options) -> np.ndarray:
-    """Rows of settings, but for what depends on the start and on what is wanted."""
+    """Rows of settings, without those that depend on the start and on what is recorded."""
     scales, (unknown, *others) = natural_scales(point, reduction)
     sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))
     speed = slip_rates(point)[0]
@@ -179,11 +181,11 @@ def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, opti
     return settings
 
 
-_kept_settings = question(_settings)
+_cached_settings = question(_settings)
 
 
 def numbers(drive: Any, stress: Any, x: Any, unknown: Any, options: Options) -> dict[str, Any]:
-    """Settings by name, from drive, steady normal stress and natural scales: arrays, or nodes of a program."""
+    """Settings by name, from drive velocity, steady normal stress and natural scales: arrays, or nodes of a program."""
     return {
         "rtol": options.rtol,
         "most_steps": options.most_steps,
@@ -197,17 +199,17 @@ def numbers(drive: Any, stress: Any, x: Any, unknown: Any, options: Options) -> 
 
 
 def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
-    """Explicit for massless models in ln v or asinh, which are not stiff; Rosenbrock for the others.
+    """Name of the method for `auto`: explicit for massless models in ln v or asinh, Rosenbrock for stiff others.
 
-    Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs that of order 8 needs
-    less time for a given error where tolerances are tight (`benchmarks/methods.py`); where the balance has to be solved
-    in each of its stages it takes minutes to compile.
+    Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs the one of order 8 is
+    faster at tight tolerances (`benchmarks/methods.py`), but takes minutes to compile if balances are solved in each of
+    its stages.
     """
     kinds = [one.variable.kind for one in reduction.slidings if one.variable is not None]
-    free = "loading" in reduction.model.inputs  # no spring brings a block back that slides fast, which is stiff
+    free = "loading" in reduction.model.inputs  # without a spring to stop it the block slides fast, which is stiff
     if any(one.inertial for one in reduction.model.coordinates) or "linear" in kinds or free:
         return "rodas4"
-    return "dop853" if rtol <= TIGHT and not reduction.unknowns else "tsit5"
+    return "dop853" if rtol <= TIGHT_RTOL and not reduction.unknowns else "tsit5"
 
 
 def prepare(
@@ -219,7 +221,7 @@ def prepare(
     options: Options,
     branch: int = 0,
 ) -> Jobs:
-    """Check everything and bring it into arrays.
+    """Check all arguments of runs and translate them to arrays.
 
     Parameters
     ----------
@@ -227,12 +229,12 @@ def prepare(
         Parameters of the rig and, as ``protocol.pieces.1.to`` or ``protocol.until``, of the protocol: flat arrays
         of equal length or numbers.
     initial : mapping
-        Starting values of model variables, as `vary`.
+        Starting values of model variables, arrays as in `vary`.
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If anything is wrong; lists every problem.
     NotAvailable
         If the rig cannot move as asked, or the numbers of a single rig leave the range of floating point.
     """
@@ -248,7 +250,7 @@ def prepare(
     if not own:
         require_range(point)
         if not np.all(resolved(point)):
-            raise NotAvailable(APART)
+            raise NotAvailable(ROUNDING_DECIDES)
     final = plan.until if until is None else until
     if final is None:
         raise ParameterError([Problem("until", "missing; give the end of the run in s, such as until=200")])
@@ -260,9 +262,9 @@ def prepare(
         )  # fmt: skip
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate, acting.pushes, acting.presses)
-    _refuse_endless(reduction, options.method)
+    _refuse_slow_to_compile(reduction, options.method)
     if acting.drive == EITHER and not np.all(np.asarray(point.evaluate(_taken_up_by(point.model))) > 0):
-        raise NotAvailable(NO_PLACE)
+        raise NotAvailable(NEEDS_STIFFNESS)
     free = segments.value[:, 0, FREE] if acting.drive == EITHER else 0.0
     start, velocity = initial_values(reduction, point, initial, free)
     let_go = operating_point(rig, own, branch=branch, drive=PULLED) if acting.drive == EITHER else None
@@ -272,17 +274,17 @@ def prepare(
 
 @question
 def _taken_up_by(model: Model) -> ArrayFunction:
-    """Stiffness of what carries the force of a drive that is let go."""
+    """Stiffness of the element that carries the force of a drive that is let go."""
     return model.function([] if model.letting_go is None else [model.letting_go.stiffness])
 
 
-def _refuse_endless(reduction: Reduction, method: str) -> None:
-    """A method with so many stages that an equation to be solved in each takes minutes to compile."""
+def _refuse_slow_to_compile(reduction: Reduction, method: str) -> None:
+    """Refuse a method with many stages where balances are solved in each, because it takes minutes to compile."""
     if not reduction.unknowns or METHOD_WORDS[method] not in TABLEAUS:
         return
     stages = {name: make().stages for name, make in TABLEAUS.items()}
-    if stages[METHOD_WORDS[method]] > MOST_SOLVED:
-        allowed = ", ".join(["auto", *(name for name, count in stages.items() if count <= MOST_SOLVED)])
+    if stages[METHOD_WORDS[method]] > MOST_STAGES_SOLVED:
+        allowed = ", ".join(["auto", *(name for name, count in stages.items() if count <= MOST_STAGES_SOLVED)])
         message = (
             f"got {method!r}; for this rig velocity follows from an equation that has to be solved in each of its "
             f"{stages[METHOD_WORDS[method]]} stages, which would take minutes to compile; allowed here: {allowed}"
@@ -291,7 +293,7 @@ def _refuse_endless(reduction: Reduction, method: str) -> None:
 
 
 def _refuse_singular(rig: Slider | Machine, point: OperatingPoint, varied: bool) -> None:
-    """What the friction laws say cannot be followed beyond small motions."""
+    """Refuse rigs whose friction laws cannot be followed beyond small motions."""
     own = with_values(rig, point.named()) if varied else rig
     laws = {"friction": own.friction} if isinstance(own, Slider) else {}
     if isinstance(own, Machine):

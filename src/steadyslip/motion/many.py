@@ -1,4 +1,4 @@
-"""Many runs at once: the same rig with other numbers, in lanes, on all cores."""
+"""Ensembles: runs of variants of a rig in lanes, on all cores."""
 
 from __future__ import annotations
 
@@ -53,17 +53,17 @@ def event_unit(name: str) -> str:
 
 
 def event_names(rig: Rig) -> tuple[str, ...]:
-    """The columns of `Ensemble.events`: of a machine for each contact, with its name before it."""
+    """Columns of `Ensemble.events`; of a machine for each contact, with its name as prefix."""
     if not isinstance(rig, Machine):
         return tuple(EVENT_UNITS)
-    return tuple(f"{contact}.{_of_contact(name)}" for contact in rig.contacts for name in EVENT_UNITS)
+    return tuple(f"{contact}.{_contact_column(name)}" for contact in rig.contacts for name in EVENT_UNITS)
 
 
 NORMAL_FORCE = ".normal_force"
 
 
-def _of_contact(name: str) -> str:
-    """What a column is called where it is one of a contact's: its stresses are forces."""
+def _contact_column(name: str) -> str:
+    """Name of a column for a contact of a machine, where stresses become forces."""
     return name.replace("stress_drop", "force_drop")
 
 
@@ -80,11 +80,11 @@ class Ensemble(ReadOnly):
     final : dict of str to ndarray
         Observables at the end, SI units.
     events : dict of str to ndarray
-        Per run: number of complete slip events (see `SlipEvent`), highest and lowest velocity, and of the last
-        complete event begin, duration, slip, stress drop, peak velocity and recurrence; number of arrests and velocity
-        peaks, time of the last peak, the period between the last two, and the growth of |ln(peak velocity/drive)|.
-        Where there is none, duration, slip and stress drop are 0, times and velocities NaN; empty unless asked for.
-        Of a machine all that for each contact, with its name before it, and a force drop, N.
+        Per run: number of complete slip events (see `SlipEvent`), highest and lowest velocity; begin, duration, slip,
+        stress drop, peak velocity and recurrence of the last complete event; number of arrests and velocity peaks, time
+        of the last peak, period between the last two, growth of |ln(peak velocity/drive)| between them. Without events,
+        duration, slip and stress drop are 0, times and velocities NaN. Empty unless asked for. For a machine, these for
+        each contact, prefixed with its name, and force drop (N) in place of stress drop.
     samples : dict of str to ndarray
         Observables at `times`, which is the last axis; NaN after the end of a run.
     times : ndarray
@@ -105,7 +105,7 @@ class Ensemble(ReadOnly):
 
     @property
     def status(self) -> np.ndarray:
-        """How each run ended, in words."""
+        """Status of each run, in words."""
         return np.asarray(read_only(np.array(WORDS)[self.status_code]))
 
     @property
@@ -114,9 +114,9 @@ class Ensemble(ReadOnly):
 
     @property
     def contact(self) -> np.ndarray:
-        """Of machines, the contact that lifted off in runs that ended so; empty elsewhere.
+        """Contact of a machine that lifted off, for runs that ended so; empty elsewhere.
 
-        Also where normal forces are not among the observables, which tell.
+        Empty everywhere if normal forces are not among the observables.
         """
         lost = self.status_code == WORDS.index("contact lost")
         names = [name.removesuffix(NORMAL_FORCE) for name in self.final if name.endswith(NORMAL_FORCE)]
@@ -127,13 +127,13 @@ class Ensemble(ReadOnly):
         return np.asarray(read_only(found.astype(str)))
 
     def summary(self) -> str:
-        """How many runs ended how."""
+        """Numbers of runs by status."""
         codes, counts = np.unique(self.status_code, return_counts=True)
         parts = [f"{count} {WORDS[code]}{self._lifted(code)}" for code, count in zip(codes, counts, strict=True)]
         return f"{self.status_code.size} runs: " + ", ".join(parts)
 
     def _lifted(self, code: int) -> str:
-        """Which contacts lifted off, and how often."""
+        """Contacts that lifted off, with the number of runs of each."""
         names, counts = np.unique(self.contact[self.status_code == code], return_counts=True)
         told = [f"{name} {count}" for name, count in zip(names, counts, strict=True) if name]
         return f" ({', '.join(told)})" if told else ""
@@ -142,7 +142,7 @@ class Ensemble(ReadOnly):
         return self.summary()
 
     def to_xarray(self) -> Any:
-        """An xarray.Dataset; axes are named as those of the DataArrays that were varied, or dim_0, dim_1, ..."""
+        """xarray.Dataset; axes are named as those of the DataArrays that were varied, or dim_0, dim_1, ..."""
         import xarray as xr
 
         dims = self._dims or tuple(f"dim_{i}" for i in range(len(self.shape)))
@@ -182,10 +182,10 @@ def simulate_many(
     progress: bool | None = None,
     branch: int = 0,
 ) -> Ensemble:
-    """Integrate many variants of a rig side by side.
+    """Integrate many variants of a rig in parallel.
 
-    Results do not depend on the number of threads or on which other runs there are. They are those of `simulate` to
-    within its tolerance; steps are chosen by the same rule, but rounded otherwise, so that a few may differ.
+    Results do not depend on the number of threads or on which other runs there are. They agree with `simulate` within
+    its tolerance; step sizes follow the same rule but round differently, so that a few steps may differ.
 
     Parameters
     ----------
@@ -200,23 +200,23 @@ def simulate_many(
     times : array_like, optional
         Times at which to sample, s.
     observables : sequence of str, optional
-        Which to keep, in `final` and `samples`; all unless given.
+        Observables to keep in `final` and `samples`; by default all.
     events : bool, optional
-        Whether to gather event statistics; without, runs are some tenths faster.
+        True to gather event statistics; without them runs are some tenths faster.
     threads : int, optional
-        All cores unless given.
+        Number of threads; by default all cores.
     progress : bool, optional
-        Whether to show a progress bar; by default on a terminal, for work of more than a second or two.
+        True to show a progress bar; by default on a terminal, for work of more than a second or two.
 
     Returns
     -------
     Ensemble
-        After Ctrl-C, runs that were not finished have the status ``interrupted``.
+        After Ctrl-C, unfinished runs have the status ``interrupted``.
 
     Raises
     ------
     ParameterError
-        If anything given is wrong; everything is listed.
+        If any argument is wrong; lists every problem.
     """
     options = Options(method, rtol, most_steps, arrest)
     flat, start, together = broadcast_arrays(rig, Protocol.of(protocol), vary, initial or {})
@@ -226,8 +226,8 @@ def simulate_many(
     groups = list(regimes(rig, flat, size))
     with progress_bar(size, progress) as advanced:
         for group_rig, chosen, index in groups:
-            part = {name: _picked(a, index) for name, a in chosen.items()}
-            begin = {name: _picked(a, index) for name, a in start.items()}
+            part = {name: _at(a, index) for name, a in chosen.items()}
+            begin = {name: _at(a, index) for name, a in start.items()}
             jobs = prepare(group_rig, protocol, until, part, begin, options, branch)
             requested = checked_times(times, float(jobs.segments.end.max()))
             if store is None:
@@ -236,14 +236,14 @@ def simulate_many(
             if not _run(jobs, store, index, count, requested, threads, advanced):
                 break
     if store is None:
-        raise InternalError("store is not None")
+        raise InternalError("the runs were split into no groups")
     return store.result(shape, together.dims or (), together.coords)
 
 
 def broadcast_arrays(
     rig: Slider | Machine, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any], BroadcastArrays]:
-    """Flat arrays of equal length by full name, the starting values apart, and how they go together."""
+    """Flat arrays of equal length by full name, those of starting values, and the rule of broadcasting."""
     known = dict.fromkeys([*rig.parameters(), *parameters(plan, "protocol.")])
     problems, named = [], {}
     for name, value in vary.items():
@@ -263,12 +263,12 @@ def broadcast_arrays(
     return flat, start, together
 
 
-def _picked(array: Any, index: np.ndarray | None) -> Any:
+def _at(array: Any, index: np.ndarray | None) -> Any:
     return array[index] if index is not None and np.ndim(array) else array
 
 
 def regimes(rig: R, flat: dict[str, Any], size: int) -> Iterator[tuple[R, dict[str, Any], np.ndarray | None]]:
-    """Split where a structural parameter (mass, B0, ...) is zero in some runs: those have other equations."""
+    """Group the runs by which structural parameters (mass, B0, ...) are zero, because the equations differ."""
     structural = [
         name
         for name, value in flat.items()
@@ -289,12 +289,12 @@ def regimes(rig: R, flat: dict[str, Any], size: int) -> Iterator[tuple[R, dict[s
 
 
 def _columns(model: Model) -> dict[str, tuple[int, int, bool]]:
-    """Columns of the tally by name, with the number of the contact and whether it is a force in place of a stress."""
+    """Columns of the event statistics by name: (column, contact, True for a force in place of a stress)."""
     found: dict[str, tuple[int, int, bool]] = {}
     for i, contact in enumerate(model.contacts):
         for k, name in enumerate(TALLY):
             if name and contact.name:
-                own = _of_contact(name)
+                own = _contact_column(name)
                 found[f"{contact.name}.{own}"] = (i * len(TALLY) + k, i, own != name)
             elif name:
                 found[name] = (k, 0, False)
@@ -302,7 +302,7 @@ def _columns(model: Model) -> dict[str, tuple[int, int, bool]]:
 
 
 class _Store:
-    """Arrays of results for all runs."""
+    """Result arrays of all runs."""
 
     def __init__(
         self, jobs: Jobs, size: int, times: np.ndarray, observables: Sequence[str] | None, events: bool
@@ -329,7 +329,7 @@ class _Store:
             self.samples = {name: np.full((size, len(times)), np.nan) for name in wanted}
 
     def put(self, where: Any, jobs: Jobs, machine: Any, first: int, outcome: Outcome) -> None:
-        """Everything that a chunk of runs has to say."""
+        """Store the results of a chunk of runs."""
         own = jobs.point.part(slice(first, first + len(outcome.status)))
         absent = np.broadcast_to(~np.asarray(own.exists), outcome.status.shape)
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
@@ -337,7 +337,7 @@ class _Store:
         ended = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
         self.code[where] = np.where(known, ended, OUT_OF_RANGE)
         self.end[where] = np.where(absent, np.nan, outcome.final[:, Final.TIME])
-        counts = np.nan_to_num(outcome.steps)  # NaN where a run was never finished
+        counts = np.nan_to_num(outcome.steps)  # NaN for runs that were not finished
         self.steps[where], self.rejected[where] = counts.T
         for name, (column, contact, force) in self.columns.items():
             area = own.evaluate(areas(own.model))[contact] if force else 1.0
@@ -349,7 +349,7 @@ class _Store:
         segment, time = final[:, Final.SEGMENT].astype(int), final[:, Final.TIME]
         found = observe(jobs, machine, first, ran, segment, time, outcome.point[ran], outcome.tables)
         rows = np.arange(len(self.code))[where]
-        self._leaves_range(rows[ran], time, out_of_range(found))
+        self._mark_out_of_range(rows[ran], time, out_of_range(found))
         for name, array in self.final.items():
             if name in found:
                 array[rows[ran]] = found[name]
@@ -359,13 +359,13 @@ class _Store:
             found = observe(
                 jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k], outcome.tables
             )
-            self._leaves_range(rows[lane], self.times[k], out_of_range(found))
+            self._mark_out_of_range(rows[lane], self.times[k], out_of_range(found))
             for name, array in self.samples.items():
                 if name in found:
                     array[rows[lane], k] = found[name]
 
-    def _leaves_range(self, rows: np.ndarray, time: np.ndarray, bad: np.ndarray) -> None:
-        """Runs that reached their end, but with numbers that are none at some time."""
+    def _mark_out_of_range(self, rows: np.ndarray, time: np.ndarray, bad: np.ndarray) -> None:
+        """Mark finished runs with infinite or NaN observables as out of range."""
         bad &= np.isin(self.code[rows], (DONE, OUT_OF_RANGE))
         self.code[rows[bad]] = OUT_OF_RANGE
         np.minimum.at(self.end, rows[bad], time[bad])

@@ -1,4 +1,4 @@
-"""From states and times to everything that can be observed."""
+"""Observables computed from states and times."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ Array = np.ndarray
 Tables = tuple[np.ndarray, ...]
 OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity",
             "load_displacement")  # fmt: skip
-"""What the driver's `observe` gives, in this order."""
-LOADING = "loading of the drive"  # by which the imposed force of the drive changes
-WAY, LOAD = "way of the drive", "velocity of the drive"  # of a contact; no name in results
+"""Outputs of the driver's `observe` for each contact, in this order."""
+LOADING = "loading of the drive"  # imposed force on the drive; keys of intermediate values, not in results
+WAY, LOAD = "way of the drive", "velocity of the drive"  # of a contact; keys of intermediate values
 STRESSES = ("normal_stress", "shear_stress", "spring_stress")
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s"}
 
 
 def observable_units(model: Model, acting: Targets) -> dict[str, str]:
-    """Names and SI units of everything that a run can show, in which a protocol acts so."""
+    """Names and SI units of all observables of a run, for a model and what its protocol acts on."""
     if model.contacts[0].name:
         return _machine_units(model, acting)
     units = (
@@ -43,7 +43,7 @@ def observable_units(model: Model, acting: Targets) -> dict[str, str]:
 
 
 def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
-    """Of a machine: by body and by contact, in forces."""
+    """Names and units for a machine: by body and by contact, in forces."""
     units: dict[str, str] = {}
     for one in model.coordinates:
         units |= {
@@ -67,7 +67,7 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
 
 
 def out_of_range(found: dict[str, Array]) -> Array:
-    """Where any observable is infinite or no number."""
+    """True where any observable is infinite or NaN."""
     first, *others = found.values()
     good: Array = np.isfinite(first)
     for values in others:
@@ -76,7 +76,7 @@ def out_of_range(found: dict[str, Array]) -> Array:
 
 
 def _given(model: Model) -> dict[sp.Symbol, str]:
-    """What observables follow from."""
+    """Symbols that observables are computed from, with their names among the results."""
     given: dict[sp.Symbol, str] = {}
     for one in model.coordinates:
         own = f"{one.name}." if model.contacts[0].name else ""
@@ -98,7 +98,7 @@ def _given(model: Model) -> dict[sp.Symbol, str]:
 
 @question
 def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
-    """Observables that follow from others: their names, and the names and the function of what they follow from."""
+    """Names of computed observables, names of their arguments, and the function from these to those."""
     given = _given(model)
     known = set(given.values())
     names = [n for n in model.observables if n not in known]
@@ -109,19 +109,19 @@ def observe(
     jobs: Jobs, machine: Runner, first: int, lane: Array, segment: Array, time: Array, points: Array,
     tables: Tables | None = None,
 ) -> dict[str, Array]:  # fmt: skip
-    """All observables at given points.
+    """Compute all observables at given points.
 
     Parameters
     ----------
     first : int
-        Job that lane 0 belongs to.
+        Job of lane 0.
     lane, segment : ndarray of int (points,)
     time : ndarray (points,)
-        Since the start of the run.
+        Time since the start of the run, s.
     points : ndarray (points, 1 + state + further unknowns)
-        Unknowns of the balances (NaN where they are not known) around the state: see `Sampled`.
+        Points with unknowns of the balances (NaN where not known) before and after the state: see `Sampled`.
     tables : tuple of ndarray, optional
-        Those of the jobs from `first` on, if they are at hand.
+        Tables of the jobs from `first` on, if they are already computed.
     """
     reduction = machine.reduction
     model = reduction.model
@@ -146,24 +146,24 @@ def observe(
         found[LOADING] = inputs[:, channels.DISTURBANCE]
     point = jobs.point.part(slice(first, last)).part(lane)
     if reduction.further:
-        _of_the_drive(model, found, point)
+        _add_displacements(model, found, point)
     else:
         found["slip"] = found["x"] + found["load_displacement"]
     if model.letting_go is not None:
         found[FREE] = inputs[:, creep.FREE]
         rate = rates_at(jobs.segments, first + lane, segment, time)[:, creep.LOADING]
-        ahead = point.evaluate(_ahead(model), *(found[name] for name in _function(model)[1]), rate)
+        ahead = point.evaluate(_load_point_lead(model), *(found[name] for name in _function(model)[1]), rate)
     names, given, function = _function(model)
     for name, value in zip(names, point.evaluate(function, *(found[n] for n in given)), strict=True):
         found[name] = value if np.shape(value) == time.shape else np.full(time.shape, value, dtype=float)
     if model.letting_go is not None:
-        _from_load_point(model, found, point, *ahead)
+        _shift_to_load_point(model, found, point, *ahead)
     return found
 
 
 @question
-def _ahead(model: Model) -> ArrayFunction:
-    """How far the load point of a drive that was let go is ahead of steady motion, and how fast that grows."""
+def _load_point_lead(model: Model) -> ArrayFunction:
+    """Displacement of a let-go drive's load point ahead of steady motion, and its rate."""
     own = model.letting_go
     if own is None:
         raise InternalError("the drive is never let go")
@@ -172,8 +172,10 @@ def _ahead(model: Model) -> ArrayFunction:
     return model.function([own.ahead, own.speed], *(names[name] for name in given), own.loading_rate)
 
 
-def _from_load_point(model: Model, found: dict[str, Array], point: OperatingPoint, ahead: Array, speed: Array) -> None:
-    """Let displacements count from where the load point is, which it is not driven to while it is let go."""
+def _shift_to_load_point(
+    model: Model, found: dict[str, Array], point: OperatingPoint, ahead: Array, speed: Array
+) -> None:
+    """Refer displacements to the load point where it is, ahead of steady motion while the drive is let go."""
     found["load_displacement"] = found["load_displacement"] + ahead
     found["load_velocity"] = found["load_velocity"] + speed
     shares = point.evaluate(_shares(model))[len(model.contacts) :]
@@ -183,7 +185,7 @@ def _from_load_point(model: Model, found: dict[str, Array], point: OperatingPoin
 
 
 def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
-    """What the driver's `observe` gives of each contact."""
+    """Outputs of the driver's `observe` by name."""
     found: dict[str, Array] = {}
     for i, contact in enumerate(model.contacts):
         seen = dict(zip(OBSERVED, values[len(OBSERVED) * i :], strict=False))
@@ -197,7 +199,7 @@ def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
 
 @question
 def _shares(model: Model) -> ArrayFunction:
-    """Slip rate of the contacts and speed of the coordinates in steady sliding, over the velocity of the drive."""
+    """Slip rates of contacts and speeds of coordinates in steady sliding, over the velocity of the drive."""
     drive = model.steady[model.inputs["load_velocity"]]
     speeds = [model.steady[contact.velocity] for contact in model.contacts]
     return model.function(speed / drive for speed in (*speeds, *(one.speed for one in model.coordinates)))
@@ -208,8 +210,8 @@ def _slips(model: Model) -> ArrayFunction:
     return model.function([c.slip for c in model.contacts], *(one.displacement for one in model.coordinates))
 
 
-def _of_the_drive(model: Model, found: dict[str, Array], point: OperatingPoint) -> None:
-    """Ways of bodies and contacts since the start: how far they are ahead of steady sliding, and the drive's way."""
+def _add_displacements(model: Model, found: dict[str, Array], point: OperatingPoint) -> None:
+    """Add displacements of bodies and contacts since the start: steady motion with the drive plus the deviation."""
     shares = point.evaluate(_shares(model))
     slips, speeds = shares[: len(model.contacts)], shares[len(model.contacts) :]
     places = [found[f"{one.name}.x"] for one in model.coordinates]

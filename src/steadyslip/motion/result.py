@@ -1,4 +1,4 @@
-"""The history of one run: samples, events, status, and everything needed to know where it came from."""
+"""History of one run: samples, events, status, rig and protocol."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from steadyslip.motion.events import AnySlip, ContactEvent, ContactSlip, Event, 
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.status import remedy
 
-STILL = 1e-6  # share by which velocities of steady sliding may differ in a run
+STEADY_SPREAD = 1e-6  # relative spread of velocity up to which a run counts as steady: ten times the default rtol
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +31,12 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C ended the run early."""
+        """True if Ctrl-C ended the run early."""
         return self.status == "interrupted"
 
     @property
     def message(self) -> str:
-        """The status in a sentence, with what to do where the run ended early."""
+        """Status in a sentence, with advice where the run ended early."""
         where = f" ({self.contact})" if self.contact else ""
         head = f"{self.status}{where} at {format_quantity(self.end, 's')}"
         area = None if isinstance(self.rig, Machine) else self.rig.area
@@ -45,17 +45,17 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def contact(self) -> str:
-        """The contact of a machine at which a run ended that was to go on: lost, or the fastest; else empty."""
+        """Contact of a machine at which a run ended early (lost, or the fastest in a blow-up); else empty."""
         last = next((e for e in reversed(self.events) if e.kind == self.status), None)
         return last.contact if isinstance(last, ContactEvent) else ""
 
     @cached_property
     def slip_events(self) -> tuple[AnySlip, ...]:
-        """Complete slip events; see `SlipEvent` and, of machines, `ContactSlip`."""
+        """Complete slip events; see `SlipEvent` and, for machines, `ContactSlip`."""
         return slip_events(self.events)
 
     def summary(self) -> str:
-        """What happened, in a few lines."""
+        """Summary in a few lines."""
         lines = [f"{self.message}", *(self._contacts() if isinstance(self.rig, Machine) else self._block())]
         until = self.protocol.until or np.inf
         begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
@@ -72,13 +72,13 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def undisturbed(self) -> bool:
-        """Whether nothing was done to steady sliding, which goes on then, be it stable or not."""
+        """True if nothing disturbed steady sliding, which then goes on even if it is unstable."""
         known = self.velocities.values() if isinstance(self.velocities, dict) else [self.velocities]
-        still = all(high - low <= STILL * abs(high) for low, high in known)
+        still = all(high - low <= STEADY_SPREAD * abs(high) for low, high in known)
         return not self.protocol.pieces and still and self.status == "done"
 
     def _caveats(self) -> list[str]:
-        """What a reader must know to make no mistake about the run."""
+        """Lines that warn of easily misread runs."""
         lines = []
         if self.protocol.frees_load_point:
             lines.append("drive           pulls with a force of its own; its motion does not hold anything back")
@@ -89,7 +89,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         return lines
 
     def _contacts(self) -> list[str]:
-        """Of a machine: what its contacts do."""
+        """Summary lines of a machine's contacts."""
         lines: list[str] = []
         velocities = self.velocities
         for name, (lowest, highest) in velocities.items() if isinstance(velocities, dict) else ():
@@ -119,7 +119,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         return lines
 
     def _block(self) -> list[str]:
-        """Of a slider: what its block does."""
+        """Summary lines of a slider's block."""
         lines: list[str] = []
         if not isinstance(self.rig, Slider) or not isinstance(self.velocities, tuple):
             return lines
@@ -149,7 +149,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         return self.summary()
 
     def to_dict(self) -> dict[str, Any]:
-        """Status and events as plain numbers and words, for JSON; samples are in the files."""
+        """Status, events and final values as JSON-ready dict, SI units; samples are left to files."""
         last = {name: float(values[-1]) for name, values in self.data.items() if len(values)}
         return {
             "version": self.version,
@@ -162,18 +162,18 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             "steps": self.steps,
             "rejected": self.rejected,
             "final": {name: value if np.isfinite(value) else None for name, value in last.items()},
-            "slip_events": [_plain(event) for event in self.slip_events],
-            "events": [_plain(event) for event in self.events],
+            "slip_events": [_json_ready(event) for event in self.slip_events],
+            "events": [_json_ready(event) for event in self.events],
             "units": self.units,
         } | self._forces(last)
 
     def _forces(self, last: dict[str, float]) -> dict[str, Any]:
-        """With an area, the last values of the whole contact."""
+        """Final values for the whole contact area; empty without an area."""
         found = totals(last, self.units, self.rig.area) if isinstance(self.rig, Slider) else {}
         return {"forces": {"area": found["area"], "final": found["values"], "units": found["units"]}} if found else {}
 
     def to_xarray(self) -> Any:
-        """An xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions in its attributes."""
+        """xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions as attributes."""
         return store.to_dataset(self)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -187,7 +187,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def plot(self, kind: str = "history", ax: Any = None, contact: str | None = None) -> Any:
         """Draw the run: ``history`` (velocity, friction and normal stress in time) or ``phase`` (phase plane).
 
-        Of a machine the phase plane is that of one contact, which `contact` names; else the one that moves most.
+        For a machine, `contact` selects the contact of the phase plane; by default the one that moves most.
 
         Returns
         -------
@@ -199,12 +199,12 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
 
 def check_contact(rig: Slider | Machine, contact: str | None) -> None:
-    """Refuse a contact whose phase plane cannot be drawn, because the rig has none of that name.
+    """Raise an error if the rig has no contact of this name, whose phase plane could be drawn.
 
     Raises
     ------
     ParameterError
-        With the contacts that there are.
+        With the names of the contacts.
     """
     if contact is None:
         return
@@ -218,17 +218,17 @@ def check_contact(rig: Slider | Machine, contact: str | None) -> None:
 def load_history(path: str | PathLike[str]) -> History:
     """Read a history that `History.save` wrote.
 
-    Nothing in the file is executed; damage is found, whatever it is.
+    Nothing in the file is executed; the content is verified.
 
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file is not a saved history, is damaged, or cannot be read.
     """
     return History(**store.read(path))
 
 
-def _plain(record: Any) -> dict[str, Any]:
-    """Fields of an event, NaN as None."""
+def _json_ready(record: Any) -> dict[str, Any]:
+    """Fields of an event as JSON-ready dict, NaN as None."""
     fields = asdict(record)
     return {n: None if isinstance(v, float) and not np.isfinite(v) else v for n, v in fields.items()}

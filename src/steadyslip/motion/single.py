@@ -1,4 +1,4 @@
-"""One run: what does this rig do?"""
+"""Simulation of one run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
 OWN_STEPS = 500_000
-"""Limit of steps of a run that reports them all: some hundred bytes each, up to four times."""
+"""Most steps of a run that records them all: a point takes some hundred bytes, and order 8 records four per step."""
 
 
 @checked(until=finite(0), times=NUMBERS)
@@ -57,43 +57,43 @@ def simulate(
     ----------
     rig : Slider or Machine
     protocol : Protocol, Piece or sequence of Piece, optional
-        What load point, normal stress and disturbance do; by default the drive's steady velocity.
+        Motion of load point, normal stress and disturbance; by default steady motion of the drive.
     until : float, optional
-        End, s; the protocol's own unless given.
+        End, s; by default the protocol's own.
     initial : mapping of str to float, optional
         Starting values that differ from steady sliding, in SI units: ``x``, ``v`` and the memory variables of
         the friction law (names as in ``build_model(rig)``). Without mass, velocity follows from the memory:
         give one of the two (a given ``v`` adjusts the first memory variable that is not given).
     times : array_like, optional
-        Times at which to report, s, rising; the solver's own steps unless given, and three points within each of
-        those of order 8. At a jump, the value after it.
+        Rising times at which to report, s; by default the solver's own steps, with three points within each step of
+        order 8. At a jump, the value after it.
     events : bool, optional
-        Whether to locate events.
+        True to locate events.
     method : str, optional
         ``explicit``, ``rosenbrock``, a method's own name, or ``auto``: explicit for massless rate-and-state models,
         which are not stiff in ln v (of order 8 where `rtol` is 1e-5 or less), Rosenbrock for everything else.
     rtol : float, optional
         Error allowed per step, relative to the size of each variable or to its scale (1 for ln v).
     most_steps : int, optional
-        Limit of steps; unless given 10 million, or half a million where the solver's own steps are reported, which
-        all stay in memory.
+        Most steps; by default 10 million, or half a million where the solver's own steps are recorded, which stay in
+        memory.
     arrest : float, optional
         Share of the drive velocity below which the block counts as arrested.
     branch : int, optional
-        Which steady sliding to start from where there are several.
+        Number of the steady sliding to start from where there are several.
     progress : callable, optional
         Called with the time reached, s, while the run goes on.
 
     Returns
     -------
     History
-        Its `status` says how the run ended. A run that cannot be continued returns what there is, and so does one
-        that is stopped by Ctrl-C: ``interrupted``.
+        Its `status` tells how the run ended. A run that cannot be continued, or that Ctrl-C stops (``interrupted``),
+        returns what was computed.
 
     Raises
     ------
     ParameterError
-        If anything given is wrong; everything is listed.
+        If any argument is wrong; lists every problem.
     NoSteadySliding
         If there is no steady sliding to start from.
     NotAvailable
@@ -111,17 +111,17 @@ def simulate(
     requested = checked_times(times, final)
     machine = jobs.runner(lanes=1, dense=True)
     outcome = run_single(jobs, machine, requested, watch=events, record=times is None, progress=progress)
-    return _history(rig, _ended(plan, final), jobs, machine, outcome, requested, times is None)
+    return _history(rig, _with_end(plan, final), jobs, machine, outcome, requested, times is None)
 
 
 @lru_cache(maxsize=32)
-def _ended(plan: Protocol, until: float) -> Protocol:
-    """A protocol with its end."""
+def _with_end(plan: Protocol, until: float) -> Protocol:
+    """Protocol with its end set."""
     return plan if plan.until == until else replace(plan, until=until)
 
 
 def checked_times(times: Any, until: float) -> np.ndarray:
-    """Requested times as an array.
+    """Requested times as an array, checked.
 
     Raises
     ------
@@ -199,14 +199,14 @@ def _surfaces(point: OperatingPoint) -> tuple[float, ...]:
 
 @question
 def areas(model: Model) -> ArrayFunction:
-    """Areas of the contacts, of which forces are stresses times."""
+    """Function for the areas of the contacts, m²; forces are stresses times areas."""
     return model.function(contact.area for contact in model.contacts)
 
 
 def _velocities(
     outcome: Outcome, contacts: tuple[str, ...], found: dict[str, np.ndarray], events: tuple[AnyEvent, ...]
 ) -> tuple[float, float] | dict[str, tuple[float, float]]:
-    """Lowest and highest velocity of a run: at samples and events, and of what is kept of it where it was watched."""
+    """Lowest and highest velocity of a run, from samples, events and the event statistics."""
     each: dict[str, tuple[float, float]] = {}
     for i, name in enumerate(contacts):
         first, samples = i * len(TALLY), found[f"{name}.slip_rate" if name else "v"]
@@ -219,7 +219,7 @@ def _velocities(
 
 
 def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome, surfaces: tuple[float, ...]) -> AnyEvent:
-    """The end of a run that could not go on, as an event: of a machine at the contact that is lost, or fastest."""
+    """Event for the end of a run that could not go on; of a machine at the contact that is lost, or fastest."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
     segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]
     found = observe(jobs, machine, 0, zero, segment, time, outcome.point, outcome.tables)

@@ -1,4 +1,4 @@
-"""How a run ended, and what to do about it."""
+"""Statuses of runs, and advice for each."""
 
 from __future__ import annotations
 
@@ -35,6 +35,6 @@ _MASS = {
 
 
 def remedy(word: str, machine: bool, area: float | None = None) -> str:
-    """What to do about a status, in the words of the rig's kind: a machine, or a slider with an area; empty if done."""
+    """Advice for a status, worded for a machine or for a slider (with forces if it has an area); empty if done."""
     normal = "force" if machine else stress_name("stress", area)
     return REMEDIES[word].format(mass=_MASS[machine], stress=normal)

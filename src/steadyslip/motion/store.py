@@ -1,4 +1,4 @@
-"""Histories in files: netCDF with the rig inside, and plain columns."""
+"""Files of histories: netCDF that contains the rig, and CSV."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _ATTRIBUTES = {
 
 
 def to_dataset(history: HistoryData) -> Any:
-    """See `History.to_xarray`."""
+    """xarray.Dataset of a history; see `History.to_xarray`."""
     import xarray as xr
 
     from steadyslip.files.specifications import rig_to_text
@@ -75,7 +75,7 @@ def to_dataset(history: HistoryData) -> Any:
 
 
 def _extremes(velocities: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """Of all contacts."""
+    """Lowest and highest velocity of all contacts."""
     return min(low for low, _ in velocities.values()), max(high for _, high in velocities.values())
 
 
@@ -84,7 +84,7 @@ def _event_units(rig: Slider | Machine) -> dict[str, str]:
 
 
 def save(history: HistoryData, path: str | PathLike[str]) -> None:
-    """Write a history as netCDF; a file of that name is replaced only once the new one is whole.
+    """Write a history as netCDF; an existing file is replaced only when the new one is complete.
 
     Raises
     ------
@@ -98,9 +98,9 @@ def save(history: HistoryData, path: str | PathLike[str]) -> None:
 
 
 def read(path: str | PathLike[str]) -> dict[str, Any]:
-    """The fields of a history that `save` wrote.
+    """Fields of a history from a file written by `save`.
 
-    Nothing in the file is executed; damage is found, whatever it is.
+    Nothing in the file is executed; the content is verified.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def _check_words(table: ExpectedTable) -> None:
 
 
 def _check_samples(table: ExpectedTable, data: dict[str, np.ndarray]) -> None:
-    """Times rise, and a run that is done has a number for everything."""
+    """Check that times rise, and that a run with status done has finite values only."""
     if not (np.all(np.isfinite(data["t"])) and np.all(np.diff(data["t"]) >= 0)):
         raise table.fault("its times do not rise")
     if table.attributes["status"] == "done":

@@ -1,4 +1,4 @@
-"""What the pieces of a protocol act on: a body or the drive, the surfaces of a contact or the fluid in it."""
+"""Targets of protocol pieces: a body or the drive, the surfaces of a contact or the fluid in it."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from steadyslip.protocol.stress import OnBlock, OnDrive, OnNormalStress, OnPores
 
 @dataclass(frozen=True)
 class Targets:
-    """What a protocol acts on, and the channels in which it is told.
+    """Targets of a protocol, and the input channels of its pieces.
 
     Attributes
     ----------
     pushes : tuple of str
-        Coordinates that are pushed, or the drive, in the order of their first pieces.
+        Coordinates that are pushed (or the drive), in the order of their first pieces.
     presses : tuple of str
-        Contacts that are pressed, or into which is injected. Both as `steadyslip.model.reducing.reduce_model` takes
-        them: empty where nothing is done, and "" where the block of a slider is pushed or pressed.
+        Contacts that are pressed or injected into. Both tuples as for `steadyslip.model.reducing.reduce_model`: empty
+        for none, "" for the block of a slider.
     channels : tuple of int
-        That of each piece.
+        Channel of each piece.
     """
 
     pushes: tuple[str, ...] = ()
@@ -38,15 +38,15 @@ class Targets:
 
     @property
     def drive(self) -> str:
-        """What the drive does in the run."""
+        """Motion of the drive in the run: moved, pulled by a force, or either in turns."""
         return EITHER if FREE in self.pushes else PULLED if LOAD_POINT in self.pushes else MOVED
 
     def named(self) -> dict[str, tuple[int, str, str]]:
-        """What a result calls the forces and stresses that act: channel, kind of target and its name, by that.
+        """Names in results of the forces and stresses that act, each with (channel, kind of target, target).
 
-        The only push of a run is its ``disturbance``, of several each has the name of what it pushes before it; so it
-        is with ``normal_disturbance`` and ``injection``. A push is there even where nothing is pushed. Where the drive
-        is let go for some time, ``creep`` is 1 then.
+        A single push is called ``disturbance``; of several, each has its target's name before it. Likewise
+        ``normal_disturbance`` and ``injection``. There is a push even if nothing is pushed. Where the drive is let go
+        for some time, ``creep`` is 1 meanwhile.
         """
         found = {}
         by_turns = self.drive == EITHER
@@ -68,22 +68,22 @@ class Targets:
 
 NOTHING = Targets()
 LET_GO = (LOAD_POINT, FREE, SWITCH)
-"""What is pushed first where a drive is let go and moves on."""
+"""First push targets where the drive is let go and moves on."""
 
 
 def targets(rig: Slider | Machine, plan: Protocol) -> Targets:
-    """What a protocol pushes and presses, and where it injects.
+    """Targets of a protocol's pushes, presses and injections.
 
     Raises
     ------
     ParameterError
-        If it is open what a piece acts on, or one acts on what does not feel it.
+        If the target of a piece is ambiguous, or a piece has no effect on its target.
     """
-    return _Targets(rig, plan).found()
+    return _TargetSearch(rig, plan).found()
 
 
-class _Targets:
-    """One pass through a protocol."""
+class _TargetSearch:
+    """Search for the targets of one protocol."""
 
     def __init__(self, rig: Slider | Machine, plan: Protocol) -> None:
         self.plan, self.several = plan, isinstance(rig, Machine)
@@ -95,7 +95,7 @@ class _Targets:
         self.problems: list[Problem] = []
 
     def found(self) -> Targets:
-        """All of them, or all problems."""
+        """All targets; raises all problems."""
         own = [self._of(piece, f"protocol.pieces.{i}") for i, piece in enumerate(self.plan.pieces, start=1)]
         if self.plan.frees_load_point:
             self._load_point_is_free()
@@ -113,12 +113,12 @@ class _Targets:
         return Targets(pushes, presses, places)
 
     def _in_order(self, kind: int, own: list[str | None]) -> tuple[str, ...]:
-        """Names of what pieces of a kind act on, each once."""
+        """Targets of the pieces of a kind, without duplicates."""
         pairs = zip(self.plan.pieces, own, strict=True)
         return tuple(dict.fromkeys(name for piece, name in pairs if piece.channel == kind and name is not None))
 
     def _of(self, piece: Piece, where: str) -> str | None:
-        """What a piece acts on; None for the motion of the load point, and where that is a problem."""
+        """Target of a piece; None for the motion of the load point, and after noting a problem."""
         if isinstance(piece, OnDrive):
             return LOAD_POINT
         if isinstance(piece, OnBlock):

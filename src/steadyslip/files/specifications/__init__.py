@@ -1,8 +1,8 @@
-"""Files that say what is meant: TOML text to and from a `Slider`, a `Protocol` and further tables; their JSON schema.
+"""Rig files: TOML text to and from a `Slider`, `Machine`, `Protocol` and further tables, and their JSON schema.
 
-Nothing here lists a parameter, or knows what maps and fits are: keys, units, domains and defaults are those declared by
-records, and a layer above hands in the tables that it declares (`read.read_specification`). Opening a file never
-executes code; laws are found by registered name or installed entry point.
+No parameter is listed here: keys, units, domains and defaults are those that records declare, and maps and fits pass in
+the tables that they declare (`read.read_contents`). Opening a file never executes code; laws are found by
+registered name or installed entry point.
 """
 
 from steadyslip.files.specifications.changes import named_value

@@ -14,25 +14,25 @@ from steadyslip.files.specifications.layout import (
     has_choice,
     is_machine,
     machine_sections,
+    nested_keys,
     own_fields,
     sections,
     selector,
-    ways,
 )
 from steadyslip.files.specifications.toml import NotToml, Table, tables_of
 from steadyslip.machine.slider import Slider
 
 
 def apply(text: str, tables: Table, lines: dict[str, int], section: Section | None = None) -> list[Problem]:
-    """Write ``name=value`` into the tables, and forget on which line that value stood; returns the problems.
+    """Write ``name=value`` into the tables and drop the line number of the old value; returns the problems.
 
-    `section` is the further table that the name is in.
+    `section` is the further table of the name, None for tables of the rig and protocol.
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
         return [Problem(repr_short(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = full_name(name, tables)
-    if problems:  # written into the tables it would be a fault of theirs, too
+    if problems:  # written into the tables, the name would be reported again
         return problems
     *path, last = full.split(".") if section is None else _keys_to(full, section, tables)
     table: Any = tables
@@ -51,20 +51,21 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
         table[last] = value_of(raw, name)
     except ParameterError as error:
         return list(error.problems)
-    lines.pop(".".join([*path, last]), None)  # the fault is no longer on that line
+    lines.pop(".".join([*path, last]), None)  # a fault of the new value is not on that line
     return []
 
 
 def _keys_to(full: str, section: Section, tables: Table) -> list[str]:
-    """The keys on the way to a value of a further table.
+    """Keys on the path to a value of a further table.
 
-    Where parameters by dotted name stand in it, these are the keys that the file has for the same parameter, however
-    either of them is shortened.
+    In tables of parameters by dotted name, the keys that the file already has for the same parameter are used, even if
+    either name is shortened.
     """
-    keys, family = full.split("."), section.family
+    keys = full.split(".")
+    family: type[FrozenRecord] | None = section.family
     inner = tables.get(section.name)
     for count, key in enumerate(keys[1:], start=2):
-        roles = {key_of(item): role for item, role in own_fields(family)} if family is not None else {}
+        roles = {key_of(item): role for item, role in own_fields(family)} if family else {}
         role, inner = roles.get(key), inner.get(key) if isinstance(inner, dict) else None
         if isinstance(role, Named) and isinstance(inner, dict):
             own = [key_of(item) for item, _ in own_fields(role.family)]
@@ -72,14 +73,15 @@ def _keys_to(full: str, section: Section, tables: Table) -> list[str]:
             is_whole = keys[-1] not in own or _resolved(".".join(keys[count:]), known) in known
             last = [] if is_whole else keys[-1:]
             name = ".".join(keys[count : len(keys) - len(last)])
-            same = (way for way, _ in ways(inner, own) if _resolved(".".join(way), known) == _resolved(name, known))
+            paths = (path for path, _ in nested_keys(inner, own))
+            same = (path for path in paths if _resolved(".".join(path), known) == _resolved(name, known))
             return [*keys[:count], *next(same, (name,)), *last]
         family = role.family if isinstance(role, Part) and not role.many else None
     return keys
 
 
 def _resolved(name: str, known: Mapping[str, Any]) -> str:
-    """The full name, or the name itself where there is none."""
+    """Full name; the name itself if there is none."""
     try:
         return resolve(name, known)
     except UnknownNameError:
@@ -87,7 +89,7 @@ def _resolved(name: str, known: Mapping[str, Any]) -> str:
 
 
 def split(text: str) -> tuple[str, str, str]:
-    """Name, equals sign and value of a change, empty where they are missing."""
+    """Name, equals sign and value of a change; empty where missing."""
     name, equals, raw = (part.strip() for part in text.partition("="))
     return name, equals, raw
 
@@ -98,7 +100,7 @@ def named_value(text: str) -> tuple[str, Any]:
     Raises
     ------
     ParameterError
-        If it is none.
+        If the text has another form.
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
@@ -107,12 +109,12 @@ def named_value(text: str) -> tuple[str, Any]:
 
 
 def value_of(raw: str, name: str) -> Any:
-    """A value of `name` written without the quotes that TOML wants around text.
+    """Value from text that may omit the quotes that TOML requires.
 
     Raises
     ------
     ParameterError
-        If more than one value is written.
+        If the text has more than one value.
     """
     try:
         tables = tables_of(f"value = {raw}")
@@ -126,7 +128,7 @@ def value_of(raw: str, name: str) -> Any:
 
 
 def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
-    """A shortened name stands for the one key of that name that the chosen laws have."""
+    """Full name for a name that may be shortened to its unique last part, and the problems."""
     known = dict.fromkeys(_known_names(tables))
     try:
         return resolve(name, known), []
@@ -136,12 +138,12 @@ def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
 
 
 def _known_names(tables: Table) -> list[str]:
-    """Every dotted name that the laws chosen in the file know."""
+    """All dotted names of the laws that the file chooses."""
     names: list[str] = []
     machine = is_machine(tables)
     for section in machine_sections() if machine else sections():
         table = tables.get(section.name)
-        if section.family is None:
+        if section.family is Slider:
             names += _names_of(Slider, {}, section.name + ".")
         elif section.keyed and isinstance(table, dict):
             below = _names_chosen if has_choice(section.family) else _names_of
@@ -151,13 +153,13 @@ def _known_names(tables: Table) -> list[str]:
         elif isinstance(table, dict):
             names.append(f"{section.name}.{selector(section.family)[0]}")
             names += _names_chosen(section.family, table, section.name + ".")
-    if PROTOCOL.family is not None and isinstance(table := tables.get(PROTOCOL.name, {}), dict):
+    if isinstance(table := tables.get(PROTOCOL.name, {}), dict):
         names += _names_of(PROTOCOL.family, table, PROTOCOL.name + ".")
     return names
 
 
 def _names_chosen(family: type[FrozenRecord], table: Table, prefix: str) -> list[str]:
-    """The names below a table that says which law it is."""
+    """Names below a table that names its law."""
     key, default = selector(family)
     chosen = table.get(key, default)
     law = family.registry.get(chosen) if isinstance(chosen, str) else None

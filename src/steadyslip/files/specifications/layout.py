@@ -1,4 +1,4 @@
-"""How records map to the tables and keys of a rig file."""
+"""Correspondence of records to the tables and keys of a rig file."""
 
 from __future__ import annotations
 
@@ -19,70 +19,70 @@ ENTRY_POINTS = "steadyslip.laws"
 
 @dataclass(frozen=True)
 class Section:
-    """A table of a file.
+    """Declaration of a table of a file.
 
     Attributes
     ----------
     name : str
-    family : type of FrozenRecord or None
-        Of the records that fill it; None for the slider itself.
+    family : type of FrozenRecord
+        Class (or base class) of the records that fill it.
     required : bool
-        Whether a file that is read for it must have it.
+        True if a file read with it must have the table.
     hint : str
-        What to write in it, for messages.
+        Content to suggest in messages.
     keyed : bool
-        Whether it holds a table for each of some names that the user gives.
+        True if it holds a table for each of some names chosen by the user.
     """
 
     name: str
-    family: type[FrozenRecord] | None
+    family: type[FrozenRecord]
     required: bool = False
     hint: str = ""
     keyed: bool = False
 
 
 PROTOCOL = Section("protocol", Protocol)
-"""The table that a file may have besides those of the rig."""
+"""Table for protocols, which a rig file may have besides those of the rig."""
 
 MAP = "map"
-"""A table that is read by what computes maps, and by nothing else."""
+"""Name of the table of maps, which others ignore."""
 
 
 def sections() -> tuple[Section, ...]:
-    """The tables of a rig, in order."""
+    """Tables of a slider, in the order in which they are written."""
     found = [Section(item.name, role.family) for item in fields(Slider) if isinstance(role := role_of(item), Part)]
-    found.insert(2, Section(Slider.section.rstrip("."), None))
+    found.insert(2, Section(Slider.section.rstrip("."), Slider))
     return tuple(found)
 
 
 def machine_sections() -> tuple[Section, ...]:
-    """The tables of a machine, in order."""
+    """Tables of a machine, in the order in which they are written."""
     found = [(item.name, role) for item in fields(Machine) if isinstance(role := role_of(item), Part)]
     return tuple(Section(name, role.family, keyed=role.keyed) for name, role in found)
 
 
 def is_machine(tables: Table) -> bool:
-    """Whether a file describes a machine, not a slider: it has a table that only machines have."""
+    """True if a file has a table that only machines have."""
     return any(section.name in tables for section in machine_sections() if section.keyed)
 
 
 def selector(family: type[FrozenRecord]) -> tuple[str, str | None]:
-    """The key that names the law of a table, and the law meant when it is absent."""
+    """Key that names the law in a table, and the law that is meant when it is absent."""
     return family.chosen_by
 
 
 def has_choice(family: type[FrozenRecord]) -> bool:
-    """Whether a table of this family names one of several laws, rather than being the one record itself."""
+    """True if tables of this family name one of several laws."""
     return bool(family.registry) and not family.name
 
 
 def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
-    """The law of a family with a registered name, or one that an installed package offers under it.
+    """Law of a family by registered name, or from an installed package that offers it.
 
     Raises
     ------
     ParameterError
-        If there is none; lists the nearest name and all others.
+        If there is none; lists the most similar name and all others.
     """
     if isinstance(name, str):
         if name in family.registry:
@@ -90,7 +90,7 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
         for entry in entry_points(group=ENTRY_POINTS, name=name):
             try:
                 law = entry.load()
-            except Exception as error:  # whatever a foreign package does when imported
+            except Exception as error:  # imports of other packages may raise anything
                 message = f"{name!r} is offered by {entry.value!r}, which cannot be loaded: {error!r}"
                 raise ParameterError([Problem("", message)]) from error
             if isinstance(law, type) and issubclass(law, family):
@@ -99,7 +99,7 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
 
 
 def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]:
-    """The fields of a record that are keys of its own table."""
+    """Fields of a record that are keys in its own TOML table (nested laws have tables of their own)."""
     for item in fields(law):  # type: ignore[arg-type]
         role = role_of(item)
         if law is Slider and isinstance(role, Part):
@@ -107,10 +107,11 @@ def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]
         yield item, role
 
 
-def ways(table: Table, keys: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """The keys to every value of a table by dotted names, where dots without quotes have made tables of parts of names.
+def nested_keys(table: Table, keys: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Pairs (keys, value) for every value of a table by dotted names, whose unquoted dots TOML turns into nested
+    tables.
 
-    A table that has one value under one of the `keys` is a value.
+    A table with a plain value under one of `keys` counts as a value.
     """
     for key, value in table.items():
         if (
@@ -118,6 +119,6 @@ def ways(table: Table, keys: Sequence[str]) -> Iterator[tuple[tuple[str, ...], A
             and value
             and not any(k in keys and not isinstance(v, (dict, list)) for k, v in value.items())
         ):
-            yield from (((key, *way), one) for way, one in ways(value, keys))
+            yield from (((key, *path), one) for path, one in nested_keys(value, keys))
         else:
             yield (key,), value

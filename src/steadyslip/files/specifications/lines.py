@@ -1,4 +1,4 @@
-"""On which line of a TOML text each key stands, for error messages."""
+"""Line numbers of the keys of a TOML text, for error messages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za
 
 
 def key_lines(text: str) -> dict[str, int]:
-    """Line (from 1) of every table header and key, by dotted name; members of lists count from 1."""
+    """Line (from 1) of every table header and key, by dotted name; members of lists are numbered from 1."""
     lines: dict[str, int] = {}
     counts: dict[str, int] = {}
     prefix = ""
@@ -27,7 +27,7 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 def line_of(name: str, lines: dict[str, int]) -> int | None:
-    """The line of a key, or of the nearest table or inline table around it."""
+    """Line of a key, or of the nearest table around it; None if there is none."""
     while name:
         if name in lines:
             return lines[name]
@@ -36,7 +36,7 @@ def line_of(name: str, lines: dict[str, int]) -> int | None:
 
 
 def _header(line: str) -> tuple[str, bool] | None:
-    """The dotted name of a table's heading, and whether it begins a member of a list; None for other lines."""
+    """Dotted name of a table's header, and True if it begins a member of a list; None for other lines."""
     text = line.strip()
     listed = text.startswith("[[")
     opened, closed = ("[[", "]]") if listed else ("[", "]")

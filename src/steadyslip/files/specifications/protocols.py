@@ -1,4 +1,4 @@
-"""Protocols of experiments from rig files and from words of the command line."""
+"""Protocols from rig files and from command lines."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from steadyslip.protocol import Piece, Protocol
 
 @checked()
 def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Protocol | None:
-    """Read the protocol of a rig file, or of a file that has the table ``[protocol]`` alone.
+    """Read the protocol of a rig file, or of a file with only the table ``[protocol]``.
 
     Parameters
     ----------
     path : path
         TOML file, UTF-8.
     changes : iterable of str
-        Values that replace or complete those of the file, as ``"protocol.pieces.1.to=2 um/s"``.
+        Values that replace or add to those of the file, as ``"protocol.pieces.1.to=2 um/s"``.
 
     Returns
     -------
@@ -36,34 +36,34 @@ def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Pro
     Raises
     ------
     RigFileError
-        If the file cannot be read or anything in it, the rig included, is wrong.
+        If the file cannot be read or anything in it is wrong (the rig included).
     """
     return protocol_from_text(text_of(path), str(path), changes)
 
 
 @checked()
 def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Protocol | None:
-    """Read the protocol of a rig file's text; see `read_protocol`."""
+    """Read the protocol from the text of a rig file; see `read_protocol`."""
     return protocol_of(text, source, changes)
 
 
 @checked()
 def piece_from_text(text: str, area: float | None = None, machine: Machine | None = None) -> Piece:
-    """Read one piece of a protocol from a line of words, the kind first.
+    """Read one piece of a protocol from a line of text.
 
     Parameters
     ----------
     text : str
-        Such as ``"velocity-step at=10s to='2 um/s'"``; quotes keep words together as in a shell.
+        Kind, then KEY=VALUE, as in ``"velocity-step at=10s to='2 um/s'"``; quoted as in a shell.
     area : float, optional
-        Contact area of the rig, m^2: with it stresses are given as forces, as in a rig file.
+        Contact area of the rig, m^2; with it stresses are given as forces, as in a rig file.
     machine : Machine, optional
-        In place of it: what is done to a machine is in forces, and in angles where its load point turns.
+        Machine that the piece acts on: takes forces, and angles where its load point turns.
 
     Raises
     ------
     ParameterError
-        If anything is wrong; every problem is listed.
+        If anything is wrong; lists every problem.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def piece_from_text(text: str, area: float | None = None, machine: Machine | Non
     if reader.problems:
         raise ParameterError(reader.problems, title=repr(text))
     if not isinstance(piece, Piece):
-        raise InternalError("isinstance(piece, Piece)")
+        raise InternalError(f"a piece of a protocol was read as {type(piece).__name__}")
     return piece
 
 

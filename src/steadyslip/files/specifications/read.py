@@ -1,4 +1,4 @@
-"""TOML text to a rig, a protocol and whatever further tables a caller declares; all problems are reported at once."""
+"""Reading of rigs, protocols and further tables from TOML text; all problems are reported together."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
     path : path
         TOML file, UTF-8.
     changes : iterable of str
-        Values that replace or complete those of the file, as ``"contact.angle=10 deg"``.
+        Values that replace or add to those of the file, as ``"contact.angle=10 deg"``.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
 
 @checked()
 def read_slider(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
-    """`read_rig` for what is offered for sliders only.
+    """Read a rig file that must describe a slider; see `read_rig`.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def read_slider(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slide
 
 
 def text_of(path: str | PathLike[str]) -> str:
-    """The text of a rig file."""
+    """Text of a rig file."""
     name = str(path)
     try:
         return read_bytes(path, MOST_TEXT).decode("utf-8-sig")
@@ -91,39 +91,39 @@ def text_of(path: str | PathLike[str]) -> str:
 @checked()
 def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider | Machine:
     """Read a rig from TOML text; see `read_rig`."""
-    found = read_specification(_not_empty(text, source), source, changes)
+    found = read_contents(_not_empty(text, source), source, changes)
     found.refuse()
     return found.checked_rig() if found.machine is None else found.machine
 
 
 def slider_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
-    """`rig_from_text` for what is offered for sliders only; NotAvailable for a machine."""
-    return read_specification(_not_empty(text, source), source, changes).checked_rig()
+    """Read a slider from TOML text; NotAvailable for a machine."""
+    return read_contents(_not_empty(text, source), source, changes).checked_rig()
 
 
 def protocol_of(text: str, source: str, changes: Iterable[str]) -> Protocol | None:
-    """The protocol of a TOML text, which may have no table but the protocol's."""
-    found = read_specification(_not_empty(text, source), source, changes, rig_needed=False)
+    """Read the protocol of a TOML text, which may omit the tables of a rig."""
+    found = read_contents(_not_empty(text, source), source, changes, rig_needed=False)
     found.refuse()
     return found.protocol
 
 
 @dataclass(frozen=True)
-class Specification:
-    """What a file says, as far as it is right.
+class RigFileContents:
+    """Contents of a rig file as far as valid, with the problems found in the others.
 
     Attributes
     ----------
     rig : Slider or None
-        None where there is none, or it is faulty.
+        None if absent or faulty.
     machine : Machine or None
-        In place of a rig.
+        In place of a slider.
     protocol : Protocol or None
     further : dict of str to FrozenRecord
-        What the declared further tables say; of a faulty table, what is right in it.
+        Records of the declared further tables; of a faulty table, its valid part.
     problems : list of Problem
     changed : set of str
-        Full names of the values that were changed.
+        Full names of the values that changes replaced.
     """
 
     source: str
@@ -137,47 +137,49 @@ class Specification:
 
     @property
     def given(self) -> Slider | Machine | None:
-        """The rig or the machine."""
+        """The slider or machine; None if absent or faulty."""
         return self.machine if self.rig is None else self.rig
 
     def line(self, name: str) -> int | None:
-        """The line of a key, or of the table around it."""
+        """Line of a key, or of the table around it."""
         return line_of(name, self.lines)
 
     def refuse(self, *others: Problem) -> None:
-        """Raise all that is wrong with the file, and `others`, each with its line; nothing if nothing is."""
+        """Raise an error with all problems of the file and `others`, each with its line; does nothing without
+        problems.
+        """
         if self.problems or others:
             every = dict.fromkeys([*self.problems, *others])
             found = [Problem(p.name, p.message, p.line or self.line(p.name)) for p in every]
             raise RigFileError(sorted(found, key=lambda p: (p.line is None, p.line or 0)), title=self.source)
 
     def refuse_machine(self) -> None:
-        """Refuse a machine where only sliders are offered."""
+        """Raise an error if the file describes a machine."""
         if self.machine is not None:
             raise NotAvailable("the file describes a machine; allowed: a slider, one block on one surface")
 
     def checked_rig(self, *others: Problem) -> Slider:
-        """The slider of a file in which nothing is wrong.
+        """The slider of a file without problems.
 
         Raises
         ------
         RigFileError
-            Listing everything that is.
+            With all problems of the file.
         NotAvailable
             If the file describes a machine.
         """
         self.refuse_machine()
         self.refuse(*others)
         if self.rig is None:
-            raise InternalError("a rig, or problems")
+            raise InternalError("the file has neither a slider nor problems")
         return self.rig
 
 
-def read_specification(
+def read_contents(
     text: str, source: str, changes: Iterable[str] = (), further: Sequence[Section] = (),
     complete: Callable[[Table], None] | None = None, rig_needed: bool = True,
-) -> Specification:  # fmt: skip
-    """Read a TOML text with changes made; problems are collected, not raised, but where it is no TOML at all.
+) -> RigFileContents:  # fmt: skip
+    """Read a TOML text after making changes; problems are collected, except that it is not TOML.
 
     Parameters
     ----------
@@ -185,11 +187,11 @@ def read_specification(
     changes : iterable of str
         ``NAME=VALUE``.
     further : sequence of Section
-        Tables besides those of rig and protocol, each with the record that declares it.
+        Tables besides those of rig and protocol, with the records that declare them.
     complete : callable, optional
-        Puts values where the tables may leave them out; called after changes of further tables, before all others.
+        Function that fills in values which tables may omit; called after changes of further tables, before all others.
     rig_needed : bool
-        Whether a text that has no table but the protocol's lacks a rig.
+        False if a text with only the protocol's table is valid.
 
     Raises
     ------
@@ -206,9 +208,9 @@ def read_specification(
 def read_tables(
     tables: Table, lines: dict[str, int], source: str, changes: Iterable[str] = (), further: Sequence[Section] = (),
     complete: Callable[[Table], None] | None = None, rig_needed: bool = True,
-) -> Specification:  # fmt: skip
-    """The same of tables, with the lines on which their keys stand."""
-    reader = _SpecificationReader(tables)
+) -> RigFileContents:  # fmt: skip
+    """Read parsed tables; `lines` are the line numbers of their keys. See `read_contents`."""
+    reader = _ContentsReader(tables)
     names = {section.name: section for section in further}
     every = [changes] if isinstance(changes, str) else list(changes)
     own = {change: first for change in every if (first := split(change)[0].partition(".")[0]) in {*names, MAP}}
@@ -229,7 +231,7 @@ def read_tables(
     said = {name: one for name, one in found.items() if one is not None}
     rig = found_rig if isinstance(found_rig, Slider) else None
     machine = found_rig if isinstance(found_rig, Machine) else None
-    return Specification(source, rig, machine, protocol, said, reader.problems, changed, lines)
+    return RigFileContents(source, rig, machine, protocol, said, reader.problems, changed, lines)
 
 
 def _not_empty(text: str, source: str) -> str:
@@ -246,15 +248,15 @@ def _failed(name: str, message: str) -> RigFileError:
 
 
 def _rigid(links: Any) -> tuple[Any, list[str]]:
-    """Tables of links with numbers where the stiffness is ``rigid``, and the names of those links."""
+    """Tables of links with a placeholder number where the stiffness is ``rigid``, and the names of those links."""
     if not isinstance(links, dict):
         return links, []
     names = [name for name, one in links.items() if isinstance(one, dict) and one.get("stiffness") == "rigid"]
     return links | {name: links[name] | {"stiffness": 1.0} for name in names}, names
 
 
-class _SpecificationReader(TableReader):
-    """One pass over a file's tables."""
+class _ContentsReader(TableReader):
+    """Reader of one file's tables."""
 
     def __init__(self, tables: Table) -> None:
         super().__init__()
@@ -271,13 +273,13 @@ class _SpecificationReader(TableReader):
                 self.problem(name, unknown_name("table", name, sorted(known)))
 
     def _machine(self) -> Machine | None:
-        """A machine; with faulty tables, what the others say of bodies and links that do not exist is found too."""
+        """Read a machine; if tables are faulty, references of the others to absent bodies and links are still
+        reported.
+        """
         before = len(self.problems)
         found: dict[str, Any] = {}
         rigid: list[str] = []
         for section in machine_sections():
-            if section.family is None:
-                raise InternalError("section.family is not None")
             if section.name not in self.tables and section.name != "links":
                 name = f"{section.name}.NAME" if section.keyed else section.name
                 self.problem(section.name, f"missing table; write [{name}] with its parameters")
@@ -302,14 +304,14 @@ class _SpecificationReader(TableReader):
         before = len(self.problems)
         own = self._table("slider")
         self._read_area(own)
-        parts = {s.name: self._section(s) for s in sections() if s.family is not None}
+        parts = {s.name: self._section(s) for s in sections() if s.family is not Slider}
         arguments = self._arguments(Slider, own, "slider.")
         if len(self.problems) > before or any(part is None for part in parts.values()):
             return None
         return self._built(Slider, {**arguments, **parts}, "slider.")  # type: ignore[return-value]
 
     def protocol(self, machine: Machine | None = None) -> Protocol | None:
-        """The protocol, None if the file has none; comes after the rig, whose area it needs."""
+        """Read the protocol, None if absent; after the rig, whose area it needs."""
         if PROTOCOL.name not in self.tables:
             return None
         before = len(self.problems)
@@ -320,9 +322,7 @@ class _SpecificationReader(TableReader):
             return self._complete(Protocol, table, f"{PROTOCOL.name}.")  # type: ignore[return-value]
 
     def settings(self, section: Section) -> FrozenRecord | None:
-        """A further table; its quantities have the unit that they are declared with, whatever the rig's area."""
-        if section.family is None:
-            raise InternalError("section.family is not None")
+        """Read a further table; its quantities keep their declared units, whatever the rig's area."""
         table = self.tables.get(section.name)
         if not isinstance(table, dict):
             wanted = f"[{section.name}] {section.hint}" if section.hint else f"a table [{section.name}]"
@@ -349,11 +349,9 @@ class _SpecificationReader(TableReader):
             try:
                 self.area = Parameter("m^2", positive, "contact area").checked(raw)
             except ParameterError:
-                self.area = 1.0  # reported when the slider's own keys are read; totals are no faults beside it
+                self.area = 1.0  # the area itself is reported with the slider's other keys; totals beside it are valid
 
     def _section(self, section: Section) -> FrozenRecord | None:
-        if section.family is None:
-            raise InternalError("section.family is not None")
         key, default = selector(section.family)
         if section.name not in self.tables:
             example = f"{key} = {next(iter(section.family.registry))!r}" if default is None else "velocity = '1 um/s'"

@@ -1,11 +1,10 @@
-"""JSON schema of files, from the records' own declarations, for editors and other programs."""
+"""JSON schema of rig files, from the declarations of the records, for editors and other programs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from steadyslip.core.errors import InternalError
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, is_required, key_of
 from steadyslip.core.roles import Schema
 from steadyslip.files.specifications.layout import (
@@ -20,22 +19,20 @@ from steadyslip.files.specifications.layout import (
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-MOST_DOTS = 4  # of a parameter's name, such as protocol.pieces.1.to
+MOST_DOTS = 4  # most dots in a parameter's name: protocol.pieces.1.to has 3
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def rig_schema(further: Sequence[Section] = ()) -> Schema:
-    """A rig file that may have further tables."""
+    """Schema of a rig file with some further tables."""
     properties: Schema = {}
     for section in sections():
-        if section.family is None:
+        if section.family is Slider:
             properties[section.name] = _table(Slider, {}, "the block, its spring and dampers")
         else:
             properties[section.name] = _family(section.family)
-    slider = [section.name for section in sections() if section.family is not None]
+    slider = [section.name for section in sections() if section.family is not Slider]
     for section in machine_sections():
-        if section.family is None:
-            raise InternalError("section.family is not None")
         table = (
             _by_key(section.family, section.family.family or "contacts") if section.keyed else _family(section.family)
         )
@@ -49,23 +46,23 @@ def rig_schema(further: Sequence[Section] = ()) -> Schema:
 
 
 def _by_key(family: type[FrozenRecord], doc: str) -> Schema:
-    """A table for each of some names."""
+    """Schema of a table for each of some names."""
     one = _family(family) if has_choice(family) else _table(family, {}, _summary(family))
     return {"type": "object", "description": f"{doc}, a table for each name", "additionalProperties": one}
 
 
 def protocol_schema() -> Schema:
-    """The table of a protocol."""
+    """Schema of the table of a protocol."""
     return _table(Protocol, {}, _summary(Protocol))
 
 
 def further_schema(further: Sequence[Section]) -> Schema:
-    """Tables by name."""
-    return {one.name: _table(one.family, {}, _summary(one.family)) for one in further if one.family is not None}
+    """Schemas of further tables, by name."""
+    return {one.name: _table(one.family, {}, _summary(one.family)) for one in further}
 
 
 def partial(schema: Any) -> Any:
-    """The same schema for a file that may leave out whatever it does not know."""
+    """Schema without required keys, for a file that omits what is not known."""
     if isinstance(schema, list):
         return [partial(one) for one in schema]
     if not isinstance(schema, dict):
@@ -75,7 +72,7 @@ def partial(schema: Any) -> Any:
 
 
 def _family(family: type[FrozenRecord]) -> Schema:
-    """One alternative for each registered law."""
+    """Schema with one alternative per registered law."""
     key, default = selector(family)
     alternatives = []
     for name, law in family.registry.items():
@@ -118,7 +115,7 @@ def _value(role: Declared) -> Schema:
 
 
 def _by_dotted_name(role: Named, depth: int) -> Schema:
-    """A value, or a table of values: without quotes, the dots of a name make tables."""
+    """Schema of a value or of nested tables of values, which unquoted dots of a name make."""
     either = [_table(role.family, {}, _summary(role.family))]
     if role.listed:
         either.append({"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "string"}]}})

@@ -1,4 +1,4 @@
-"""Tables of TOML to records: one pass that notes every problem, for whatever records are declared."""
+"""Reading of records from TOML tables, with all problems collected; works for any declared record."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steadyslip.core.errors import ParameterError, Problem, legible, repr_short,
 from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
-from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector, ways
+from steadyslip.files.specifications.layout import find_law, has_choice, nested_keys, own_fields, selector
 from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.input_units import TURNING, turns_on
 from steadyslip.machine.machine import Machine
@@ -22,23 +22,23 @@ from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
 
 class TableReader:
-    """Reads tables and collects their problems; with an area, quantities per unit area are for the whole of it."""
+    """Reader of tables that collects problems; with an `area`, quantities per unit area are read as totals."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.area: float | None = None
         self.turning = False
-        """Whether the load point turns, so that its ways are angles."""
+        """True if the load point turns, so that its displacements are angles."""
         self.in_totals = False
         self.machine: Machine | None = None
         self.twisted = False
-        """Whether a torque is described in place of a force."""
+        """True while a torque is read in place of a force."""
 
     def problem(self, name: str, message: str) -> None:
         self.problems.append(Problem(name, message))
 
     def record(self, family: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
-        """The record that a table describes, or None after noting its problems."""
+        """Record described by a table; None after noting its problems."""
         if not has_choice(family):
             law, rest = family, table
         else:
@@ -53,12 +53,12 @@ class TableReader:
         return self._complete(law, rest, prefix)
 
     def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
-        """Build a record; with bad values, still find what the others contradict."""
+        """Record of a known law; if values are bad, contradictions between the others are still noted."""
         before = len(self.problems)
-        before_it, self.twisted = self.twisted, self._twists(law, table)
+        outer, self.twisted = self.twisted, self._twists(law, table)
         with self._own_area(law, table):
             arguments = self._arguments(law, table, prefix)
-        self.twisted = before_it
+        self.twisted = outer
         if len(self.problems) == before:
             return self._built(law, arguments, prefix)
         if issubclass(law, Settings):
@@ -68,26 +68,28 @@ class TableReader:
 
     @contextmanager
     def _own_area(self, law: type[FrozenRecord], table: Table) -> Iterator[None]:
-        """Read what is below a contact with an area of its own, or with none, in totals."""
-        outside = self.area, self.in_totals
+        """Context for a record that is read in totals: with its own area, or in forces without one."""
+        outer = self.area, self.in_totals
         if law.in_totals:
             self.area, self.in_totals = 1.0 if "area" in table else None, True
-            with suppress(ParameterError):  # reported when its own keys are read; totals are no faults beside it
+            with suppress(ParameterError):  # a bad area is reported with the other keys; totals beside it are valid
                 self.area = None if "area" not in table else Parameter("m^2", positive, "area").checked(table["area"])
         yield
-        self.area, self.in_totals = outside
+        self.area, self.in_totals = outer
 
     @contextmanager
     def of_machine(self, machine: Machine | None) -> Iterator[None]:
-        """Read what is done to a machine: in forces, and in angles where its load point turns; None for a slider."""
-        outside = self.in_totals, self.turning, self.machine
+        """Context for what acts on a machine: in forces, and in angles where its load point turns; None for a
+        slider.
+        """
+        outer = self.in_totals, self.turning, self.machine
         if machine is not None:
             self.in_totals, self.turning, self.machine = True, machine.drive.turns, machine
         yield
-        self.in_totals, self.turning, self.machine = outside
+        self.in_totals, self.turning, self.machine = outer
 
     def _twists(self, law: type[FrozenRecord], table: Table) -> bool:
-        """Whether a piece of a protocol acts on what turns."""
+        """True if a piece of a protocol acts on something that turns."""
         if self.machine is None or not issubclass(law, Piece):
             return False
         if law.frees_load_point:
@@ -98,7 +100,7 @@ class TableReader:
         return turns_on(self.machine, on if isinstance(on, str) else None)
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
-        """Tables by names that the user gives."""
+        """Records of tables by names that the user chooses."""
         if not isinstance(raw, dict):
             self.problem(name, f"got {repr_short(raw)}; allowed: a table for each, [{name}.NAME]")
             return None
@@ -153,14 +155,14 @@ class TableReader:
                 if value is not None:
                     arguments[item.name] = value
             elif is_required(item):
-                self.problem(prefix + key, _missing(self.told(role)))
+                self.problem(prefix + key, _missing(self.worded(role)))
         for name, value in rest.items():
             another = _key_of_another(law, name, value)
             self.problem(prefix + legible(name), unknown_name("key", name, keys, guess=not another) + another)
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
-        """Tables that are named after laws of a family, taken out of the rest."""
+        """Records of tables that are named after laws of a family; the tables are removed from `rest`."""
         found = []
         key = selector(role.family)[0]
         for name in [name for name, value in rest.items() if isinstance(value, dict)]:
@@ -176,7 +178,7 @@ class TableReader:
         return tuple(found)
 
     def _inline(self, item: Field[Any], role: Part, rest: Table, prefix: str, keys: list[str]) -> FrozenRecord | None:
-        """A part named by a word whose own parameters stand beside it (evolution, c_nagata)."""
+        """Record of a part that is named by a word, with its parameters beside it (evolution, c_nagata)."""
         raw = rest.pop(item.name, item.default.name if isinstance(item.default, FrozenRecord) else None)
         law = self._law(role.family, raw, prefix + item.name)
         if law is None:
@@ -187,31 +189,31 @@ class TableReader:
         return self._complete(law, mine, prefix)
 
     def _value(self, role: Declared, raw: Any, name: str) -> Any:
-        """One checked value, None after noting a problem."""
+        """Checked value; None after noting a problem."""
         if isinstance(role, Part):
             return self._part(role, raw, name)
         if isinstance(role, Named):
             return self._named(role, raw, name)
         if isinstance(role, Parameter):
-            role = self.outside(role)
+            role = self.in_file_unit(role)
         try:
             return role.read(raw, self.area)
         except ParameterError as error:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
 
-    def outside(self, role: Parameter) -> Parameter:
-        """A parameter in the unit in which it is described here."""
+    def in_file_unit(self, role: Parameter) -> Parameter:
+        """Parameter in the unit that this file uses for it."""
         if self.in_totals and self.area is None and is_per_area(role.unit):
-            unit = "N m" if self.twisted else total_unit(role.unit)  # a contact without area is described in forces
+            unit = "N m" if self.twisted else total_unit(role.unit)  # without area: forces
             return replace(role, unit=unit)
         return replace(role, unit=TURNING[role.unit]) if self.turning and role.unit in TURNING else role
 
-    def told(self, role: Declared) -> Declared:
-        """The same for people: with totals where there is an area, and forces and torques called so."""
+    def worded(self, role: Declared) -> Declared:
+        """Parameter as worded for people: totals where there is an area, and the words force or torque."""
         if not isinstance(role, Parameter):
             return role
-        here = self.outside(role)
+        here = self.in_file_unit(role)
         if self.area is not None and is_per_area(here.unit):
             here = replace(here, unit=total_unit(here.unit))
         forces = here.unit.startswith("N") or (self.in_totals and self.area is None)
@@ -239,8 +241,8 @@ class TableReader:
             return None
         keys = [key_of(item) for item, _ in own_fields(role.family)]
         found: dict[str, Any] = {}
-        for way, value in ways(raw, keys):
-            inner = ".".join(way)
+        for path, value in nested_keys(raw, keys):
+            inner = ".".join(path)
             if inner in found:
                 self.problem(f"{name}.{inner}", "is named twice; name it once")
             elif isinstance(value, dict):
@@ -258,7 +260,7 @@ class TableReader:
 
 
 def _from_short(family: type[FrozenRecord], raw: Any) -> Table | None:
-    """The table that a value stands for, None if it stands for none."""
+    """Table that a short value stands for; None if there is none."""
     if isinstance(raw, Mapping):
         return dict(raw)
     if has_choice(family):
@@ -280,7 +282,7 @@ def _missing(role: Declared) -> str:
 
 
 def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping[str, Any]) -> FrozenRecord:
-    """A record that was not checked, of what is valid; `others`, or defaults, in place of the rest."""
+    """Unchecked record with the valid values; `others` or defaults for the rest."""
     found = object.__new__(law)
     for item in fields(law):  # type: ignore[arg-type]
         default = None if is_required(item) else item.default
@@ -289,9 +291,9 @@ def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping
 
 
 def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with: set[str]) -> list[Problem]:
-    """Problems between the fields of a record that cannot be built, because other fields are bad.
+    """Contradictions between the valid fields of a record whose other fields are bad.
 
-    Numbers that were given but are bad, or missing, stand as NaN, which contradicts nothing.
+    Bad or missing numbers are NaN, which violates no condition.
     """
     bad = [i for i in fields(law) if i.name not in valid and (key_of(i) in came_with or is_required(i))]  # type: ignore[arg-type]
     if not all(isinstance(role_of(item), Parameter) for item in bad):
@@ -306,7 +308,7 @@ def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with
 
 
 def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
-    """Which law of the same family a key belongs to, or its value names, where the chosen one has no such key."""
+    """Hint for an unknown key: the laws of the family that have it, or the law that its value names."""
     bases = (base for base in law.__mro__ if issubclass(base, FrozenRecord) and base is not FrozenRecord)
     family = next((base for base in bases if has_choice(base) and law in base.registry.values()), None)
     if family is None:
@@ -320,7 +322,7 @@ def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
 
 
 def _part_of_another(family: type[FrozenRecord], name: object) -> str:
-    """Which law of a family has a part of this name, where the family itself has no such law."""
+    """Hint for an unknown law: the law of the family that has a part of this name."""
     for word, law in family.registry.items():
         for item, role in own_fields(law):
             if isinstance(role, Part) and role.inline and isinstance(name, str) and name in role.family.registry:

@@ -1,4 +1,4 @@
-"""TOML text to tables, within bounds: what would keep the reader busy for ever, or overflow later, is refused."""
+"""Parsing of TOML text within bounds, against input that would keep the parser busy for ever or overflow later."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 
 Table = dict[str, Any]
 MOST_PARTS = 32
-"""Parts of a dotted key: the time that tomllib takes grows with their cube."""
+"""Most parts of a dotted key; the time that tomllib takes grows with their cube."""
 MOST_INTEGER = 2**63
-"""TOML's integers have 64 bits."""
+"""Bound of integers: TOML's have 64 bits."""
 
 _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
@@ -19,16 +19,16 @@ _TOO_LARGE = "it has an integer that does not fit into 64 bits; write such a num
 
 
 class NotToml(ValueError):
-    """A text is not TOML, or not within bounds; says why."""
+    """Error: a text is not TOML, or exceeds the bounds."""
 
 
 def tables_of(text: str) -> Table:
-    """The tables of a text.
+    """Tables of a TOML text.
 
     Raises
     ------
     NotToml
-        If it is not TOML, has keys of too many parts or integers of more than 64 bits.
+        If it is not TOML, or has keys of too many parts or integers of more than 64 bits.
     """
     if long := _LONG_KEY.search(text):
         raise NotToml(f"a key has more than {MOST_PARTS} parts: {long[0][:40]}...")
@@ -36,14 +36,14 @@ def tables_of(text: str) -> Table:
         tables = tomllib.loads(text)
     except RecursionError:
         raise NotToml("lists or tables lie too deep in each other") from None
-    except ValueError as error:  # integers of thousands of digits are not even a TOMLDecodeError
+    except ValueError as error:  # Python's own error for integers of thousands of digits is no TOMLDecodeError
         raise NotToml(str(error) if isinstance(error, tomllib.TOMLDecodeError) else _TOO_LARGE) from error
     _check(tables)
     return tables
 
 
 def _check(tables: Any) -> None:
-    """Refuse integers beyond 64 bits; without recursion, for depth is the file's choice."""
+    """Raise an error for integers beyond 64 bits; iterative, because the file determines the depth."""
     left = [tables]
     while left:
         value = left.pop()

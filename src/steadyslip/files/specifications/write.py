@@ -1,4 +1,4 @@
-"""A Slider as the text of a rig file."""
+"""Writing of rigs and protocols as the text of a rig file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from steadyslip.protocol import Protocol
 
 @checked()
 def write_rig(rig: Slider | Machine, path: str | PathLike[str], protocol: Protocol | None = None) -> None:
-    """Write a rig file, with the protocol of an experiment if one is given; see `rig_to_text`.
+    """Write a rig file, with a protocol if one is given; see `rig_to_text`.
 
     Raises
     ------
@@ -43,22 +43,22 @@ def write_rig(rig: Slider | Machine, path: str | PathLike[str], protocol: Protoc
 
 @checked()
 def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
-    """The rig as TOML, SI numbers with the unit as a comment; with an area, totals (N, N/m, kg).
+    """Rig as TOML text: SI numbers with the unit as a comment; totals (N, N/m, kg) if it has an area.
 
     Raises
     ------
     ParameterError
-        If the rig or the protocol has a law without registered name, which no file can refer to.
+        If the rig or the protocol has a law without registered name, which a file cannot refer to.
     """
     blocks = []
     area = None if isinstance(rig, Machine) else rig.area
     for section in machine_sections() if isinstance(rig, Machine) else sections():
-        if section.keyed and section.family is not None:
+        if section.keyed:
             blocks += [_members(section.family, inner, section.name)] if (inner := getattr(rig, section.name)) else []
             continue
-        record = rig if section.family is None else getattr(rig, section.name)
+        record = rig if section.family is Slider else getattr(rig, section.name)
         first: list[str] = []
-        if section.family is not None:
+        if section.family is not Slider:
             key, default = selector(section.family)
             word = _law_name(record, section.name)
             first = [] if word == default else [f'{key} = "{word}"']
@@ -70,7 +70,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
 
 
 def settings_to_text(section: Section, settings: FrozenRecord) -> str:
-    """A further table as TOML."""
+    """A further table as TOML text."""
     return _table(f"[{section.name}]", settings, [], section.name, None)
 
 
@@ -111,7 +111,7 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
 
 
 def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], path: str) -> str:
-    """A table for each of some names."""
+    """Tables of members by name."""
     blocks = []
     for name, one in members.items():
         first = []
@@ -124,7 +124,7 @@ def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], pa
 
 
 def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
-    """A table of values by dotted name: an inline table each, or a list."""
+    """Table of values by dotted name: an inline table or a list each."""
     lines = [f"[{path}]"]
     for name, one in values.items():
         if isinstance(one, role.family):

@@ -300,7 +300,8 @@ def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, 
     reader = TableReader()
     with reader.of_machine(rig if isinstance(rig, Machine) else None):
         return {
-            name: replace(one, role=reader.outside(one.role)) for name, one in parameters(protocol, "protocol.").items()
+            name: replace(one, role=reader.in_file_unit(one.role))
+            for name, one in parameters(protocol, "protocol.").items()
         }
 
 

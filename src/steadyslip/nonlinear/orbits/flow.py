@@ -280,7 +280,7 @@ class Runs:
     def _advanced(self, setting: FlowSetting, settings: Array, initial: Array, times: Array) -> Array:
         tables = (setting.varied[0], np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
         call = Call(self.sensitive, tables, len(times), np.empty(0))
-        call.go(2**62)
+        call.run_steps(2**62)
         outcome = call.outcome()
         taken = np.nansum(outcome.steps, axis=1)
         self.steps += int(taken.sum())

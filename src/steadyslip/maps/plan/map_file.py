@@ -12,7 +12,7 @@ from steadyslip.core.errors import InternalError, ParameterError, Problem, Stead
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.files.specifications.layout import MAP, Section
-from steadyslip.files.specifications.read import Specification, read_specification, text_of
+from steadyslip.files.specifications.read import RigFileContents, read_contents, text_of
 from steadyslip.maps.plan.axes import Grid
 from steadyslip.maps.plan.map import Map, protocol_parameters
 from steadyslip.maps.plan.settings import FIT_POINTS, GridSettings, MapSettings, RangeSettings, SampleSettings
@@ -49,7 +49,7 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
 @checked()
 def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), folder: Path = Path()) -> Map:
     """Read the text of such a file; see `read_map`."""
-    spec = read_specification(text, source, changes, (TABLE,))
+    spec = read_contents(text, source, changes, (TABLE,))
     settings = spec.further.get(MAP)
     plan = _Plan(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None
     spec.refuse(*(plan.placed() if plan is not None else ()))
@@ -61,7 +61,7 @@ def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), f
 class _Plan:
     """The map that a table means for the rig of its file, and what is wrong with it beyond the table alone."""
 
-    def __init__(self, spec: Specification, settings: MapSettings, folder: Path) -> None:
+    def __init__(self, spec: RigFileContents, settings: MapSettings, folder: Path) -> None:
         self.problems: list[Problem] = []
         self.found: Map | None = None
         self.spec, self.folder = spec, folder

@@ -1,4 +1,4 @@
-"""Bodies of a machine: what they weigh, and how they move."""
+"""Bodies of a machine: inertia, constant forces and kind of motion."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from steadyslip.core.records import FrozenRecord, parameter
 
 
 class Body(FrozenRecord, family="body"):
-    """Base of bodies; inertia zero, the default, is a body whose inertia does not matter."""
+    """Base of bodies; an inertia of zero, the default, neglects it."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("motion", "slide")
     turns: ClassVar[bool] = False
     lifts: ClassVar[bool] = False
-    """Whether it moves away from the surface as well."""
+    """True if the body also moves away from the surface."""
 
     def inertia_of(self) -> Any:
         """Mass (kg), or moment of inertia (kg m²)."""
@@ -30,7 +30,7 @@ class Body(FrozenRecord, family="body"):
 
 
 class SlidingBody(Body, name="slide"):
-    """A body that moves along the slide; guides keep it at its height."""
+    """A body that moves along the slide only."""
 
     mass: float = parameter("kg", nonnegative, "mass m", default=0.0, structural=True)
     force: float = parameter(
@@ -49,7 +49,7 @@ class SlidingBody(Body, name="slide"):
 
 
 class PlanarBody(SlidingBody, name="plane"):
-    """A body that moves along the slide and away from the surface, on which a compliant contact carries it."""
+    """A body that moves along the slide and away from the surface; a compliant contact carries it."""
 
     press: float = parameter(
         "N", real, "constant force towards the surface (weight, piston)", default=0.0, structural=True
@@ -61,7 +61,7 @@ class PlanarBody(SlidingBody, name="plane"):
 
 
 class RotatingBody(Body, name="rotation"):
-    """A body that turns: motor, screw, gear wheel."""
+    """A body that rotates: motor, screw, gear wheel."""
 
     inertia: float = parameter("kg m^2", nonnegative, "moment of inertia J", default=0.0, structural=True)
     torque: float = parameter("N m", real, "constant torque in the direction of motion", default=0.0, structural=True)

@@ -1,8 +1,8 @@
-"""A machine as a sketch, drawn from its description: bodies, links, contacts, drive, with their names and numbers.
+"""Sketch of a machine: layout of bodies, links, contacts and drive with their names and values.
 
-Bodies stand in columns, in the order in which links lead away from the drive; those that another slides on stand above
-or below it. Only names, kinds and numbers are looked at: no machine has a drawing of its own. What draws is a `Pencil`:
-on paper that of `steadyslip.figures`, on pages that of `steadyslip.explorer`.
+Bodies are placed in columns, ordered by links away from the drive; bodies in sliding contact with one of them are
+placed above or below it. A `Pencil` draws the strokes: that of `steadyslip.figures` in Matplotlib, that of
+`steadyslip.explorer` in SVG. Lengths are in units of the drawing.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ from steadyslip.machine.surfaces import Surface
 
 Point = tuple[float, float]
 INK, PALE, DRIVEN, FORCED = "ink", "pale", "driven", "forced"
-"""Colours: of what there is, of the ground, of what the drive does, of constant forces."""
-_WIDE, _HIGH = 1.7, 1.15  # of a body
-LONG = 9  # letters of a name from which on it is written small
-_ACROSS, _UP = 3.7, 1.85  # from column to column, and from row to row where bodies slide on each other
+"""Colours of bodies and links, of the ground, of the drive, and of constant forces."""
+# sizes chosen by trial, so that labels and links do not overlap
+_WIDE, _HIGH = 1.7, 1.15  # width and height of a body
+LONG = 9  # letters; longer names are written small
+_ACROSS, _UP = 3.7, 1.85  # distance of columns, and of rows of bodies that slide on each other
 _HOLD = 1.5  # length of links to a wall
 
 
 @dataclass
 class _Place:
-    """Where a body stands, and which of its sides are taken."""
+    """Centre of a body in the sketch, and number of links attached at its left and right side."""
 
     x: float
     y: float
     taken: dict[str, int] = field(default_factory=dict)
 
     def side(self, way: str) -> tuple[float, float]:
-        """Where the next link is hooked, on the left or on the right; several share the height of the side."""
+        """Point at which the next link is attached on the side ``"left"`` or ``"right"``; links spread in height."""
         count = self.taken.get(way, 0)
         self.taken[way] = count + 1
         step = (0.0, 0.3, -0.3, 0.45, -0.45)[min(count, 4)]
@@ -43,49 +44,49 @@ class _Place:
 
 
 class Pencil:
-    """Strokes that sketches are made of; a subclass draws lines, words and shapes."""
+    """Base of drawing back ends; subclasses draw lines, text and shapes."""
 
     def line(self, *points: Point, color: str = INK, linewidth: float = 1.2, dashed: bool = False) -> None:
-        """A line through points."""
+        """Draw a line through points."""
         raise NotImplementedError
 
     def words(
         self, x: float, y: float, text: str, *, ha: str = "center", va: str = "center", color: str = INK,
         large: bool = False, paper: bool = False,
     ) -> None:  # fmt: skip
-        """Text, small unless it is `large`; on `paper` that hides what is behind it."""
+        """Write text, small unless `large`; with `paper` on an opaque background."""
         raise NotImplementedError
 
     def arrow(self, start: Point, end: Point, *, color: str = DRIVEN, dashed: bool = False) -> None:
-        """An arrow."""
+        """Draw an arrow."""
         raise NotImplementedError
 
     def block(self, name: str, x: float, y: float, wide: float, high: float, text: str) -> None:
-        """A body that slides, from its lower left corner, with what is written on it."""
+        """Draw a sliding body with its text; x, y is the lower left corner."""
         raise NotImplementedError
 
     def wheel(self, name: str, x: float, y: float, radius: float, text: str) -> None:
-        """A body that turns, with what is written on it."""
+        """Draw a rotating body with its text; x, y is the centre."""
         raise NotImplementedError
 
     def rough(self, corners: list[Point]) -> None:
-        """A piece of ground."""
+        """Draw a hatched piece of ground."""
         raise NotImplementedError
 
     def gouge(self, x: float, y: float, wide: float, high: float) -> None:
-        """What is between two bodies that slide on each other."""
+        """Draw the interface between two bodies that slide on each other."""
         raise NotImplementedError
 
     def frame(self, x: float, y: float, wide: float, high: float) -> None:
-        """The box of a controller."""
+        """Draw the box of a controller."""
         raise NotImplementedError
 
     def hatched(self, x: float, y: float, wide: float, high: float) -> None:
-        """A level piece of ground."""
+        """Draw a horizontal piece of ground."""
         self.rough([(x, y), (x + wide, y), (x + wide, y + high), (x, y + high)])
 
     def link(self, start: Point, end: Point, sprung: bool, damped: bool, ends: tuple[str, str]) -> None:
-        """A spring, a dashpot, or both beside each other; `ends` are the bodies at both, empty for what stands."""
+        """Draw a spring, a dashpot, or both in parallel; `ends` are the names of the bodies, empty for a wall."""
         both = sprung and damped
         (x, y), (far, high) = start, end
         long = math.hypot(far - x, high - y)
@@ -94,25 +95,25 @@ class Pencil:
         if sprung:
             self.spring((x + dx, y + dy), (far + dx, high + dy))
         if damped:
-            self.pot((x - dx, y - dy), (far - dx, high - dy))
+            self.dashpot((x - dx, y - dy), (far - dx, high - dy))
         if both:
             for end_x, end_y in (start, end):
                 self.line((end_x + dx, end_y + dy), (end_x - dx, end_y - dy))
 
     def spring(self, start: Point, end: Point) -> None:
-        """A zigzag."""
+        """Draw a zigzag line."""
         zigzag = [(0.2 + 0.06 * (i + 0.5), 0.11 * (-1) ** i) for i in range(10)]
         self._along(start, end, [(0, 0), (0.2, 0), *zigzag, (0.8, 0), (1, 0)])
 
-    def pot(self, start: Point, end: Point) -> None:
-        """A piston in its cylinder."""
+    def dashpot(self, start: Point, end: Point) -> None:
+        """Draw a piston in a cylinder."""
         cylinder: list[Point] = [(0.62, 0.1), (0.42, 0.1), (0.42, -0.1), (0.62, -0.1)]
         parts: list[list[Point]] = [[(0, 0), (0.42, 0)], cylinder, [(0.54, 0.075), (0.54, -0.075)], [(0.54, 0), (1, 0)]]
         for part in parts:
             self._along(start, end, part)
 
     def _along(self, start: Point, end: Point, points: list[Point]) -> None:
-        """A line given as shares of the way and as units across it."""
+        """Draw a line in coordinates of start and end: fractions of the distance, and units across it."""
         (x, y), (far, high) = start, end
         dx, dy = far - x, high - y
         long = math.hypot(dx, dy)
@@ -120,18 +121,18 @@ class Pencil:
 
 
 class Drawing:
-    """Draws a machine with a pencil: motion is to the right, up is up; a body is `WIDE` and `HIGH`.
+    """Layout of one machine's sketch: motion to the right, away from the surface upwards.
 
-    Without `values` names alone are written, where numbers change beside the drawing.
+    Without `values` only names are written, for pages on which the numbers change.
     """
 
     def __init__(self, machine: Machine, pencil: Pencil, values: bool = True) -> None:
         self.machine, self.pencil, self.values = machine, pencil, values
         self.places = _places(machine)
-        self.pulled, self.around, self.storeys = False, 0, 0
+        self.drive_drawn, self.detours, self.levels = False, 0, 0
 
     def draw(self) -> None:
-        """All of it."""
+        """Draw bodies, links, contacts and drive."""
         for name in self.machine.bodies:
             self._body(name)
         for name, link in self.machine.links.items():
@@ -140,8 +141,8 @@ class Drawing:
             self._contacts(name)
         self._drive()
 
-    def _told(self, name: str, value: str, between: str = "\n") -> str:
-        """A name, and its value where values are written."""
+    def _label(self, name: str, value: str, between: str = "\n") -> str:
+        """Text of a name, with its value if values are written."""
         return f"{name}{between}{value}" if self.values else name
 
     # -- bodies and contacts
@@ -150,7 +151,7 @@ class Drawing:
         body, place = self.machine.bodies[name], self.places[name]
         inertia = body.inertia_of()
         weighs = format_quantity(inertia, "kg m^2" if body.turns else "kg") if inertia else "no mass"
-        text = self._told(name, weighs)
+        text = self._label(name, weighs)
         if body.turns:
             for side in (-1, 1):
                 near, far = place.x + side * _HIGH / 1.7, place.x + side * _WIDE / 2
@@ -165,7 +166,7 @@ class Drawing:
         along, away = float(body.along()), float(body.away())
         if along:
             y, way = place.y + _HIGH / 2 + 0.22, math.copysign(0.7, along)
-            x = place.x + (0.95 if self.machine.drive.driven() == name else 0.0)  # beside what the drive does
+            x = place.x + (0.95 if self.machine.drive.driven() == name else 0.0)  # beside the controller's arrow
             self.pencil.arrow((x - way / 2, y), (x + way / 2, y), color=FORCED)
             size = format_quantity(abs(along), "N m" if body.turns else "N") if self.values else "force"
             self.pencil.words(x, y + 0.2, size, color=FORCED, va="bottom")
@@ -177,7 +178,7 @@ class Drawing:
             self.pencil.words(x + 0.12, y + 0.6, size, color=FORCED, ha="left")
 
     def _contacts(self, name: str) -> None:
-        """What a body slides on: pads beside each other on ground or drive, or another body above or below."""
+        """Draw the contacts of a body: pads side by side on ground or drive, interfaces with other bodies."""
         place = self.places[name]
         own = [(n, one) for n, one in self.machine.contacts.items() if one.held == name]
         beside = [(n, one) for n, one in own if one.base in (GROUND, LOAD_POINT)]
@@ -199,13 +200,13 @@ class Drawing:
         else:
             self.pencil.line((x - 0.8 * half, foot + 0.04), (x + 0.8 * half, foot + 0.04), linewidth=4, color=PALE)
         self.pencil.line((x - half, foot), (x + half, foot), linewidth=1.6)
-        if abs(x - place.x) + half > _WIDE / 2 + 0.2:  # a rail of its own beyond the body
+        if abs(x - place.x) + half > _WIDE / 2 + 0.2:  # the pad reaches beyond the body: draw a bracket
             self.pencil.line((x, top), (x, foot))
             self.pencil.line((place.x, top), (x, top))
         self.pencil.hatched(x - half, foot - 0.2, 2 * half, 0.2)
         if one.base == LOAD_POINT:
             self.pencil.arrow((x - 0.3, foot - 0.1), (x + 0.3, foot - 0.1))
-        self.pencil.words(x, foot - 0.28, self._told(name, self._load(name, one)), va="top")
+        self.pencil.words(x, foot - 0.28, self._label(name, self._load(name, one)), va="top")
 
     def _interface(self, place: _Place, other: _Place, name: str, one: Surface) -> None:
         if abs(place.x - other.x) < 0.1 and abs(abs(place.y - other.y) - _UP) < 0.1:
@@ -214,24 +215,24 @@ class Drawing:
                 near = edge + math.copysign(_HIGH / 2, y - edge)
                 self.pencil.line((place.x - _WIDE / 2, near), (place.x + _WIDE / 2, near), linewidth=2.4)
             self.pencil.gouge(place.x - _WIDE / 2, y - (_UP - _HIGH) / 2, _WIDE, _UP - _HIGH)
-            self.pencil.words(place.x, y, self._told(name, self._load(name, one)), paper=True)
+            self.pencil.words(place.x, y, self._label(name, self._load(name, one)), paper=True)
             return
-        self.around += 1
-        y = min(p.y for p in self.places.values()) - _HIGH / 2 - 0.85 - 0.35 * self.around
+        self.detours += 1
+        y = min(p.y for p in self.places.values()) - _HIGH / 2 - 0.85 - 0.35 * self.detours
         ends = [(p.x - 0.6, p.y - _HIGH / 2) for p in (place, other)]
         self.pencil.line(ends[0], (ends[0][0], y), (ends[1][0], y), ends[1], dashed=True, color=PALE)
-        self.pencil.words((ends[0][0] + ends[1][0]) / 2, y, self._told(name, self._load(name, one), ", "), paper=True)
+        self.pencil.words((ends[0][0] + ends[1][0]) / 2, y, self._label(name, self._load(name, one), ", "), paper=True)
 
     def _load(self, name: str, one: Surface) -> str:
-        """What presses it, in a few words, and at which radius it rubs."""
+        """Text of a contact's load and radius."""
         return self._pressed(name, one) + (f" at {format_quantity(one.radius, 'm')}" if one.radius is not None else "")
 
     def _pressed(self, name: str, one: Surface) -> str:
         if one.loaded_by is not None:
             return f"pressed by {one.loaded_by}"
         for full, known in self.machine.parameters().items():
-            told = known.role.kind in ("normal stress", "stiffness") and known.value is not None
-            if told and full.startswith(f"contacts.{name}.contact."):
+            labelled = known.role.kind in ("normal stress", "stiffness") and known.value is not None
+            if labelled and full.startswith(f"contacts.{name}.contact."):
                 return format_quantity(float(known.value or 0.0), known.role.unit, area=self.machine.area_of(full))
         return one.contact.name
 
@@ -263,10 +264,10 @@ class Drawing:
             self._named(name, link, ((start[0] + end[0]) / 2, max(start[1], end[1]) + 0.32), va="bottom")
 
     def _over(self, name: str, link: Link, left: str, right: str) -> None:
-        """Between bodies with others in between: above them."""
+        """Draw a link above the bodies that stand between its ends."""
         one, two = self.places[left], self.places[right]
-        y = self._storey()
-        shift = 0.6 - 0.12 * self.storeys
+        y = self._next_level()
+        shift = 0.6 - 0.12 * self.levels
         start, end = (one.x + shift, y), (two.x - 0.3 - shift, y)
         self.pencil.line((start[0], one.y + _HIGH / 2), start)
         self.pencil.line((end[0], two.y + _HIGH / 2), end)
@@ -274,7 +275,7 @@ class Drawing:
         self._named(name, link, ((start[0] + end[0]) / 2, y + 0.32), va="bottom")
 
     def _to_wall(self, name: str, link: Link, body: str) -> None:
-        """To the ground, or to what the drive moves."""
+        """Draw a link to the ground or the load point."""
         place, other = self.places[body], next(end for end in link.between if end != body)
         shares = link.directions()
         if "x" not in shares:
@@ -297,7 +298,7 @@ class Drawing:
             return
         side = self._free_side(place, other)
         if side == "over":
-            x, y = place.x + 0.6 - 0.12 * self.storeys, self._storey()
+            x, y = place.x + 0.6 - 0.12 * self.levels, self._next_level()
             start, end = (x, y), (x + 1.45, y)
             self.pencil.line((x, place.y + _HIGH / 2), start)
         else:
@@ -307,13 +308,13 @@ class Drawing:
         self._wall(end, (1, 0) if end[0] > start[0] else (-1, 0), other)
         self._named(name, link, ((start[0] + end[0]) / 2, start[1] + 0.32), va="bottom")
 
-    def _storey(self) -> float:
-        """The height above bodies at which one more link has room."""
-        self.storeys += 1
-        return max(p.y for p in self.places.values()) + _HIGH / 2 + 0.75 + 0.95 * (self.storeys - 1)
+    def _next_level(self) -> float:
+        """Height above the bodies at which the next link is drawn."""
+        self.levels += 1
+        return max(p.y for p in self.places.values()) + _HIGH / 2 + 0.75 + 0.95 * (self.levels - 1)
 
     def _free_side(self, place: _Place, other: str) -> str:
-        """Where a link to a wall has room: the load point ahead of all, in front where it pulls or behind."""
+        """Side with room for a link to a wall, ``"over"`` if none; the load point prefers left, the ground right."""
         row = [p for p in self.places.values() if abs(p.y - place.y) < 1]
         left = place.taken.get("left", 0) > 0 or any(p.x < place.x - 0.1 for p in row)
         right = place.taken.get("right", 0) > 0 or any(p.x > place.x + 0.1 for p in row)
@@ -331,8 +332,8 @@ class Drawing:
             self.pencil.line(*ends[:2])
             return
         self.pencil.line(*ends[:2], color=DRIVEN, linewidth=3)
-        if not self.pulled:  # there is one load point, wherever it is held
-            self.pulled = True
+        if not self.drive_drawn:  # one arrow only, though several links may lead to the load point
+            self.drive_drawn = True
             begin = (x - 0.55, y + 0.58) if abs(along) > abs(up) else (x - 0.4, y + 0.2)
             self.pencil.arrow(begin, (begin[0] + 0.9, begin[1]))
             speed = format_quantity(
@@ -369,9 +370,9 @@ class Drawing:
         place = self.places[body]
         speed = format_quantity(float(drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
         late = f"\n{format_quantity(float(drive.lateness()), 's')} late" if drive.lateness() else ""
-        top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.storeys
+        top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.levels
         self.pencil.frame(place.x - 1.0, top, 2.0, 0.75)
-        self.pencil.words(place.x, top + 0.375, self._told(drive.name, speed + late, ", "), color=DRIVEN)
+        self.pencil.words(place.x, top + 0.375, self._label(drive.name, speed + late, ", "), color=DRIVEN)
         roof = place.y + (_HIGH / 1.7 if self.machine.bodies[body].turns else _HIGH / 2)
         self.pencil.arrow((place.x - 0.2, top), (place.x - 0.2, roof + 0.02))
         for i, seen in enumerate(dict.fromkeys(drive.watched())):
@@ -398,13 +399,13 @@ class Drawing:
 
 
 def _places(machine: Machine) -> dict[str, _Place]:
-    """A row of bodies in the order in which links lead away from the drive.
+    """Places of all bodies: a row ordered by links away from the drive.
 
-    What only rests on the ground and is slid on by another body stands below or above that.
+    Bodies outside this chain that are in contact with one of the row are placed alternately below and above it.
     """
     ties = [link.between for link in machine.links.values() if GROUND not in link.between]
     order = [machine.drive.driven() or LOAD_POINT]
-    for one in order:  # grows while it is gone through
+    for one in order:  # grows during the loop
         for tie in ties:
             order += [end for end in tie if one in tie and end not in order]
     row = [name for name in order if name in machine.bodies]

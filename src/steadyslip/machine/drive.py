@@ -1,8 +1,8 @@
-"""What moves the load point: a steady pull, or a position controller that follows a ramp.
+"""Drives of sliders: a load point at constant velocity, or a position controller that follows a ramp.
 
-The spring stress on the block is T = Tss − k x − c (v − v_lp) − (controller), with x the slip of the
-block ahead of the load point. A controller that holds the block to the reference v0 t sees the position
-error −x, so its proportional gain acts as a stiffness and its derivative gain as a dashpot (theory 4).
+The spring stress on the block is T = Tss − k x − c (v − v_lp) − (controller), with x the slip of the block ahead of
+the load point. A controller that holds the block to the reference v0 t sees the position error −x, so its
+proportional gain acts as a stiffness and its derivative gain as a dashpot (theory 4).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from steadyslip.core.records import FrozenRecord, parameter
 
 
 class Drive(FrozenRecord, family="drive", kw_only=False):
-    """Base of drives: steady velocity and the gains of a controller, zero unless a subclass has them."""
+    """Base of drives: steady velocity and controller gains, which are zero unless overridden."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
 
@@ -29,11 +29,11 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         return 0
 
     def integral(self) -> Any:
-        """Stress per unit time integral of the slip x (Pa/(m s)), None without integral action."""
+        """Stress per time integral of the slip x (Pa/(m s)); None without integral action."""
         return None
 
     def lateness(self) -> Any:
-        """Time (s) between measuring and acting."""
+        """Dead time (s) between measuring and acting."""
         return 0
 
 

@@ -1,4 +1,4 @@
-"""Names that tables mention and that do not exist, or that nothing mentions: told before there is a machine to ask."""
+"""Checks of names in the tables of a machine file, possible even if other faults prevent a `Machine`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 
 
 def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
-    """The same as a `Machine` finds, of tables in which other things are wrong too."""
+    """Yield Problems with names of bodies and links in raw tables: unknown ones, and bodies that nothing refers to."""
     bodies, links, contacts = (_tables(tables.get(name)) for name in ("bodies", "links", "contacts"))
     for name, link in links.items():
         ends = link.get("between")
@@ -28,7 +28,7 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
         yield from _unknown(f"drive.{key}", driven.get(key), list(bodies))
     named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
     named += [surface.get(key) for surface in contacts.values() for key in ("body", "against")]
-    lost = list(unnamed(bodies, [*named, driven.get("body")]))
+    lost = list(unreferenced_bodies(bodies, [*named, driven.get("body")]))
     yield from lost
     if all(end in (*bodies, GROUND, LOAD_POINT) for end in named if isinstance(end, str)):
         told = {problem.name for problem in lost}
@@ -36,25 +36,25 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _floating(bodies: Iterable[str], links: Mapping[str, Mapping[str, Any]], driven: Any) -> Iterator[Problem]:
-    """Bodies that no chain of links with stiffness reaches from drive or ground, be the numbers what they may."""
+    """Yield a Problem for each body that no chain of links with stiffness connects to the drive or the ground."""
     stiff = [link for link in links.values() if "stiffness" in link and link.get("direction") != "normal"]
     ties = [link["between"] for link in stiff if isinstance(link.get("between"), list)]
     reached = [GROUND, LOAD_POINT, *([driven] if isinstance(driven, str) else [])]
-    for one in reached:  # grows while it is gone through
+    for one in reached:  # grows during the loop
         reached += [end for ends in ties if one in ends for end in ends if end not in reached]
-    yield from (floats(name) for name in bodies if name not in reached)
+    yield from (floating_body(name) for name in bodies if name not in reached)
 
 
-def floats(name: str) -> Problem:
-    """A body whose speed in steady sliding nothing settles."""
+def floating_body(name: str) -> Problem:
+    """Problem of a body whose speed in steady sliding is undetermined."""
     return Problem(
         f"bodies.{name}", "floats: no chain of links with stiffness ties it to the drive or the ground, so that its "
         "speed in steady sliding is open",
     )  # fmt: skip
 
 
-def unnamed(bodies: Iterable[str], named: Sequence[Any]) -> Iterator[Problem]:
-    """Bodies that float whatever is wrong with names: unless one that does not exist was meant for them."""
+def unreferenced_bodies(bodies: Iterable[str], named: Sequence[Any]) -> Iterator[Problem]:
+    """Yield a Problem for each body that no name refers to, unless a misspelt name was probably meant for it."""
     bodies = list(bodies)
     meant = {near for end in named if isinstance(end, str) and end not in bodies
              for near in get_close_matches(end, bodies, cutoff=0.5)}  # fmt: skip

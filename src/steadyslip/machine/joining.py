@@ -1,4 +1,4 @@
-"""A machine with rigid links: both ends of each become one body, so that no stiffness is too large."""
+"""Rigid links: removal of links of a machine by joining the bodies at their ends."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 from steadyslip.machine.surfaces import Surface
 
-_SAME = 1e-12  # relative difference of two ratios that are one but for rounding
+_RATIO_TOLERANCE = 1e-12  # relative; products of a few ratios that should be 1 differ from it by some 1e-16
 
 
 @checked()
 def joined(machine: Machine, *links: str) -> Machine:
-    """The machine with links that are rigid: the bodies at both ends of each are one body, and the link is gone.
+    """Copy of a machine in which given links are rigid: each is removed, and its two bodies become one.
 
-    What turns and what slides may be joined as well: a screw's inertia J is then a mass J/lead² of the table, or the
-    table's mass m an inertia m lead² of the screw; what held or rubbed on the one holds or rubs on the other.
+    A rotating and a sliding body can be joined: a screw's inertia J becomes a mass J/lead² of the table, or the table's
+    mass m an inertia m lead² of the screw. Links and contacts of the removed body are transferred to the other.
 
     Parameters
     ----------
@@ -33,33 +33,33 @@ def joined(machine: Machine, *links: str) -> Machine:
     Returns
     -------
     Machine
-        The body that is kept has the name of the link's first end, unless the drive acts on the second, or only the
-        second can have the other's contacts.
+        The joint body has the name of the link's first end, unless the drive acts on the second, or only the second
+        can take over the other's contacts.
 
     Raises
     ------
     UnknownNameError
-        If there is no such link.
+        If a link does not exist.
     NotAvailable
-        If a link ends at the ground or the drive, an end moves away from the surface, a contact sees the force of the
-        link, or no body can take over what holds and rubs on the other.
+        If a link ends at the ground or the drive, an end moves away from the surface, a contact law depends on the
+        force of the link (`loaded_by`), or neither body can take over links and contacts of the other.
     """
     for link in links:
         name = link.removeprefix("links.")
         if name not in machine.links:
             raise UnknownNameError("link", link, machine.links)
-        machine = _without(machine, name)
+        machine = _without_link(machine, name)
     return machine
 
 
-def _without(machine: Machine, name: str) -> Machine:
+def _without_link(machine: Machine, name: str) -> Machine:
     link = machine.links[name]
     first, second = link.between
     for end in link.between:
         if end in (GROUND, LOAD_POINT):
             raise NotAvailable(
-                f"links.{name} cannot be rigid: it ends at the {end}, so that {_other(link, end)!r} would not move by "
-                "itself; leave that body out, or give the link a stiffness"
+                f"links.{name} cannot be rigid: it ends at the {end}, so that {_other_end(link, end)!r} would not move "
+                "by itself; leave that body out, or give the link a stiffness"
             )
         if machine.bodies[end].lifts or "y" in link.directions():
             raise NotAvailable(f"links.{name} cannot be rigid: it holds a body that moves away from the surface")
@@ -79,20 +79,20 @@ def _without(machine: Machine, name: str) -> Machine:
             raise error from None
 
 
-def _other(link: Link, end: str) -> str:
+def _other_end(link: Link, end: str) -> str:
     return link.between[1] if link.between[0] == end else link.between[0]
 
 
 def _merged(machine: Machine, name: str, kept: str, gone: str, ratio: float) -> Machine:
-    """With one body in place of two, of which that which goes moves `ratio` times as fast as that which is kept."""
+    """Copy of a machine with body `gone` joined to `kept`; `gone` moves `ratio` times as fast."""
     bodies = dict(machine.bodies)
-    bodies[kept] = _heavier(bodies[kept], bodies.pop(gone), ratio)
+    bodies[kept] = _joint_body(bodies[kept], bodies.pop(gone), ratio)
     links = {}
     for other, link in machine.links.items():
         if other != name and set(link.between) != {kept, gone}:
-            links[other] = _tied(machine, other, link, kept, gone, ratio) if gone in link.between else link
+            links[other] = _moved_link(machine, other, link, kept, gone, ratio) if gone in link.between else link
     contacts = {
-        n: _rubbing(machine, n, one, kept, gone, ratio) if gone in (one.body, one.against) else one
+        n: _moved_contact(machine, n, one, kept, gone, ratio) if gone in (one.body, one.against) else one
         for n, one in machine.contacts.items()
     }
     drive = machine.drive
@@ -105,11 +105,11 @@ def _merged(machine: Machine, name: str, kept: str, gone: str, ratio: float) -> 
 
 
 def _is_one(ratio: float) -> bool:
-    return abs(ratio - 1) <= _SAME
+    return abs(ratio - 1) <= _RATIO_TOLERANCE
 
 
-def _heavier(body: Body, other: Body, ratio: float) -> Body:
-    """A body with the inertia and the constant force of another that moves so many times as fast."""
+def _joint_body(body: Body, other: Body, ratio: float) -> Body:
+    """Copy of `body` with added inertia and constant force of `other`, which moves `ratio` times as fast."""
     inertia = body.inertia_of() + ratio**2 * other.inertia_of()
     force = body.along() + ratio * other.along()
     if isinstance(body, RotatingBody):
@@ -117,10 +117,10 @@ def _heavier(body: Body, other: Body, ratio: float) -> Body:
     return replace(body, mass=inertia, force=force) if isinstance(body, SlidingBody) else body
 
 
-def _tied(machine: Machine, name: str, link: Link, kept: str, gone: str, ratio: float) -> Link:
-    """A link to the body that goes, as one to the body that is kept."""
+def _moved_link(machine: Machine, name: str, link: Link, kept: str, gone: str, ratio: float) -> Link:
+    """Equivalent of a link to body `gone` that holds body `kept` instead."""
     shares = dict(zip(link.between, (-float(link.ratio()), 1.0), strict=True))
-    other = _other(link, gone)
+    other = _other_end(link, gone)
     own, far = shares[gone] * ratio, shares[other]
     turning: Mapping[str, bool | None] = {kept: machine.bodies[kept].turns, other: machine._turns(other)}
 
@@ -142,8 +142,8 @@ def _tied(machine: Machine, name: str, link: Link, kept: str, gone: str, ratio: 
     return Spring(between=(other, kept), **values(own))
 
 
-def _rubbing(machine: Machine, name: str, surface: Surface, kept: str, gone: str, ratio: float) -> Surface:
-    """A contact of the body that goes, as one of the body that is kept."""
+def _moved_contact(machine: Machine, name: str, surface: Surface, kept: str, gone: str, ratio: float) -> Surface:
+    """Equivalent of a contact of body `gone` for body `kept`."""
     if surface.against == gone or not machine.bodies[kept].turns:
         if not _is_one(ratio) or machine.bodies[kept].turns != machine.bodies[gone].turns:
             raise NotAvailable(

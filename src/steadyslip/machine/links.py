@@ -1,4 +1,4 @@
-"""Links: a spring beside a dashpot between two bodies, or between a body and the ground or the drive."""
+"""Links: a spring and a dashpot in parallel between two bodies, or between a body and the ground or the drive."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from steadyslip.core.records import FrozenRecord, option, parameter, setting
 
 
 class Link(FrozenRecord, family="link"):
-    """Base of links. `between` names its two ends: bodies, ``ground`` or ``drive``."""
+    """Base of links; `between` names the two ends: bodies, ``ground`` or ``drive``."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", "spring")
     turning: ClassVar[tuple[bool | None, bool | None]] = (False, False)
-    """Whether the first and the second end turn; None for whatever the ground does."""
+    """For each end, True if it must rotate, False if it must slide; None for either."""
 
     between: tuple[str, ...] = setting(Names("the two ends: names of bodies, ground or drive"))
 
@@ -31,27 +31,27 @@ class Link(FrozenRecord, family="link"):
             yield Problem("stiffness", "missing; give stiffness, damping or both")
 
     def rigidity(self) -> Any:
-        """Its stiffness, None where it is a dashpot alone."""
+        """Stiffness (N/m or N m/rad), None for a dashpot alone."""
         raise NotImplementedError
 
     def dashpot(self) -> Any:
-        """Its damping."""
+        """Damping (N s/m or N m s/rad)."""
         raise NotImplementedError
 
     def is_damped(self) -> bool:
-        """Whether it has a dashpot."""
+        """True if the damping is not zero."""
         return bool(self.dashpot() != 0)
 
     def ratio(self) -> Any:
-        """Speed of the second end for a speed of one of the first."""
+        """Speed of the second end per speed of the first without stretch."""
         return 1
 
     def keeps_pace(self) -> bool:
-        """Whether both ends must move together in steady sliding."""
+        """True if the stretch is constant in steady sliding, so that the speeds of the ends are coupled."""
         return self.rigidity() is not None
 
     def directions(self) -> Mapping[str, Any]:
-        """Share of the stretch along the slide (``x``) and away from the surface (``y``)."""
+        """Direction cosines of the link: along the slide (``x``) and away from the surface (``y``)."""
         return {"x": 1}
 
 

@@ -1,10 +1,10 @@
-"""A machine: named bodies, links, contacts and a drive."""
+"""Machines of named bodies, links, contacts and a drive."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part
 from steadyslip.machine.bodies import Body
-from steadyslip.machine.ends import floats, unnamed
+from steadyslip.machine.ends import floating_body, unreferenced_bodies
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
     GROUND,
@@ -26,20 +26,28 @@ from steadyslip.machine.mechanism import (
     Integral,
     Mechanism,
 )
-from steadyslip.machine.motion import Tie, rigid_motion
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.servo import MachineDrive
 from steadyslip.machine.surfaces import Surface
 
-_SAME = 1e-9  # relative difference below which two speeds of one end agree
+_SPEED_TOLERANCE = 1e-9  # relative difference of two speeds of one end that counts as rounding; chosen by trial
+
+
+class Tie(NamedTuple):
+    """Coupling of two ends in steady sliding by link `name`: the second moves `ratio` times as fast as the first."""
+
+    name: str
+    first: str
+    second: str
+    ratio: Any
 
 
 class Machine(Rig):
     """Bodies that slide or turn, tied to each other by links, on one contact or several (theory 11).
 
-    Forces, not stresses: masses in kg, stiffnesses in N/m. In steady sliding everything moves rigidly at what the
-    drive's velocity makes of it. Parameters have dotted names such as ``bodies.table.mass``, ``links.screw.stiffness``,
-    ``contacts.guide.friction.a``; a last part is enough where it is unique.
+    Quantities are forces, not stresses: masses in kg, stiffnesses in N/m. In steady sliding all bodies move at constant
+    speeds in fixed ratios to the drive's velocity. Parameters have dotted names such as ``bodies.table.mass``,
+    ``links.screw.stiffness``, ``contacts.guide.friction.a``; the last part is enough if it is unique.
     """
 
     bodies: Any = members(Body, "bodies, by name")
@@ -47,20 +55,20 @@ class Machine(Rig):
     contacts: Any = members(Surface, "contacts, by name")
     drive: MachineDrive = part(MachineDrive, "drive")
 
-    # -- what is wrong with it
+    # -- checks
 
     def inconsistencies(self) -> Iterator[Problem]:
-        faults = [*self._nameless(), *self._wrong_ends()]
+        faults = [*self._name_problems(), *self._end_problems()]
         yield from faults
         if not faults:
-            yield from self._wrong_contacts()
+            yield from self._contact_problems()
             yield from self._floating()
         else:
             ends = [end for link in self.links.values() for end in link.between]
             ends += [end for surface in self.contacts.values() for end in (surface.body, surface.against)]
-            yield from unnamed(self.bodies, [*ends, self.drive.driven()])
+            yield from unreferenced_bodies(self.bodies, [*ends, self.drive.driven()])
 
-    def _nameless(self) -> Iterator[Problem]:
+    def _name_problems(self) -> Iterator[Problem]:
         for name in (GROUND, LOAD_POINT):
             if name in self.bodies:
                 yield Problem(f"bodies.{name}", "is what links and contacts call something else; give another name")
@@ -73,8 +81,8 @@ class Machine(Rig):
         if name not in known:
             yield Problem(where, unknown_name("body", name, known))
 
-    def _wrong_ends(self) -> Iterator[Problem]:
-        """Names of bodies that do not exist, or that move otherwise than it takes."""
+    def _end_problems(self) -> Iterator[Problem]:
+        """Yield Problems with ends of links, contacts and drive: unknown bodies, or the wrong kind of motion."""
         for name, link in self.links.items():
             for end, turning in zip(link.between, link.turning, strict=True):
                 where = f"links.{name}.between"
@@ -124,7 +132,7 @@ class Machine(Rig):
     def _lifts(self, end: str) -> bool:
         return end in self.bodies and bool(self.bodies[end].lifts)
 
-    def _wrong_contacts(self) -> Iterator[Problem]:
+    def _contact_problems(self) -> Iterator[Problem]:
         for name, surface in self.contacts.items():
             where, ends = f"contacts.{name}", (surface.body, surface.against)
             turning = [bool(self._turns(end)) for end in ends]
@@ -162,18 +170,18 @@ class Machine(Rig):
         speeds, _ = self._speeds()
         for name in self.bodies:
             if name not in speeds:
-                yield floats(name)
+                yield floating_body(name)
 
         for body in () if self.drive.driven() is None else dict.fromkeys(self.drive.watched()):
             if body in speeds and not speeds[body]:
                 yield Problem("drive.measured", f"{body!r} stands still in steady sliding; measure a body that moves")
 
     def conditions(self) -> Iterator[Condition]:
-        """Every loop of links must close, and every contact must slide forwards."""
+        """Yield the conditions that loops of links are consistent and that all contacts slide forwards."""
         speeds, closing = self._speeds()
         for tie, speed, other in closing:
             message = f"the links contradict each other: {tie.second} would move at {{}} and at {{}} in steady sliding"
-            same = np.abs(np.asarray(speed - other)) <= _SAME * np.abs(np.asarray(speed))
+            same = np.abs(np.asarray(speed - other)) <= _SPEED_TOLERANCE * np.abs(np.asarray(speed))
             yield Condition("drive" if tie.name == "drive" else "links", same, message, (speed, other))
         for name, surface in self.contacts.items():
             slip = self._slip_rate(surface, speeds)
@@ -183,7 +191,7 @@ class Machine(Rig):
             )
             yield Condition(f"contacts.{name}", np.asarray(slip) > 0, message, (slip,))
 
-    # -- how it moves
+    # -- steady motion
 
     def _ties(self) -> list[Tie]:
         ties = [
@@ -199,7 +207,7 @@ class Machine(Rig):
         return {name: 0 if _is_zero(speed) else speed for name, speed in speeds.items()}, closing
 
     def speeds(self) -> dict[str, Any]:
-        """Steady speed of every body, m/s or rad/s."""
+        """Speeds of the bodies in steady sliding (m/s or rad/s), by name."""
         speeds, _ = self._speeds()
         return {name: speeds[name] for name in self.bodies}
 
@@ -215,7 +223,7 @@ class Machine(Rig):
         return area
 
     def declared(self) -> dict[str, Address]:
-        """Laws of contacts without an area are in forces."""
+        """Collect the parameters; laws of contacts without an area have units of force."""
         return {name: self._in_forces(one) for name, one in super().declared().items()}
 
     def _in_forces(self, one: Address) -> Address:
@@ -224,10 +232,10 @@ class Machine(Rig):
         doc = stress_name(one.role.doc, 1.0)
         return replace(one, role=replace(one.role, unit=total_unit(one.role.unit), doc=doc))
 
-    # -- how it is assembled
+    # -- assembly
 
     def mechanism(self) -> Mechanism:
-        """One coordinate for every body, and a second for bodies that move away from the surface."""
+        """Mechanism with one coordinate for every body, and a second for bodies that move away from the surface."""
         speeds, _ = self._speeds()
         coordinates = []
         for name, body in self.bodies.items():
@@ -239,20 +247,21 @@ class Machine(Rig):
         controls, integral = self._control(speeds)
         contacts = tuple(
             ContactPort(
-                name, surface.friction, surface.contact, self._row((surface.body, surface.against), surface.radius),
-                self._apart(surface), 1 if surface.area is None else surface.area,
+                name, surface.friction, surface.contact,
+                self._slip_row((surface.body, surface.against), surface.radius), self._separation_row(surface),
+                1 if surface.area is None else surface.area,
                 "" if surface.loaded_by is None else f"links.{surface.loaded_by}",
             )
             for name, surface in self.contacts.items()
         )  # fmt: skip
         return Mechanism(tuple(coordinates), (*elements, *controls), integral, contacts, self.drive.velocity)
 
-    def _row(self, ends: tuple[str, str], lever: Any = None) -> dict[str, Any]:
-        """The first end ahead of the second."""
+    def _slip_row(self, ends: tuple[str, str], lever: Any = None) -> dict[str, Any]:
+        """Row of the slip of the first end ahead of the second."""
         row = {ends[0]: 1 if lever is None else lever, ends[1]: -1}
         return {end: share for end, share in row.items() if end != GROUND}
 
-    def _apart(self, surface: Surface) -> dict[str, Any]:
+    def _separation_row(self, surface: Surface) -> dict[str, Any]:
         row = {surface.held: 1, surface.base: -1}
         return {end + NORMAL: share for end, share in row.items() if self._lifts(end)}
 
@@ -268,7 +277,7 @@ class Machine(Rig):
         return Element(f"links.{name}", row, row, stiffness, link.dashpot(), GROUND in link.between)
 
     def _control(self, speeds: dict[str, Any]) -> tuple[tuple[Element, ...], Integral | None]:
-        """What a controller does as springs and dashpots that sense elsewhere than they act."""
+        """Controller as springs and dashpots that may sense other bodies than they act on, and its integral action."""
         driven = self.drive.driven()
         if driven is None:
             return (), None
@@ -280,6 +289,36 @@ class Machine(Rig):
             elements.append(Element("", acts, speed, held, 0 if place == speed else kd, delay=late))
         sensed = {name: share for name, share in place.items() if name != LOAD_POINT}
         return tuple(elements), None if ki is None else Integral(acts, sensed, ki, late)
+
+
+def rigid_motion(known: Mapping[str, Any], ties: list[Tie]) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:
+    """Speeds of all ends that the ties connect to known ones, and the redundant ties.
+
+    Parameters
+    ----------
+    known : mapping of str
+        Known speeds: of the ground and of the load point.
+    ties : list of Tie
+
+    Returns
+    -------
+    speeds : dict of str
+    closing : list of tuple
+        Ties that close a loop, each with the two speeds of its second end, which must be equal.
+    """
+    speeds, left = dict(known), list(ties)
+    closing: list[tuple[Tie, Any, Any]] = []
+    while True:
+        tie = next((one for one in left if one.first in speeds or one.second in speeds), None)
+        if tie is None:
+            return speeds, closing
+        left.remove(tie)
+        if tie.first in speeds and tie.second in speeds:
+            closing.append((tie, speeds[tie.second], tie.ratio * speeds[tie.first]))
+        elif tie.first in speeds:
+            speeds[tie.second] = tie.ratio * speeds[tie.first]
+        else:
+            speeds[tie.first] = speeds[tie.second] / tie.ratio
 
 
 def _is_zero(speed: Any) -> bool:

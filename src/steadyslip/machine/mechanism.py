@@ -1,8 +1,8 @@
-"""A rig taken apart: coordinates, what acts between them, where surfaces touch. From this alone the Model is assembled.
+"""Mechanism: the elements of a rig from which the Model is assembled: coordinates, forces between them, contacts.
 
-Numbers are those of the rig, or the symbols of its twin. A *row* says how something follows from the coordinates: a
-coefficient for each that takes part, such as {"table": 1, "motor": -lead}; `LOAD_POINT` stands for what moves at the
-velocity of the drive. Displacements count from steady sliding.
+Values are the rig's numbers, or symbols. A row is a linear combination of coordinates as a mapping of names to
+coefficients, such as {"table": 1, "motor": -lead}; the name `LOAD_POINT` stands for the load point, which moves at
+the velocity of the drive. Displacements are relative to steady sliding.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from steadyslip.laws.friction import FrictionLaw
 Shares = Mapping[str, Any]
 LOAD_POINT, GROUND = "drive", "ground"
 NORMAL = ".normal"
-"""Behind a body's name: its coordinate away from the surface."""
+"""Suffix of a body's name: its coordinate away from the surface."""
 
 
 @dataclass(frozen=True)
 class DegreeOfFreedom:
-    """One way in which a body moves: its name, inertia (kg, kg m²), steady speed, and a constant force along it."""
+    """Coordinate of a body: name, inertia (kg or kg m²), steady speed, constant force along it, unit (m or rad)."""
 
     name: str
     inertia: Any
@@ -33,22 +33,22 @@ class DegreeOfFreedom:
 
 @dataclass(frozen=True)
 class Element:
-    """A spring beside a dashpot, or what acts as one: forces −`acts`·(stiffness · stretch + damping · stretch rate).
+    """Linear spring and dashpot, or controller: forces −`acts`·(stiffness · stretch + damping · stretch rate).
 
     Attributes
     ----------
     name : str
-        Dotted name of the link, or that of the drive; empty where nobody asks for its force.
+        Dotted name of the link, or that of the drive; empty if its force is not reported.
     acts : Shares
-        Where the force acts.
+        Row of the coordinates on which the force acts.
     senses : Shares
-        The stretch; for a spring the same row.
+        Row of the stretch; for a spring equal to `acts`.
     stiffness, damping
-        Zero where there is none.
+        Zero if there is none.
     grounded : bool
-        Whether it holds a body back, rather than pulling at it: its force is no part of what a contact law sees as T.
+        True for links to the ground: their force is not part of the spring force T of contact laws.
     delay
-        Time (s) by which it senses late.
+        Dead time (s) between sensing and acting.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Integral:
-    """A controller's integral action: a force −`acts`·gain · I with dI/dt = `senses`; with a delay, I that long ago."""
+    """Integral action of a controller: force −`acts`·gain·I with dI/dt = `senses`; I is taken `delay` (s) ago."""
 
     acts: Shares
     senses: Shares
@@ -72,19 +72,19 @@ class Integral:
 
 @dataclass(frozen=True)
 class ContactPort:
-    """Where a body slides on another, or on the ground.
+    """Contact of a body that slides on another, or on the ground.
 
     Attributes
     ----------
     name : str
-        Of the contact; empty where there is but one.
+        Name of the contact; empty for a slider.
     slip, separation : Shares
-        Slip, and distance of the surfaces where bodies move away from them; an empty row where they cannot.
+        Row of the slip, and row of the distance of the surfaces; the latter is empty if the bodies cannot separate.
     area : float or 1
-        Over which the laws' stresses act.
+        Area (m²) over which the stresses act; 1 if the laws are in forces.
     loaded_by : str
-        The element whose force and stiffness the contact law sees as T and k; empty for the force of all that pull at
-        the body, and the stiffness between it and the load point.
+        Element whose force and stiffness the contact law uses as T and k; if empty, T is the sum of all elements that
+        pull at the body, and k the stiffness between it and the load point.
     """
 
     name: str
@@ -98,16 +98,16 @@ class ContactPort:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """All of it.
+    """Coordinates, elements and contacts of a rig.
 
     Attributes
     ----------
     velocity
-        Of the drive.
+        Velocity of the drive (m/s or rad/s).
     gain
-        Stiffness that a controller adds to that of the slider.
+        Stiffness that a controller adds to that of a slider.
     axial_share
-        A slider's stiffness along the slide over that along its axis, where the latter is given; else None.
+        Ratio of a slider's stiffness along the slide to that along its axis, if the latter is given; else None.
     """
 
     coordinates: tuple[DegreeOfFreedom, ...]

@@ -1,4 +1,4 @@
-"""What every rig has, whether it is a slider or a machine: parameters by dotted name, and a mechanism."""
+"""Base class of rigs: parameters by dotted name, and a mechanism."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ S = TypeVar("S", bound="Rig")
 
 
 class Rig(FrozenRecord, Keeper):
-    """Base of `Slider` and `Machine`: a frozen record whose parameters have dotted names, and its mechanism."""
+    """Base of `Slider` and `Machine`: a frozen record with parameters by dotted name and a mechanism."""
 
-    assumed: ClassVar[Mapping[str, str]] = {}
-    """Parameters that the Model has even where the rig does not give them, with their letters."""
-    instead: ClassVar[Mapping[str, str]] = {}
-    """Parameters that are given in place of others, and of which."""
+    always_symbols: ClassVar[Mapping[str, str]] = {}
+    """Parameters that are symbols of the Model even if the rig does not give them, with their letters."""
+    replaces: ClassVar[Mapping[str, str]] = {}
+    """Parameters that may be given in place of others: name to name of the replaced one."""
 
-    aside: ClassVar[tuple[str, ...]] = ()
-    """Parameters that the Model does not have, because no equation does."""
+    not_in_model: ClassVar[tuple[str, ...]] = ()
+    """Parameters that occur in no equation of the Model."""
 
     def mechanism(self) -> Mechanism:
-        """The rig as its Model is assembled from it; of a twin with symbols, in symbols."""
+        """Mechanism from which the Model is assembled; symbolic for a copy of the rig with symbols."""
         raise NotImplementedError
 
     def area_of(self, name: str) -> float | None:
-        """Area (m²) for which people give and get a parameter as a total; None where it is in its own unit."""
+        """Area (m²) if users give and get this parameter as a total of the contact, else None."""
         raise NotImplementedError
 
     def parameters(self) -> dict[str, Address]:
-        """Every parameter of the rig by dotted name: declaration, in the unit of its user, and present value."""
+        """Parameters of the rig by dotted name: role, with the user's unit, and value (cached)."""
         return dict(_parameters(self))
 
     def declared(self) -> dict[str, Address]:
-        """The same, worked out."""
+        """Collect the parameters (uncached)."""
         return parameters(self)
 
     def resolve(self, name: str) -> str:
-        """The full dotted name of a parameter.
+        """Full dotted name of a parameter.
 
         Raises
         ------
@@ -52,12 +52,12 @@ class Rig(FrozenRecord, Keeper):
         return resolve(name, self.parameters())
 
     def read(self, name: str, value: Any) -> Any:
-        """A value of a parameter of this name in SI units; text as its user writes it, in totals where it has an area.
+        """Convert a value of a parameter to SI units; text may give a total of a contact with an area.
 
         Raises
         ------
         ParameterError
-            If text is none of its quantities.
+            If text is not a quantity of the parameter's dimension.
         """
         if not isinstance(value, str):
             return value
@@ -67,15 +67,15 @@ class Rig(FrozenRecord, Keeper):
             raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
     def of_kind(self, kind: str) -> tuple[str, ...]:
-        """Dotted names of the given parameters whose laws declare them to be of a `kind`, in order."""
+        """Dotted names of the given parameters with a `kind` of `PARAMETER_KINDS`, in order."""
         return tuple(n for n, a in self.parameters().items() if a.role.kind == kind and a.value is not None)
 
     def value(self, name: str) -> float | None:
-        """The value of a parameter in SI units, None if it is not given."""
+        """Value of a parameter in SI units, None if it is not given."""
         return self.parameters()[self.resolve(name)].value
 
     def with_values(self: S, changes: Mapping[str, Any]) -> S:
-        """A copy with some parameters changed.
+        """Copy of the rig with some parameters changed.
 
         Parameters
         ----------

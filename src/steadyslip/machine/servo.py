@@ -1,8 +1,8 @@
-"""Drives of machines: a load point that moves steadily, or a position controller; linear, or of a body that turns.
+"""Drives of machines: a load point at constant velocity, or a position controller; sliding or rotating.
 
-A controller measures the place of a body, reduced to the body on which it acts by the steady motion of both, and pushes
-that body with F = Fss − (gain) (place ahead of the reference v0 t) − (gain) (speed above v0) − (gain) ∫. What it
-measures need not be where it acts (not collocated).
+A controller measures the position of a body, converted to the driven body by the ratio of their steady speeds, and
+acts on the driven body with F = Fss − (gain) (position ahead of the reference v0 t) − (gain) (speed above v0)
+− (gain) ∫ (position ahead). The measured and the driven body may differ (non-collocated control).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from steadyslip.core.records import FrozenRecord, parameter, setting
 
 
 class MachineDrive(FrozenRecord, family="drive of a machine"):
-    """Base of drives. The `velocity` is that of the body on which it acts, or of the load point, ``drive`` in links."""
+    """Base of drives; `velocity` is that of the driven body, or of the load point, which links call ``drive``."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
     turns: ClassVar[bool] = False
@@ -23,19 +23,19 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
     velocity: float = parameter("m/s", positive, "velocity v0 in steady sliding")
 
     def driven(self) -> str | None:
-        """The body on which a controller acts."""
+        """Body on which a controller acts; None for a load point."""
         return None
 
     def watched(self) -> tuple[str, str]:
-        """The bodies whose place and whose speed it measures."""
+        """Bodies whose position and whose speed a controller measures."""
         raise NotImplementedError
 
     def lateness(self) -> Any:
-        """Time (s) between measuring and acting."""
+        """Dead time (s) between measuring and acting."""
         return 0
 
     def gains(self) -> tuple[Any, Any, Any, Any]:
-        """Gains on the place of the first watched body, on speed and place of the second, on ∫ place of the first."""
+        """Gains on position of the first watched body, speed and position of the second, and integral of the first."""
         return 0, 0, 0, None
 
 
@@ -51,7 +51,7 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
 
 
 class _Controller(MachineDrive):
-    """A controller that acts on a body; with a `delay`, on what it measured that long ago."""
+    """Base of controllers that act on a body; `delay` is the dead time of the measurement."""
 
     body: str = setting(Text("the body on which it acts"))
     measured: str | None = setting(
@@ -91,9 +91,9 @@ class PositionPID(PositionPD, name="pid"):
 
 
 class Cascade(_Controller, name="p-pi"):
-    """A position loop around a speed loop, as machine drives are tuned: F = Kp [e + ∫e dt / Tn], e = Kv x_e + v_e.
+    """Cascade of a position loop and a speed loop (P-PI): F = Kp [e + ∫e dt / Tn], e = Kv x_e + v_e.
 
-    The place is that of `measured` (a scale at the table), the speed that of the body on which it acts (the encoder of
+    The position x_e is that of `measured` (a scale at the table), the speed v_e that of the driven body (the encoder of
     the motor) unless `speed_measured` names another.
     """
 
@@ -112,7 +112,7 @@ class Cascade(_Controller, name="p-pi"):
 
 
 class RotaryPD(PositionPD, name="rotary-pd"):
-    """`PositionPD` of a body that turns."""
+    """`PositionPD` of a body that rotates."""
 
     turns: ClassVar[bool] = True
     velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
@@ -121,7 +121,7 @@ class RotaryPD(PositionPD, name="rotary-pd"):
 
 
 class RotaryPID(PositionPID, name="rotary-pid"):
-    """`PositionPID` of a body that turns."""
+    """`PositionPID` of a body that rotates."""
 
     turns: ClassVar[bool] = True
     velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
@@ -131,7 +131,7 @@ class RotaryPID(PositionPID, name="rotary-pid"):
 
 
 class RotaryCascade(Cascade, name="rotary-p-pi"):
-    """`Cascade` of a body that turns."""
+    """`Cascade` of a body that rotates."""
 
     turns: ClassVar[bool] = True
     velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")

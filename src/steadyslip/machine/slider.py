@@ -1,4 +1,4 @@
-"""The rig: one block, its friction, its contact, the spring and dampers, and the drive."""
+"""Sliders: one block with friction, contact, spring, dampers and a drive."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from steadyslip.machine.rig import Rig
 class Slider(Rig, section="slider"):
     """A block pushed through a spring: m v̇ = T − τ(v, σ, memory) − ηv + q (theory 1).
 
-    All stresses, stiffnesses, dampings and the mass are per unit nominal contact area; with area 1 the
-    same numbers are forces. `stiffness` is the component along the sliding direction; where the contact
-    has an axis, `axial_stiffness` may be given instead. Mass zero is the quasistatic model.
+    All stresses, stiffnesses, dampings and the mass are per unit nominal contact area; with area 1 the same numbers are
+    forces. `stiffness` is the component along the sliding direction; if the contact has an axis, `axial_stiffness` may
+    be given instead. Mass zero is the quasistatic model.
 
-    Parameters have dotted names (``friction.a``, ``contact.angle``, ``slider.stiffness``,
-    ``drive.velocity``); a bare last part is enough where it is unique.
+    Parameters have dotted names (``friction.a``, ``contact.angle``, ``slider.stiffness``, ``drive.velocity``); the last
+    part is enough if it is unique.
     """
 
     has_area: ClassVar[bool] = True
-    assumed: ClassVar[Mapping[str, str]] = {"slider.stiffness": "k"}
-    instead: ClassVar[Mapping[str, str]] = {"slider.axial_stiffness": "slider.stiffness"}
-    aside: ClassVar[tuple[str, ...]] = ("slider.area",)
+    always_symbols: ClassVar[Mapping[str, str]] = {"slider.stiffness": "k"}
+    replaces: ClassVar[Mapping[str, str]] = {"slider.axial_stiffness": "slider.stiffness"}
+    not_in_model: ClassVar[tuple[str, ...]] = ("slider.area",)
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
@@ -77,12 +77,12 @@ class Slider(Rig, section="slider"):
             yield Condition("stiffness", np.asarray(gain) > 0, message, (gain,))
 
     def stiffness_name(self) -> str:
-        """The parameter that is this rig's stiffness: the spring's, along the slide or its axis, else a gain."""
+        """Name of the parameter that is the rig's stiffness: the spring's, along the slide or its axis, else a gain."""
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
     def gain_name(self) -> str | None:
-        """The drive's parameter that is the stiffness it adds, None where there is no such one."""
+        """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
         names = [name for name in self.of_kind("stiffness") if name.startswith("drive.")]
         if len(names) != 1 or self.value(names[0]) != self.drive.proportional():
             return None
@@ -92,7 +92,7 @@ class Slider(Rig, section="slider"):
         return self.area
 
     def mechanism(self) -> Mechanism:
-        """One coordinate, x, with the spring and controller between it and the load point."""
+        """Mechanism with one coordinate, x, and spring and controller between it and the load point."""
         pulled = {"x": 1, LOAD_POINT: -1}
         drive = self.drive
         ki, late = drive.integral(), drive.lateness()

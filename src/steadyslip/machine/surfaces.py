@@ -1,4 +1,4 @@
-"""Contacts of a machine: which bodies slide on what, by which laws."""
+"""Contacts of a machine: two bodies and their friction and contact laws."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 
 
 class Surface(FrozenRecord):
-    """A contact of a machine: a body that slides on another, on the ground or on what the drive moves.
+    """A contact of a machine: a body that slides on another, on the ground or on the moving load point.
 
-    The laws are in stresses over `area`; without one they are in forces. Slip is counted in the direction of motion.
+    The laws are in stresses over `area`; without one they are in forces. Slip is positive in the direction of motion.
     """
 
     has_area: ClassVar[bool] = True
@@ -35,10 +35,10 @@ class Surface(FrozenRecord):
 
     @property
     def held(self) -> str:
-        """The body that the contact rubs on: that which slides, or lies on what the drive moves."""
+        """Body on which friction acts: the one that slides, or that lies on the moving load point (a belt)."""
         return self.against if self.body == LOAD_POINT else self.body
 
     @property
     def base(self) -> str:
-        """The other end."""
+        """Counterpart of `held`: body, ground or load point."""
         return self.body if self.body == LOAD_POINT else self.against

@@ -69,7 +69,7 @@ def _build_cached(structure: _Structure) -> Model:
     rig = structure.rig
     symbols, known = _parameter_symbols(rig, structure.present)
     given = {name: symbol for name, symbol in symbols.items() if symbol.is_Symbol}
-    for name in rig.instead:
+    for name in rig.replaces:
         given.pop(name, None)
     roles = {name: address.role for name, address in rig.parameters().items()}
     mechanism = with_values(rig, symbols).mechanism()
@@ -86,9 +86,9 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
         called, letter = f"parameter_{place:03d}", _LETTERS.get(name) or _declared_letter(address, declared)
         before = name.rpartition(".")[0]
         dotted = f"{before}.{address.role.letter}" if address.role.letter else name
-        if name in rig.assumed:
-            symbols[name] = letters.symbol(called, dotted, rig.assumed[name], nonnegative=True)
-        elif name in rig.aside or address.value is None:
+        if name in rig.always_symbols:
+            symbols[name] = letters.symbol(called, dotted, rig.always_symbols[name], nonnegative=True)
+        elif name in rig.not_in_model or address.value is None:
             continue
         elif address.role.structural and address.value == 0 and name not in present:
             symbols[name] = sp.Integer(0)

@@ -218,9 +218,9 @@ def _placed(model: Model, rig: Rig, together: BroadcastArrays, branch: int, scan
         check_together(rig, "", varied)
     values = {name: address.value for name, address in rig.parameters().items()} | varied
     if model.axial_share is not None:
-        for name, other in rig.instead.items():
+        for name, other in rig.replaces.items():
             values[other] = values[name] * _axial_share(model)(values)
-    values |= {name: 0.0 for name in rig.assumed if values[name] is None}  # a controller alone
+    values |= {name: 0.0 for name in rig.always_symbols if values[name] is None}  # a controller alone
     arguments = tuple(values[name] for name in model.parameters)
     return OperatingPoint(model, arguments, together.shape, together.wrap, branch, valid)
 
@@ -251,9 +251,9 @@ def _varied(rig: Rig, vary: Vary) -> BroadcastArrays:
                 raise ParameterError(
                     [Problem(full, "got 0; without this term the rig has fewer states, ask for it apart")]
                 )
-            if known[full].value is None and full not in rig.assumed:
+            if known[full].value is None and full not in rig.always_symbols:
                 raise ParameterError([Problem(full, "cannot be varied: the rig does not have it")])
-            for name, other in rig.instead.items():
+            for name, other in rig.replaces.items():
                 if full == other and known[name].value is not None:
                     given = name.rpartition(".")[2]
                     raise ParameterError([Problem(full, f"cannot be varied: the rig has {given}")])

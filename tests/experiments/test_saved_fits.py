@@ -1,6 +1,7 @@
 """Fits of every kind of record are what they were once they are read back: to the last bit, and nothing is searched."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.experiments.numerics.noise import Noise, white
 
 
 def drifting(chance, rows=3000, drift=0.02):
@@ -119,6 +120,38 @@ def test_a_fit_of_means_is_read_back_with_its_loading(tmp_path):
     assert fit.plan.records[0].worth is not None
     fit.save(tmp_path / "fit.nc")
     same(ss.load_fit(tmp_path / "fit.nc"), fit)
+
+
+def test_a_fit_is_checked_by_its_residuals(tmp_path):
+    """White residuals pass; those that drift beside what their noise says leave the errors open, and words say so."""
+    chance = np.random.default_rng(2)
+    record = drifting(chance, rows=400)
+    fit = made(ss.lab_rig(), record, chance)
+    fit = replace(fit, coordinates=np.abs(fit.coordinates))
+    size, scatter = len(record), 1e-4
+
+    def left(residuals, **changes):
+        one = replace(fit, ssq=float(residuals @ residuals), noise=(white(scatter * np.ones(size)),), **changes)
+        one.__dict__.update(model=record.friction - residuals, as_measured=None, as_ramps=())
+        return one
+
+    noise = scatter * chance.standard_normal(size)
+    right = left(noise, search=replace(fit.search, cut=False))
+    assert [one.what for one in right.checks] == ["sum of squares", "minimum", "errors"]
+    assert all(one.passed for one in right.checks)
+    assert right.to_dict()["checked"] == "checked: sum of squares, minimum, errors"
+    assert "checked: sum of squares, minimum, errors" in str(right)
+    slow = left(noise + scatter * np.sin(np.arange(size) * 12 / size), search=replace(fit.search, converged=False))
+    assert "not decided: minimum, errors; checked: sum of squares" in str(slow)
+    right.save(tmp_path / "fit.nc")
+    assert ss.load_fit(tmp_path / "fit.nc").checks == right.checks
+    assert not replace_ssq(right, 1 + 1e-5).checks[0].passed
+
+
+def replace_ssq(fit, factor):
+    other = replace(fit, ssq=factor * fit.ssq)
+    other.__dict__.update(model=fit.model)
+    return other
 
 
 def test_a_fit_read_back_is_printed_without_a_search(tmp_path, monkeypatch):

@@ -10,12 +10,13 @@ import pytest
 import steadyslip as ss
 from edges_at_random import drawn
 from rigs_of_theory import LAWS, rig
+from steadyslip.core.checks import in_words
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.linear.boundary import margins
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.model.point import operating_point
 from steadyslip.verdict import checks, numbers
-from steadyslip.verdict.checks import critical_check, edge_checks, in_words, spectrum_checks, steady_check
+from steadyslip.verdict.checks import critical_check, edge_checks, spectrum_checks, steady_check
 from steadyslip.verdict.words import headline
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -72,6 +73,20 @@ def test_the_critical_stiffness_has_its_root_on_the_axis():
     assert critical_check(point, *right).passed
     for wrong in ((right[0] * 1.0001, right[1]), (right[0], right[1] * 1.0001)):
         assert not critical_check(point, *wrong).passed
+
+
+@pytest.mark.parametrize("name", ["inclined-spring", "machines/two-guides"])
+def test_the_kind_of_onset_is_checked_by_the_error_of_its_coefficient(name):
+    analysis = ss.analyze(ss.read_rig(EXAMPLES / f"{name}.toml"))
+    onset = analysis.onset
+    assert analysis.checks[-1:] == onset.checks
+    (right,) = onset.checks
+    assert right.error == onset.coefficient_error / abs(onset.coefficient) < 1e-6
+    assert "checked: kind of onset" in str(onset)
+    (wrong,) = replace(onset, coefficient_error=2 * abs(onset.coefficient)).checks
+    assert (wrong.passed, wrong.error) == (False, 2.0)
+    assert not replace(onset, coefficient=np.nan).checks[0].passed
+    assert replace(onset, kind="degenerate", coefficient=0.0, coefficient_error=0.0).checks[0].passed
 
 
 def test_a_wrong_count_of_growing_roots_leaves_no_verdict(monkeypatch):

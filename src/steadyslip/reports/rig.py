@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from steadyslip import figures
 from steadyslip.core.areas import stress_name
+from steadyslip.core.checks import in_words
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.experiments import Prediction
@@ -22,7 +23,6 @@ from steadyslip.reports.brief import rows_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import Markup, figure, heading, letter, math, paragraph, table
 from steadyslip.verdict import Analysis, Tolerated
-from steadyslip.verdict.checks import in_words
 from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.words import edge_rows, facts, headline, meaning
 

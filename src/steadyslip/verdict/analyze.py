@@ -131,17 +131,18 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
             checks += (critical_check(values, numbers["critical_stiffness"], numbers["critical_angular_frequency"]),)
             if not checks[-1].passed:
                 numbers |= dict.fromkeys([name for name in numbers if name.startswith("critical_")])
+        onset = _onset(rig, distances, branch)
         found = Analysis(
             rig=rig,
             steady=states[branch],
             reason="",
             margins=distances,
-            onset=_onset(rig, distances, branch),
+            onset=onset,
             kicks=_kicks(rig, kicks, branch),
             on_edge=on_the_edge,
             branch=branch,
             warnings=_warnings(rig, values, states, on_the_edge),
-            checks=checks,
+            checks=(*checks, *(onset.checks if onset else ())),
             version=__version__,
             **numbers,
         )

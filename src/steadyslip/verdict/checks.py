@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.linear.boundary import Margin, present_zeros, without_edges
@@ -33,7 +32,6 @@ from steadyslip.model.range import in_range
 
 Array = NDArray[np.float64]
 
-UNDECIDED = "not decided: "
 BALANCED = 1e-8
 """Share of stresses, and of the rates of memory that are e-folds away, by which a balance may be missed."""
 BESIDE = (1e-7, 1e-5, 1e-9)
@@ -44,49 +42,6 @@ ON_AXIS = 1e-6
 _DECIDING = ("steady sliding", "growing roots")  # without which there is no verdict
 _STEP = 1e-3  # of the logarithms of velocity, stress and memory, whose effect on its rates says how large these are
 _ZERO = 1e-9  # of the largest root: what a root of zero, which has no share of its own, may be by rounding
-
-
-@dataclass(frozen=True)
-class Check(Displayed):
-    """One number of an answer, and the second question that was asked of it.
-
-    Attributes
-    ----------
-    what : str
-        The number, such as ``eigenvalues`` or ``edge of friction.a at 0.0142``.
-    how : str
-        What was asked.
-    error : float
-        What came of it, as a share of the number; inf where nothing did.
-    allowed : float
-        Up to which the number is told.
-    passed : bool
-    """
-
-    what: str
-    how: str
-    error: float
-    allowed: float
-    passed: bool
-
-    def __str__(self) -> str:
-        verb = "passed" if self.passed else "failed"
-        return f"{self.what}: {self.how}; {verb}, {self.error:.2g} where {self.allowed:.2g} is allowed"
-
-
-def _checked(what: str, how: str, error: float, allowed: float) -> Check:
-    error = float(error) if math.isfinite(error) else math.inf
-    return Check(what, how, error, allowed, error <= allowed)
-
-
-def in_words(checks: Sequence[Check]) -> str:
-    """One line: what was checked, or what failed."""
-    failed = [one.what for one in checks if not one.passed]
-    edges = sum(one.passed and one.what.startswith("edge of ") for one in checks)
-    passed = [one.what for one in checks if one.passed and not one.what.startswith("edge of ")]
-    passed += [f"{edges} edge{'s' if edges > 1 else ''}"] if edges else []
-    words = [f"{UNDECIDED}{', '.join(failed)}"] if failed else []
-    return "; ".join([*words, f"checked: {', '.join(passed)}"] if passed else words)
 
 
 def verdict_checks(rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
@@ -116,7 +71,7 @@ def steady_check(rig: Rig, point: OperatingPoint) -> Check:
         velocity, friction, normal, *memory = (numbers.pop(0) for _ in range(3 + len(contact.memory)))
         missed.append(abs(normal - float(sigma)) / float(sigma))
         missed += _missed_by_law(law, velocity, float(sigma), tuple(memory), friction)
-    return _checked("steady sliding", "forces and memory by the laws", max(missed), BALANCED)
+    return check("steady sliding", "forces and memory by the laws", max(missed), BALANCED)
 
 
 @question
@@ -169,9 +124,7 @@ def spectrum_checks(point: OperatingPoint, stable: bool, on_edge: bool) -> tuple
         return ()
     found, (share, good) = checked_spectrum(point), shares_of_errors(point)
     worst = float(np.max(share, initial=0.0)) if len(share) else math.inf
-    values = _checked(
-        "eigenvalues", "least singular value of the rig's own matrix", worst, max(GOOD, worst * all(good))
-    )
+    values = check("eigenvalues", "least singular value of the rig's own matrix", worst, max(GOOD, worst * all(good)))
     how, growing = "argument along the imaginary axis", found.growing
     if growing < 0 and len(share) and not point.model.delays:  # sizes at which that leaves floating point
         how, growing = "conditions of Routh and Hurwitz", int(np.sum(found.values.real > 0))
@@ -188,7 +141,7 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
         s = s[np.isfinite(s)]
         size = beta or float(np.exp(np.mean(np.log(np.maximum(np.sort(np.abs(s))[1:], 1e-300))))) or 1.0
         missed = np.min(np.abs(s - 1j * beta), initial=np.inf) / size
-    return _checked("critical stiffness", "a root on the imaginary axis", float(missed), ON_AXIS)
+    return check("critical stiffness", "a root on the imaginary axis", float(missed), ON_AXIS)
 
 
 # -- edges
@@ -210,7 +163,7 @@ def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple
     checks = []
     for (_, edge), share in zip(edges, shares, strict=True):
         what = f"edge of {edge.parameter} at {edge.value:.6g} {edge.unit}".removesuffix(" 1")
-        checks.append(_checked(what, "roots on both sides", share, max(BESIDE)))
+        checks.append(check(what, "roots on both sides", share, max(BESIDE)))
     lost = [edge for (_, edge), one in zip(edges, checks, strict=True) if not one.passed]
     return without_edges(margins, lost), tuple(checks)
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.areas import total
-from steadyslip.verdict.checks import in_words
+from steadyslip.core.checks import as_data
 from steadyslip.verdict.holding import holding
 
 if TYPE_CHECKING:
@@ -90,8 +89,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "time_to_double": found.time_to_double,
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),
-        "checked": in_words(found.checks),
-        "checks": [asdict(check) for check in found.checks],
+        **as_data(found.checks),
         **(late if found.characteristic_terms else {}),
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from steadyslip.core.checks import Check
 from steadyslip.core.pages import Displayed
 from steadyslip.linear.boundary import Margin
 from steadyslip.linear.modes import Mode
@@ -14,7 +15,6 @@ from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import SteadyMachine, SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.verdict.checks import Check
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear.kicks.threshold import Threshold

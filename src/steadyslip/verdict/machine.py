@@ -110,6 +110,7 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
         distances, of_edges = edge_checks(machine, margins(machine), 0)
         posed = numbers["growth_rate"] not in (math.inf, None)
         leading = numbers["eigenvalues"][0] if posed else 0.0
+        onset = None if point.model.delays else _onset(machine, distances)
         found = MachineAnalysis(
             rig=machine,
             reason="",
@@ -117,10 +118,10 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
             mode=mode_of(machine, point, complex(leading.real, abs(leading.imag))) if posed else None,
             on_edge=edged,
             margins=distances,
-            onset=None if point.model.delays else _onset(machine, distances),
+            onset=onset,
             kicks=_kicks(machine, kicks),
             warnings=_warnings(machine, steady),
-            checks=(*checks, *of_edges),
+            checks=(*checks, *of_edges, *(onset.checks if onset else ())),
             version=__version__,
             **numbers,
         )

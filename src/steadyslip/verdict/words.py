@@ -6,10 +6,10 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
+from steadyslip.core.checks import UNDECIDED, in_words
 from steadyslip.core.errors import InternalError
 from steadyslip.core.format import format_quantity
 from steadyslip.machine.slider import Slider
-from steadyslip.verdict.checks import UNDECIDED, in_words
 from steadyslip.verdict.holding import gain_words, holding
 from steadyslip.verdict.reasons import NEXT_TO_IT, in_stiffness
 

@@ -8,6 +8,7 @@ import pytest
 import steadyslip as ss
 from dimensionless import two_states
 from doubled_machines import ALONG, closing, drawn, judged, places
+from steadyslip.core.checks import in_words
 from steadyslip.nonlinear.orbits import tracer
 from steadyslip.nonlinear.orbits.cycle import End
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
@@ -99,20 +100,32 @@ def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling
 
 def test_cycles_carry_how_well_they_close_and_multipliers_their_error(doubling):
     """What integrates badly shows it, and is computed again with smaller errors per step."""
-    assert doubling.checks.closing < 1e-6
-    assert doubling.checks.multiplier_error < 1e-6
-    assert not doubling.checks.undecided
-    assert str(doubling.checks) in str(doubling)
-    assert doubling.to_dict()["checks"].startswith("checked: cycles close to")
+    count = len(doubling)
+    onset, closing, multipliers = doubling.checks
+    assert all(one.passed for one in doubling.checks)
+    assert (onset.what, closing.what) == ("kind of onset", f"{count} cycles")
+    assert multipliers.what.startswith("stability of ")
+    assert closing.error == max(one.closing for one in doubling) < 1e-6
+    known = max(cycle.multiplier_error for cycle in doubling)
+    assert known < 1e-6
+    data = doubling.to_dict()
+    assert data["checked"] == f"checked: kind of onset, {count} cycles, {multipliers.what}"
+    assert data["checked"] in str(doubling)
+    assert [one["what"] for one in data["checks"]] == [one.what for one in doubling.checks]
+    worse = replace(doubling, cycles=(replace(doubling.cycles[0], closing=1e-3), *doubling.cycles[1:]))
+    assert f"not decided: 1 of {count} cycles; checked: kind of onset, stability" in str(worse)
+    wild = replace(doubling, cycles=(*doubling.cycles[:-1], replace(doubling.cycles[-1], trivial=np.nan)))
+    assert f"not decided: stability of 1 of {count} cycles; checked: kind of onset, {count} cycles" in str(wild)
+    assert {one["what"]: one["error"] for one in wild.to_dict()["checks"]}[f"stability of 1 of {count} cycles"] is None
     edge = doubling.onset.value
     coarse = ss.cycles(doubling.rig, between=(0.9 * edge, 1.01 * edge), rtol=1e-4, doublings=0)
     worst = max(cycle.multiplier_error for cycle in coarse)
-    assert worst > 100 * doubling.checks.multiplier_error
+    assert worst > 100 * known
     one = coarse.cycles[-1]
     wrong = replace(one, closing=1e-3)
-    assert "not decided: whether it is a cycle" in wrong.checked
-    assert "not decided: whether it attracts" in replace(one, trivial=1.002).checked
-    assert "not decided: whether it attracts" in replace(one, trivial=1.0009, multipliers=(0.998,)).checked
+    assert in_words(wrong.checks) == "not decided: the cycle; checked: its stability"
+    assert in_words(replace(one, trivial=1.002).checks) == "not decided: its stability; checked: the cycle"
+    assert not replace(one, trivial=1.0009, multipliers=(0.998,)).checks[1].passed
 
 
 @pytest.mark.campaign

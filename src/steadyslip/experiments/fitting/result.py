@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+from steadyslip.core.checks import Check
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.numbers import FitNumbers
+from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.fitting.words import as_dict, words
 
 
@@ -23,6 +25,11 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
     def __repr__(self) -> str:
         inner = ", ".join(f"{e.name}={e.value:.4g}" for e in self.estimates)
         return f"<Fit: {inner}; print it for errors and warnings>"
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """What the residuals say of the sum of squares, the minimum and the errors."""
+        return residual_checks(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``--json`` prints it; numbers that do not exist are None."""

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import total
+from steadyslip.core.checks import as_data, in_words
 from steadyslip.core.format import format_quantity
 from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import Ramped, may_be_ramp
+from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -86,6 +88,7 @@ def _quality(fit: FitNumbers) -> list[str]:
         f"errors          one standard deviation, {independent}",
         f"minimum         {reached}",
         *textwrap.wrap(f"driven by       {drive_line(fit)}", WIDTH, subsequent_indent=" " * 16),
+        in_words(residual_checks(fit)),
     ]
 
 
@@ -352,5 +355,6 @@ def as_dict(fit: FitNumbers) -> dict[str, Any]:
             for one in fit.unidentified
         ],
         "warnings": warnings(fit),
+        **as_data(residual_checks(fit)),
         "notes": {record.source: list(record.notes) for record in fit.plan.records},
     }

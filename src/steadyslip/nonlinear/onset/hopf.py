@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.checks import Check, check, in_words
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import BRANCH, NAME, checked
@@ -99,6 +100,12 @@ class Onset(Displayed):
         return self.kind in ("supercritical", "subcritical")
 
     @property
+    def checks(self) -> tuple[Check, ...]:
+        """Whether the cubic coefficient is larger than its error, or vanishes in exact arithmetic."""
+        share = 0.0 if self.kind == "degenerate" else self.coefficient_error / (abs(self.coefficient) or np.nan)
+        return (check("kind of onset", "error of the cubic coefficient", share, 1.0),)
+
+    @property
     def is_weak(self) -> bool:
         """Whether motion in ordinary numbers does not see the cubic coefficient, or nobody knows its sign."""
         return not (self.has_sign and self.share > WEAK)
@@ -148,7 +155,7 @@ class Onset(Displayed):
         where = f" at {self.contact}" if self.contact else ""
         size = f"{self.normalised:.4g}{self._within()} of the frequency per squared amplitude of ln v{where}"
         lines.append(f"  cubic coefficient {size}, period {format_quantity(2 * np.pi / self.angular_frequency, 's')}")
-        return "\n".join(lines)
+        return "\n".join([*lines, f"  {in_words(self.checks)}"])
 
     def _within(self) -> str:
         """The error of the coefficient in words, where it matters."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import outside, stress_name, total, totals
+from steadyslip.core.checks import Check, as_data, in_words
 from steadyslip.core.errors import unknown_name
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
@@ -21,7 +22,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
-from steadyslip.nonlinear.orbits.ranges import CycleChecks, Stretch, checks_of, neighbours, stretches_of
+from steadyslip.nonlinear.orbits.ranges import Stretch, checks_of, neighbours, stretches_of
 from steadyslip.nonlinear.orbits.values import CyclesAt, cycles_at, simulations
 
 Array = np.ndarray
@@ -168,9 +169,9 @@ class CycleBranch(Displayed):
         return tuple(one.range for one in self.stretches if one.stable)
 
     @property
-    def checks(self) -> CycleChecks:
-        """How well the cycles close, how well their multipliers are known, and what that does not decide."""
-        return checks_of(self.cycles, self.repeated)
+    def checks(self) -> tuple[Check, ...]:
+        """How well the kind of onset is known, the cycles close, and their multipliers are known."""
+        return (*self.onset.checks, *checks_of(self.cycles, self.repeated))
 
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``point``."""
@@ -181,7 +182,7 @@ class CycleBranch(Displayed):
         data["stable"] = ("point", self["stable"], {})
         attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind, "gaps": list(self.gaps)}
         attributes["stable_ranges"] = [end for one in self.stable_ranges for end in one]
-        attributes["checks"] = str(self.checks)
+        attributes["checked"] = in_words(self.checks)
         return xr.Dataset(data, attrs=attributes)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
@@ -227,7 +228,7 @@ class CycleBranch(Displayed):
                 {"stable": one.stable, "range": list(one.range), "ends": [end.kind for end in one.ends]}
                 for one in self.stretches
             ],
-            "checks": str(self.checks),
+            **as_data(self.checks),
             "cycles": [plain(cycle) for cycle in self.cycles],
             "special": [
                 {"kind": s.kind, "bracket": list(s.bracket), "precision": s.precision} | plain(s.cycle)
@@ -277,7 +278,7 @@ class CycleBranch(Displayed):
             how = "from the period doubling at" if begin.kind == "period doubling" else "found by simulation, from"
             lines += [f"  gap: at {before} {why};", f"    another sheet, {how} {after} on"]
         lines.append(f"  ends: {self.end}")
-        lines += [f"  {self.checks}"] if self.cycles else []
+        lines += [f"  {in_words(self.checks)}"]
         if self.doubled is not None:
             lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]
         return "\n".join(lines)

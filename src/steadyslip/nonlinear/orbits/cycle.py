@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from steadyslip.core.checks import Check, check
 from steadyslip.core.pages import Displayed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -121,20 +122,13 @@ class Cycle(Displayed):
         return abs(self.trivial - 1)
 
     @property
-    def decided(self) -> bool:
-        """Whether multipliers are known, and the largest is farther from 1 in size than its error."""
+    def checks(self) -> tuple[Check, ...]:
+        """Whether the motion closes, and whether the largest multiplier is farther from 1 in size than its error."""
+        room = abs(self.growth - 1) / (UNCERTAIN * self.growth) if self.growth else IMPRECISE
         return (
-            self.multiplier_error <= IMPRECISE
-            and abs(self.growth - 1) > UNCERTAIN * self.multiplier_error * self.growth
+            check("the cycle", "closing by an integration of the motion alone", self.closing, OPEN),
+            check("its stability", "the multiplier along the motion is 1", self.multiplier_error, min(IMPRECISE, room)),
         )
-
-    @property
-    def checked(self) -> str:
-        """Closing and multipliers of the cycle, in words."""
-        words = f"closes to {self.closing:.1g} of its size, multipliers to {self.multiplier_error:.1g}"
-        if not self.closing <= OPEN or not self.decided:
-            words += "; not decided: whether it " + ("attracts" if self.closing <= OPEN else "is a cycle")
-        return words
 
     @property
     def slip(self) -> float:

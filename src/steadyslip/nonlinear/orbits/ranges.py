@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import inf
 
+from steadyslip.core.checks import Check
 from steadyslip.core.format import format_quantity
-from steadyslip.nonlinear.orbits.cycle import OPEN, Cycle, End, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.special import NOISE, SMALL
 
 
@@ -102,62 +104,35 @@ def neighbours(levels: Sequence[Changing], value: float) -> tuple[Neighbour | No
     return below, above
 
 
-@dataclass(frozen=True)
-class CycleChecks:
-    """Answers to the questions that check the cycles of a branch.
-
-    Attributes
-    ----------
-    count : int
-        Number of cycles.
-    closing : float
-        Largest `Cycle.closing`.
-    multiplier_error : float
-        Largest `Cycle.multiplier_error`.
-    repeated : int
-        Number of cycles that were computed again with smaller errors per step.
-    open : tuple of float
-        Values of the parameter of cycles that do not close.
-    undecided : tuple of float
-        Values of the parameter at which multipliers are not known, or the largest is 1 within its error; small cycles
-        at the edge left out: there the kind of onset decides.
-    """
-
-    count: int
-    closing: float
-    multiplier_error: float
-    repeated: int
-    open: tuple[float, ...]
-    undecided: tuple[float, ...]
-
-    def __str__(self) -> str:
-        words = f"checked: cycles close to {self.closing:.1g} of their size by an integration of the motion alone; "
-        words += f"the multiplier along the motion is 1 to {self.multiplier_error:.1g}"
-        if self.repeated:
-            words += f"; {self.repeated} computed again with smaller errors per step"
-        for what, values in (("whether they are cycles", self.open), ("whether they attract", self.undecided)):
-            if values:
-                words += f"; not decided: {what}, of {len(values)} of {self.count}"
-        return words
-
-
-def checks_of(cycles: Sequence[Cycle], repeated: int) -> CycleChecks:
-    """The checks of the cycles of a branch."""
-    return CycleChecks(
-        count=len(cycles),
-        closing=max((cycle.closing for cycle in cycles), default=0.0),
-        multiplier_error=max((cycle.multiplier_error for cycle in cycles), default=0.0),
-        repeated=repeated,
-        open=tuple(cycle.value for cycle in cycles if is_open(cycle)),
-        undecided=tuple(cycle.value for cycle in cycles if is_undecided(cycle)),
+def checks_of(cycles: Sequence[Cycle], repeated: int) -> tuple[Check, ...]:
+    """The checks of the cycles of a branch, all together; how many fail, where some do."""
+    kinds = (
+        ("", 0, is_open, cycles),
+        ("stability of ", 1, is_undecided, [one for one in cycles if not _is_small(one)]),
     )
+    found = []
+    for what, place, fails, asked in kinds:
+        if not asked:
+            continue
+        worst = max(
+            (one.checks[place] for one in asked), key=lambda one: one.error / one.allowed if one.allowed else inf
+        )
+        failing, how = sum(map(fails, asked)), worst.how
+        how += f"; {repeated} computed again with smaller errors per step" if repeated else ""
+        many = f"{failing} of {len(cycles)}" if failing else f"{len(asked)}"
+        found.append(replace(worst, what=f"{what}{many} cycles", how=how))
+    return tuple(found)
 
 
 def is_open(cycle: Cycle) -> bool:
     """Whether a motion that begins on a cycle does not come back to its start."""
-    return not cycle.closing <= OPEN
+    return not cycle.checks[0].passed
 
 
 def is_undecided(cycle: Cycle) -> bool:
     """Whether multipliers do not tell if a cycle attracts, and it is too large for the kind of onset to tell."""
-    return not cycle.decided and cycle.amplitude > SMALL
+    return not (cycle.checks[1].passed or _is_small(cycle))
+
+
+def _is_small(cycle: Cycle) -> bool:
+    return cycle.amplitude <= SMALL

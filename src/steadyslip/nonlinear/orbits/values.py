@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from steadyslip.core.checks import in_words
 from steadyslip.core.format import format_quantity
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset
@@ -99,7 +100,7 @@ class CyclesAt(tuple[Cycle, ...]):
     def __str__(self) -> str:
         lines = [
             f"{'stable' if one.stable else 'unstable'} cycle of period {format_quantity(one.period, 's')}; "
-            f"{one.checked}"
+            f"{in_words(one.checks)}"
             for one in self
         ]
         return "\n".join([*lines, *map(str, self.simulated), *filter(None, [self._window])]) or "no cycle"

@@ -93,7 +93,7 @@ class ChunkTimes:
 def run(plan: ss.Map, **options: Any) -> tuple[float, ChunkTimes]:
     """Seconds in all, and times of the chunks."""
     times = ChunkTimes()
-    flows = {module: module._flow for module in (local, cluster)}
+    flows = {module: module._finished_chunks for module in (local, cluster)}
     for module, flow in flows.items():
 
         def watched(*arguments: Any, flow: Any = flow) -> Any:
@@ -101,7 +101,7 @@ def run(plan: ss.Map, **options: Any) -> tuple[float, ChunkTimes]:
                 times.seen(done.points)
                 yield done
 
-        module._flow = watched
+        module._finished_chunks = watched
     try:
         with tempfile.TemporaryDirectory() as folder:
             begin = time.perf_counter()
@@ -109,7 +109,7 @@ def run(plan: ss.Map, **options: Any) -> tuple[float, ChunkTimes]:
             return time.perf_counter() - begin, times
     finally:
         for module, flow in flows.items():
-            module._flow = flow
+            module._finished_chunks = flow
 
 
 def stability(points: int) -> ss.Map:

@@ -10,7 +10,7 @@ from pathlib import Path
 from steadyslip.core.errors import NotAvailable
 
 MOST_TEXT = 2**20
-"""Largest size of a typed file (rig, protocol, map, fit), bytes: far beyond any, small enough to parse at once."""
+"""Largest size of a typed file (rig, protocol, map, fit), bytes; chosen by trial, far above that of any."""
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",

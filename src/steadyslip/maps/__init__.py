@@ -1,7 +1,8 @@
-"""Maps: any analysis over millions of rigs, on this machine or on a cluster, kept on disk chunk by chunk.
+"""Maps: analyses of millions of rigs, on this machine or a cluster, stored on disk chunk by chunk.
 
-Map (plan, axes, measures) -> Store (Zarr) <- do_chunk (work) <- workers (local, cluster) <- run_map
-Store -> MapResult -> files (export), figures, refine. Knows neither figures nor documents.
+A `Map` (plan: axes, measures) is computed chunk by chunk (work) by processes here or on a cluster, stored in a Zarr
+group (store) and returned as `MapResult` (view), which is exported, drawn and refined. Independent of figures and
+documents.
 """
 
 from __future__ import annotations

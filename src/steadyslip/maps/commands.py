@@ -1,4 +1,4 @@
-"""Maps and sensitivities from files and the words of a command line, and the files that they are written to."""
+"""Maps and sensitivities from rig files and command-line options, and the files they are written to."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from steadyslip.maps.plan.axes import Axis, Generated
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.map_file import read_map
 from steadyslip.maps.refine import Refined
-from steadyslip.maps.sensitivity import POINTS, Sensitivity, sensitivity, usual_numbers
+from steadyslip.maps.sensitivity import POINTS, Sensitivity, default_results, sensitivity
 from steadyslip.maps.store.arrays import check_path
 from steadyslip.maps.view.result import MapResult, open_map
 from steadyslip.maps.work.run import run_map
@@ -31,12 +31,12 @@ def map_file(
     cluster: str | None = None, refine: bool = False, figure: Mapping[str, Any] | None = None,
     edge: Mapping[str, Any] | None = None,
 ) -> MapResult:  # fmt: skip
-    """Compute the map of a rig file into the one of `outputs` that ends in .zarr, or open a map.
+    """Compute the map of a rig file into the path of `outputs` that ends in .zarr, or open a computed map.
 
     Raises
     ------
     ParameterError, NotAvailable
-        If anything is wrong, before anything is computed where it can be known.
+        If anything is wrong; found before the computation where possible.
     """
     _check_words(refine, figure or {}, edge or {})
     check_output([path for path in outputs if path.suffix != STORE], REFINED if refine else ENDINGS)
@@ -55,7 +55,7 @@ def map_file(
 
 
 def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any]) -> None:
-    """Options that would have no effect are mistakes."""
+    """Raise an error for options that have no effect."""
     if refine:
         idle = [name for name, value in figure.items() if value is not None]
         message = "is for figures of a map; with --refine they show the edge. Draw the map itself in a second command"
@@ -69,9 +69,9 @@ def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any
 def write_map(
     found: MapResult, path: Path, options: Mapping[str, Any], edge: Refined | None = None, source: Path | None = None
 ) -> None:
-    """Write a map as netCDF, Parquet, document or figure, or a refined edge as text or figure, by the name's ending.
+    """Write a map as netCDF, Parquet, document or figure, or a refined edge as CSV or figure, by the name's ending.
 
-    A document gives the hash of the `source`, the file that it was made of.
+    A document contains the hash of `source`, the rig file of the map.
 
     Raises
     ------
@@ -91,12 +91,12 @@ def write_map(
 def sensitivity_file(
     source: Path, changes: Iterable[str] = (), of: Sequence[str] = (), points: int = POINTS
 ) -> Sensitivity:
-    """Sobol indices over the ranges of the grids and samples of a rig file's ``[map]``.
+    """Compute Sobol indices over the ranges of the grids and samples of a rig file's ``[map]``.
 
     Raises
     ------
     ParameterError
-        If anything is wrong.
+        If anything is wrong; lists every problem.
     NotAvailable
         If a parameter has no range.
     """
@@ -108,13 +108,13 @@ def sensitivity_file(
         raise NotAvailable("the draws of a fit depend on each other, and Sobol indices are for independent parameters")
     own = {one.name: one for one in plan.compute}
     wanted = tuple(own.get(name, name) for name in of)  # with the options that the file gives it
-    return sensitivity(plan.rig, ranges, wanted or _suited(plan), points=points, protocol=plan.protocol)
+    return sensitivity(plan.rig, ranges, wanted or _numeric_measures(plan), points=points, protocol=plan.protocol)
 
 
 def write_sensitivity(found: Sensitivity, path: Path, source: Path | None = None) -> None:
-    """Write a document or draw the shares, by the ending of the name.
+    """Write a sensitivity as a document or as a figure of shares, by the ending of the name.
 
-    A document gives the hash of the `source`, the file that it was made of.
+    A document contains the hash of `source`, the rig file.
 
     Raises
     ------
@@ -130,9 +130,9 @@ def _range_of(axis: Axis) -> tuple[float, float, str]:
     return low, high, "log" if axis.spacing == "log" else "linear"
 
 
-def _suited(plan: Map) -> tuple[Any, ...]:
-    """What the map computes as far as it is one number a point; what is usual if nothing is."""
+def _numeric_measures(plan: Map) -> tuple[Any, ...]:
+    """Measures of the map with one number per point; the usual ones if there are none."""
     found = tuple(
         one for one in plan.compute if not any(o.flags or o.extra for o in one.outputs(plan.rig, plan.varied))
     )
-    return found or usual_numbers(plan.rig)
+    return found or default_results(plan.rig)

@@ -1,8 +1,8 @@
-"""New points of a map along an edge instead of everywhere.
+"""Refinement of a map along an edge, instead of everywhere.
 
-Between neighbouring points of a grid that differ (stable or not, say) lies an edge. The cells that it crosses are
-divided in two along each axis, again and again; a cell whose corners agree is taken in as soon as a point on its rim
-differs, so that an edge is followed out of the cells in which it was seen first.
+An edge lies between neighbouring grid points that differ (stable or not, say). Cells that it crosses are halved along
+each axis, repeatedly. A cell with equal corners is included as soon as a point on its faces differs, so that an edge is
+followed beyond the cells where it was first seen.
 """
 
 from __future__ import annotations
@@ -33,31 +33,31 @@ from steadyslip.maps.view.result import MapResult
 from steadyslip.maps.work.run import run_map
 
 Array = np.ndarray
-MOST_ROUNDS = 12
-MOST_AXES = 3
+MOST_ROUNDS = 12  # halvings: 4096 points between two of the map; chosen by trial
+MOST_AXES = 3  # the number of cells along an edge grows as size^(axes - 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Refined(ReadOnly):
-    """An edge of a map, and the points computed to find it.
+    """Edge of a map, and the points computed to find it.
 
     Attributes
     ----------
     map : MapResult
     of : str
-        The result whose edge it is.
+        Name of the result whose edge it is.
     level : float or None
-        Value that it crosses there; None where it is one of several kinds.
+        Value of the result at the edge; None for a result that is one of several kinds.
     rounds : int
-        How often cells were halved.
+        Number of times that cells were halved.
     points : dict of str to ndarray (m,)
         New points: parameters that vary and all results, SI units.
     edge : dict of str to ndarray (n,)
-        Points on the edge: parameters halfway between two of the finest neighbours that differ.
+        Points on the edge: parameters halfway between finest neighbours that differ.
     sides : ndarray (n, 2)
-        What `of` is on both sides: kind, or whether it is above the level.
+        Kinds of `of` on both sides; for numbers, 1 above the level and 0 below.
     spacing : dict of str to float
-        Largest distance of neighbours along each parameter, on the finest level; the edge is known to half of it.
+        Largest distance of finest neighbours along each parameter; the edge is known to half of it.
     """
 
     map: MapResult
@@ -86,7 +86,7 @@ class Refined(ReadOnly):
         return "\n".join(lines)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the points on the edge, a line each: parameters in SI units, then both sides.
+        """Write the points on the edge as CSV: parameters in SI units, then both sides.
 
         Raises
         ------
@@ -119,23 +119,23 @@ def refine(
     cluster: str | None = None,
     progress: bool | None = None,
 ) -> Refined:
-    """Put new points along an edge of a map.
+    """Compute new points along an edge of a map.
 
     Parameters
     ----------
     found : MapResult
-        Complete, over up to three parameters on grids; lists of values stay as they are.
+        Complete map over up to three parameters on grids; lists of values are not refined.
     rounds : int
-        How often to halve the cells that the edge crosses; each round costs about as many points as the edge has cells.
+        Number of halvings of the cells at the edge; each needs about as many points as the edge has cells.
     of : str, optional
-        Result whose edge is wanted; ``status`` unless given, or the map's first result.
+        Result whose edge is wanted; by default ``status``, or the map's first result.
     level : float, optional
-        Value in SI units that a result of numbers crosses at the edge; 0 for ``growth_rate`` and ``margin``, 1 for
-        ``safety_factor`` unless given. Where the result does not exist counts as below.
+        Value (SI units) of a numeric result at the edge; by default 0 for ``growth_rate`` and ``margin``, 1 for
+        ``safety_factor``. Points without the result count as below.
     compute : sequence of Measure, optional
-        What to compute; as in the map unless given, which is needed where it had functions.
+        Measures to compute; by default those of the map. Required if the map computes functions.
     workers, cluster, progress
-        As for `run_map`. New points are kept beside the map, in a folder of its name that ends in ``.refined``.
+        As in `run_map`. New points are stored beside the map, in a folder with its name and the ending ``.refined``.
 
     Returns
     -------
@@ -151,13 +151,13 @@ def refine(
     of = of or ("status" if "status" in found.results else found.results[0])
     level = _level(found, of, level)
     lattice = _Lattice(found, rounds)
-    kinds = _Kinds(found, of, level)
+    kinds = _Sides(found, of, level)
     base = found.read(of)
     nodes = lattice.flat(np.indices(found.shape).reshape(len(found.shape), -1).T * lattice.size)
-    known = _Known(nodes, kinds(base.reshape(-1)))
+    known = _KnownNodes(nodes, kinds(base.reshape(-1)))
     batch = _Batches(found, of, level, compute, lattice, workers, cluster, progress)
     cells = lattice.first_cells()
-    cells = cells[_mixed(lattice, known, cells, lattice.size)]
+    cells = cells[_is_mixed(lattice, known, cells, lattice.size)]
     if not len(cells):
         raise NotAvailable(f"{of} is the same at all points of the map; there is no edge to refine")
     for number in range(1, rounds + 1):
@@ -192,8 +192,8 @@ def _level(found: MapResult, of: str, level: float | None) -> float | None:
     return level
 
 
-class _Kinds:
-    """Which side of the edge values are on, as small integers."""
+class _Sides:
+    """Function from values of a result to the side of the edge, as small integers."""
 
     def __init__(self, found: MapResult, of: str, level: float | None) -> None:
         self.level = None if found.words(of) else level
@@ -205,7 +205,7 @@ class _Kinds:
 
 
 class _Lattice:
-    """Points between those of a grid: whole numbers, `size` of them from one grid point to the next."""
+    """Fine grid with integer coordinates (nodes): `size` steps from one point of the map's grid to the next."""
 
     def __init__(self, found: MapResult, rounds: int) -> None:
         over = found.store.definition["over"]
@@ -229,24 +229,24 @@ class _Lattice:
         self.inside = np.array(list(thirds), dtype=np.int64)
 
     def flat(self, nodes: Array) -> Array:
-        """Nodes (m, n) as single numbers."""
+        """Nodes (m, n) as flat indices."""
         return np.asarray(np.ravel_multi_index(tuple(np.asarray(nodes).T), self.shape), dtype=np.int64)
 
     def nodes(self, flat: Array) -> Array:
         return np.stack(np.unravel_index(flat, self.shape), axis=-1).astype(np.int64)
 
     def first_cells(self) -> Array:
-        """Lowest corners of all cells of the grid."""
+        """Lowest corners of all cells of the map's grid."""
         counts = [len(v) - 1 if d else len(v) for v, d in zip(self.values, self.divides, strict=True)]
         return np.asarray(np.indices(counts).reshape(len(counts), -1).T * self.size)
 
     def inner(self, cells: Array, step: int) -> Array:
-        """Whether cells lie within the grid."""
+        """True for cells within the grid."""
         high = np.array(self.shape) - np.where(self.divides, step, 1)
         return np.asarray(np.all((cells >= 0) & (cells <= high), axis=1))
 
     def parameters(self, nodes: Array) -> dict[str, Array]:
-        """Values of the parameters at nodes that need not be whole, SI units."""
+        """Values (SI units) of the parameters at nodes, which need not be integers."""
         found = {}
         for i, (name, values) in enumerate(zip(self.names, self.values, strict=True)):
             place = nodes[:, i] / self.size
@@ -259,14 +259,14 @@ class _Lattice:
 
     def spacing(self, axis: int) -> float:
         nodes = np.zeros((self.shape[axis], len(self.names)))
-        if self.shape[axis] > 2**20:  # even spacing is enough to know
+        if self.shape[axis] > 2**20:  # too many to list: the spacing is even
             return float(np.max(np.abs(np.diff(self.values[axis]))) / self.size)
         nodes[:, axis] = np.arange(self.shape[axis])
         return float(np.max(np.abs(np.diff(self.parameters(nodes)[self.names[axis]]))))
 
 
-class _Known:
-    """Nodes whose kind is known, in order."""
+class _KnownNodes:
+    """Nodes whose kind is known, sorted by flat index."""
 
     def __init__(self, flat: Array, kinds: Array) -> None:
         order = np.argsort(flat)
@@ -286,7 +286,7 @@ class _Known:
 
 
 class _Batches:
-    """Computes points as maps of their own beside the map, so that work on them can be interrupted as well."""
+    """Computation of new points as maps of their own beside the map, so that it can be interrupted and continued."""
 
     def __init__(
         self, found: MapResult, of: str, level: float | None, compute: Sequence[AnyMeasure] | None, lattice: _Lattice,
@@ -334,15 +334,17 @@ def _measures_of(definition: dict[str, Any]) -> tuple[Any, ...]:
     return tuple(found)
 
 
-def _mixed(lattice: _Lattice, known: _Known, cells: Array, step: int) -> Array:
-    """Whether the corners of cells, given by their lowest ones, differ."""
+def _is_mixed(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int) -> Array:
+    """True for cells (given by their lowest corners) whose corners differ in kind."""
     corners = cells[:, None, :] + step * lattice.corners
     kinds = known.of(lattice.flat(corners.reshape(-1, corners.shape[-1]))).reshape(len(cells), -1)
     return np.asarray(np.any(kinds != kinds[:, :1], axis=1))
 
 
-def _divided(lattice: _Lattice, known: _Known, cells: Array, step: int, compute: Any) -> Array:
-    """Halve cells of size 2 step, and others that the edge turns out to cross; returns the mixed halves."""
+def _divided(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int, compute: Any) -> Array:
+    """Halve cells of size 2 step at the edge, and others that it turns out to cross; returns halves with mixed
+    corners.
+    """
     active = np.unique(lattice.flat(cells))
     waiting = active
     unit = np.where(lattice.divides, 1, 0)
@@ -352,7 +354,7 @@ def _divided(lattice: _Lattice, known: _Known, cells: Array, step: int, compute:
         new = flat[~known.has(flat)]
         if len(new):
             known.add(new, compute(new))
-        # the rim: points that differ from a corner of the cell belong to its neighbours' business too
+        # nodes on a face that differ from a corner: the edge continues in the neighbouring cell
         kinds = known.of(lattice.flat(nodes.reshape(-1, nodes.shape[-1]))).reshape(len(waiting), -1)
         is_corner = np.all(lattice.inside != 1, axis=1)
         odd = np.any(kinds[:, :, None] != kinds[:, None, is_corner], axis=2) & ~is_corner
@@ -368,11 +370,11 @@ def _divided(lattice: _Lattice, known: _Known, cells: Array, step: int, compute:
         active = np.union1d(active, waiting)
     halves = (lattice.nodes(active)[:, None, :] + step * lattice.corners).reshape(-1, len(unit))
     halves = np.unique(halves, axis=0)
-    return np.asarray(halves[_mixed(lattice, known, halves, step)])
+    return np.asarray(halves[_is_mixed(lattice, known, halves, step)])
 
 
-def _edge(lattice: _Lattice, known: _Known, cells: Array) -> tuple[dict[str, Array], Array]:
-    """Halfway points between finest neighbours that differ, and their kinds."""
+def _edge(lattice: _Lattice, known: _KnownNodes, cells: Array) -> tuple[dict[str, Array], Array]:
+    """Points halfway between finest neighbours that differ, and their kinds."""
     places, sides = [], []
     for axis in np.flatnonzero(lattice.divides):
         along = np.zeros(len(lattice.names), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Which parameters decide: Sobol indices of a result over ranges of parameters."""
+"""Sensitivity of results to parameters: Sobol indices over ranges of parameters."""
 
 from __future__ import annotations
 
@@ -19,38 +19,37 @@ from steadyslip.maps.plan.axes import Samples
 from steadyslip.maps.plan.map import Map, evaluate
 
 Array = np.ndarray
-POINTS = 4096
-RESAMPLES = 200
-BLOCK = 32  # sets of points at a time, between which Ctrl-C takes effect
-LEAST, MOST = 64, 2**20
-ROUNDING = 1e-10  # relative, of a result: what varies by less does not depend on anything
-WIDE = 0.2  # width of an interval from which on an index says little
-LEVEL = 0.95
+POINTS = 4096  # default number of sets of points: chosen by trial against time
+RESAMPLES = 200  # of the bootstrap; chosen by trial against time
+BLOCK = 32  # sets of points evaluated together, between checks for Ctrl-C; chosen by trial
+LEAST, MOST = 64, 2**20  # sets of points; chosen by trial: fewer give intervals as wide as the range of an index
+ROUNDING = 1e-10  # relative range of a result up to which it counts as constant: a million roundings
+WIDE = 0.2  # width of an interval of an index (0 to 1) from which the summary warns
+LEVEL = 0.95  # of confidence
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity(ReadOnly):
-    """Shares of a result's variance that parameters are responsible for.
+    """Shares of a result's variance that are due to each parameter (Sobol indices).
 
     Attributes
     ----------
     rig : Slider or Machine
     parameters : tuple of str
     ranges : dict of str to (float, float, str)
-        Ends in SI units, and ``linear`` or ``log``.
+        Ends in SI units, and spacing ``linear`` or ``log``.
     first, total : dict of str to ndarray (d,)
-        By result: share by a parameter alone, and with all that it does together with others.
+        By result: share of each parameter alone, and together with its interactions.
     first_interval, total_interval : dict of str to ndarray (2, d)
-        95 % intervals by bootstrap.
+        95 % bootstrap intervals.
     missing : dict of str to float
-        Share of the points at which the result does not exist; they are left out, so that the shares are those within
-        the rest.
+        Share of the points without the result; they are left out, and the indices are those over the rest.
     points : dict of str to int
-        Sets of points used, each of d + 2 evaluations.
+        Number of sets of points used, each of d + 2 evaluations.
     interrupted : bool
-        Whether Ctrl-C came before all sets were done.
+        True if Ctrl-C came before all sets were done.
     without : dict of str to str
-        Results that have no shares, and why: they exist at too few points, or do not vary.
+        Results without indices, and why: too few points with a value, or no variation.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -66,7 +65,7 @@ class Sensitivity(ReadOnly):
     without: dict[str, str] = field(default_factory=dict)
 
     def ranked(self, result: str) -> list[str]:
-        """Parameters by falling total share."""
+        """Parameters by decreasing total share."""
         return [self.parameters[i] for i in np.argsort(-self.total[result])]
 
     def __str__(self) -> str:
@@ -92,7 +91,7 @@ class Sensitivity(ReadOnly):
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Result as JSON-ready dict."""
         return {
             "parameters": list(self.parameters),
             "ranges": {name: list(ends) for name, ends in self.ranges.items()},
@@ -126,25 +125,25 @@ def sensitivity(
     protocol: Any = None,
     progress: bool | None = None,
 ) -> Sensitivity:
-    """Sobol indices of results over ranges of parameters.
+    """Compute Sobol indices of results over ranges of parameters.
 
     Parameters
     ----------
     rig : Slider or Machine
     over : mapping of str to (low, high) or (low, high, "log")
-        At least two parameters by dotted name and their ranges, SI units or text; independent, and uniform in the value
-        or in its logarithm.
+        At least two parameters by dotted name and their ranges (SI units or text); independent and uniform in the value
+        or its logarithm.
     of : sequence of str, Measure or function
-        Measures as for `Map` that give one number a point; ``margin`` is ln(k/k_cr). Unless given, of a slider the
-        critical stiffness and that, of a machine its growth rate.
+        Measures with one number per point, as for `Map`; ``margin`` is ln(k/k_cr). By default critical stiffness and
+        margin of a slider, growth rate of a machine.
     points : int
-        Sets of points, a power of 2; each costs as many evaluations as there are parameters, and two.
+        Number of sets of points, a power of 2; each takes d + 2 evaluations for d parameters.
     seed : int
     protocol : Protocol or piece, optional
-        For measures that simulate.
+        Protocol of measures that simulate.
     progress : bool, optional
-        Whether to show a progress bar; on a terminal unless given. After Ctrl-C, indices are those of the sets that
-        are done, where these are enough (`Sensitivity.interrupted`).
+        True to show a progress bar; by default on a terminal. After Ctrl-C the indices are those of the finished sets,
+        if there are enough (`Sensitivity.interrupted`).
 
     Returns
     -------
@@ -153,9 +152,9 @@ def sensitivity(
     Raises
     ------
     ParameterError
-        If anything given is wrong.
+        If any argument is wrong.
     NotAvailable
-        If every result exists at too few points, or does not vary.
+        If all results have too few points with a value, or do not vary.
 
     Notes
     -----
@@ -168,7 +167,7 @@ def sensitivity(
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, from {LEAST} to {MOST}")])
     plan = Map(
         rig,
-        compute=usual_numbers(rig) if of is None else of,
+        compute=default_results(rig) if of is None else of,
         samples=Samples(over, points, seed=seed),
         protocol=protocol,
     )
@@ -213,13 +212,13 @@ def sensitivity(
     )  # fmt: skip
 
 
-def usual_numbers(rig: Slider | Machine) -> tuple[str, ...]:
-    """What is asked for unless something is said."""
+def default_results(rig: Slider | Machine) -> tuple[str, ...]:
+    """Default results for a rig."""
     return ("critical_stiffness", "margin") if isinstance(rig, Slider) else ("growth_rate",)
 
 
 def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict[str, Array]:
-    """All results at all sets (d + 2, points), or at those that were done when Ctrl-C came."""
+    """All results at all sets (d + 2, points), or at those finished when Ctrl-C came."""
     count = next(iter(sets.values())).shape[1]
     parts: list[dict[str, Array]] = []
     with (
@@ -238,7 +237,7 @@ def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict
 
 
 def _sets(plan: Map, points: int, seed: int) -> dict[str, Array]:
-    """Parameters at points A, B, and A with one parameter of B each, (d + 2, points)."""
+    """Parameters at points A, B, and A with one parameter from B, shape (d + 2, points) each."""
     from scipy.stats import qmc
 
     ranges = plan.sampling.ranges  # type: ignore[union-attr]
@@ -255,7 +254,7 @@ def _sets(plan: Map, points: int, seed: int) -> dict[str, Array]:
 
 
 def _indices(column: Array) -> Array:
-    """First and total indices, (2, d), from a result at all sets, (d + 2, n)."""
+    """First-order and total indices, (2, d), from a result at all sets, (d + 2, n)."""
     from scipy.stats import sobol_indices
 
     parts = {"f_A": column[:1], "f_B": column[1:2], "f_AB": column[2:, None, :]}

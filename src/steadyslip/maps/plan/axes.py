@@ -1,4 +1,4 @@
-"""Which parameters a map varies, and through which values: grids and lists are axes, samples share one dimension."""
+"""Values of the varied parameters: grids and lists as axes, samples along one common dimension."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Array = np.ndarray
 SPACINGS = ("linear", "log")
 SAMPLERS = ("sobol", "latin-hypercube")
 SAMPLE = "sample"
-COMPLETE = "complete"  # the array of marks
-MOST_POINTS = 10**12
-SOBOL_BITS = 32  # SciPy's jumps ahead work up to here
-LARGEST_HYPERCUBE = 2**22  # all its points are needed for one of them
+COMPLETE = "complete"  # name of the array of chunk checksums ("marks")
+MOST_POINTS = 10**12  # of a map: results of 8 bytes then have 8 TB
+SOBOL_BITS = 32  # largest resolution at which SciPy's fast_forward works
+LARGEST_HYPERCUBE = 2**22  # points; all are generated to get one of them, 34 MB per parameter
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Grid(Displayed):
     Parameters
     ----------
     start, stop : float or str
-        SI units, or text such as ``"10 deg"``.
+        SI units, or text with a unit such as ``"10 deg"``.
     points : int
         At least 1; one point is `start`.
     spacing : str
@@ -85,7 +85,7 @@ class Axis(ReadOnly):
 
 @dataclass(frozen=True)
 class Generated:
-    """Sample points that follow from a seed, a piece at a time.
+    """Sample points that follow from a seed, computed in parts.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Generated:
         return tuple(name for name, *_ in self.ranges)
 
     def part(self, start: int, stop: int) -> dict[str, Array]:
-        """Parameters of points `start` to `stop`."""
+        """Parameters of the points from `start` to `stop`."""
         unit = _sobol(self).part(start, stop) if self.method == "sobol" else _hypercube(self)[start:stop]
         found = {}
         for column, (name, low, high, spacing) in zip(unit.T, self.ranges, strict=True):
@@ -117,7 +117,7 @@ class Generated:
 
 
 class _Sobol:
-    """A Sobol sequence that goes on from where it was; back to its beginning only if it must."""
+    """Sobol sequence that continues from its position, and restarts only to go back."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         self.dimensions, self.seed = dimensions, seed
@@ -135,7 +135,7 @@ class _Sobol:
             self._restart()
         if start > self.position:
             self.engine.fast_forward(start - self.position)
-        with warnings.catch_warnings():  # that the number of points is no power of 2: pieces add up to the whole
+        with warnings.catch_warnings():  # SciPy warns if a part's length is no power of 2; only the whole should be
             warnings.simplefilter("ignore", UserWarning)
             found = self.engine.random(stop - start)
         self.position = stop
@@ -156,13 +156,13 @@ def _hypercube(of: Generated) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Listed(ReadOnly):
-    """Sample points given one by one, such as draws of a fit.
+    """Sample points given as arrays, such as draws of a fit.
 
     Attributes
     ----------
     values : dict of str to ndarray (m,)
     source : str
-        Where they come from, in words.
+        Origin of the points, for messages.
     """
 
     values: dict[str, Array] = field(repr=False)
@@ -177,7 +177,7 @@ class Listed(ReadOnly):
         return len(next(iter(self.values.values())))
 
     def part(self, start: int, stop: int) -> dict[str, Array]:
-        """Parameters of points `start` to `stop`."""
+        """Parameters of the points from `start` to `stop`."""
         return {name: column[start:stop] for name, column in self.values.items()}
 
     def definition(self) -> dict[str, Any]:
@@ -189,17 +189,17 @@ Sampling = Generated | Listed
 
 
 def digest(values: Array) -> str:
-    """A short name for the exact numbers of an array."""
+    """Short hash of the exact numbers of an array."""
     return hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()[:16]
 
 
 def make_axis(name: str, role: Parameter, given: Any) -> Axis:
-    """The axis of a parameter.
+    """Axis of a parameter from a Grid or a list of values.
 
     Raises
     ------
     ParameterError
-        Naming the parameter and what is wrong.
+        With the parameter and what is wrong.
     """
     if isinstance(given, Grid):
         low, high = _ends(name, role, given.start, given.stop, given.spacing)
@@ -231,7 +231,7 @@ def make_sampling(given: Any, roles: Mapping[str, Parameter]) -> Sampling:
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If anything is wrong; lists every problem.
     """
     if isinstance(given, Samples):
         return _generated(given, roles)

@@ -1,4 +1,4 @@
-"""Measures of where stability changes: along the stiffness of a slider, or along any parameter that enters linearly."""
+"""Measures of stability boundaries along a slider's stiffness or any parameter that enters the equations linearly."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.stable_values import edge_along, intervals_along, is_own_stiffness, name_along, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan.measures import Measure, Output, block_of
+from steadyslip.maps.plan.measures import Measure, Output, as_slider
 from steadyslip.model.point import Vary, operating_point
 from steadyslip.nonlinear.onset.hopf import KINDS, onset_map, parameter_along
 from steadyslip.protocol import Protocol
 
 
 def _of_sliders(rig: Slider | Machine) -> Iterator[Problem]:
-    """What is about the stiffness k of a block is no question for a machine."""
+    """Problem of a machine for measures about the stiffness k of a slider."""
     if isinstance(rig, Machine):
         yield Problem(
             "", "is about the one stiffness of a slider, and a machine has several; compute 'edge' or 'stable_values' "
@@ -39,7 +39,7 @@ class CriticalStiffness(Measure, name="critical_stiffness"):
         return (Output("critical_stiffness", "Pa/m", "critical stiffness"),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"critical_stiffness": critical_stiffness(block_of(rig), vary)}
+        return {"critical_stiffness": critical_stiffness(as_slider(rig), vary)}
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         yield from _of_sliders(rig)
@@ -56,7 +56,7 @@ class StableStiffness(Measure, name="stable_stiffness"):
         return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"stable_stiffness": stable_stiffness(block_of(rig), vary)}
+        return {"stable_stiffness": stable_stiffness(as_slider(rig), vary)}
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         yield from _of_sliders(rig)
@@ -66,16 +66,16 @@ ALONG = "dotted name of the parameter that is meant, which must enter the equati
 
 
 class Along(Measure):
-    """Base of measures of where stability changes along one parameter that enters the equations linearly."""
+    """Base of measures about the stability boundary along one parameter that enters the equations linearly."""
 
     along: str | None = setting(Text(ALONG), default=None)
 
     def name_of(self, rig: Slider | Machine) -> str:
-        """The full name of the parameter."""
+        """Full name of the parameter."""
         return name_along(rig, self.along)
 
     def is_own(self, rig: Slider | Machine) -> bool:
-        """Whether it is the stiffness of a slider, for which there are closed forms."""
+        """True if the parameter is the stiffness of a slider, for which there are closed forms."""
         return is_own_stiffness(rig, self.name_of(rig))
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
@@ -91,12 +91,12 @@ class Along(Measure):
             yield Problem("along", str(error))
 
     def unit(self, rig: Slider | Machine) -> tuple[float, str]:
-        """The unit in which values are kept: that of the model, of a contact of a machine that of its user."""
+        """Factor and unit of the results: the unit of the model, or totals for a contact of a machine with an area."""
         full = self.name_of(rig)
         return outside(rig.parameters()[full].role.unit, rig.area_of(full) if isinstance(rig, Machine) else None)
 
     def room(self, rig: Slider | Machine, varied: Sequence[str]) -> int:
-        """How many intervals there may be."""
+        """Largest possible number of intervals."""
         return most_values(operating_point(rig, None, [n for n in varied if n in rig.parameters()]))
 
     def intervals(self, rig: Slider | Machine, vary: Vary) -> Any:
@@ -104,7 +104,7 @@ class Along(Measure):
         return intervals_along(rig, self.name_of(rig), vary)
 
     def edge(self, rig: Slider | Machine, vary: Vary) -> tuple[Any, Any]:
-        """The nearest end of a stable interval, and the rig's own value, SI units."""
+        """Nearest end of a stable interval, and the rig's own value, SI units."""
         return edge_along(rig, self.name_of(rig), vary)
 
 
@@ -131,7 +131,7 @@ class StableValues(Along, name="stable_values"):
 
 
 class SafetyFactor(Along, name="safety_factor"):
-    """Stiffness, or another parameter, over where its edge is; see `steadyslip.safety_factor`."""
+    """Stiffness, or another parameter, divided by its value at the edge; see `steadyslip.safety_factor`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         what = "stiffness over critical stiffness" if self.is_own(rig) else f"{self.name_of(rig)} over its edge"
@@ -142,7 +142,7 @@ class SafetyFactor(Along, name="safety_factor"):
 
 
 class LogMargin(SafetyFactor, name="margin"):
-    """Logarithm of the safety factor, ln(k/k_cr): zero at the edge, as far below it as above by the same factor."""
+    """Logarithm of the safety factor, ln(k/k_cr): zero at the edge, symmetric for factors above and below."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         (factor,) = super().outputs(rig, varied)

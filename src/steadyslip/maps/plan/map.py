@@ -1,4 +1,4 @@
-"""A map as data: which rig, what is computed, over which parameters; and how its points fall into chunks."""
+"""Definition of a map: rig, measures, varied parameters, and the partition of its points into chunks."""
 
 from __future__ import annotations
 
@@ -28,43 +28,43 @@ from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Outp
 from steadyslip.model.point import operating_point
 from steadyslip.protocol import Protocol
 
-SECONDS = 0.5  # that a chunk should take: long beside the cost of handing it out, short enough to lose
-LARGEST_CHUNK = 2**20  # points; bounds the memory of a worker
-LEAST_CHUNKS = 32  # so that all workers have something to do until the end
-SHORT = 0.2  # seconds; chunks are not made shorter than this to have more of them
-MOST_AXIS = 10**7  # values along one axis, which is kept in memory
-MOST_CHUNKS = 2 * 10**6  # each is a few files
+SECONDS = 0.5  # CPU time of a chunk: long beside the cost of handing it out, short enough to lose
+LARGEST_CHUNK = 2**20  # points; bounds a worker's memory (8 MiB per result)
+LEAST_CHUNKS = 32  # so that all workers are busy until the end; chosen by trial
+SHORT = 0.2  # s of CPU time; LEAST_CHUNKS does not make chunks shorter than this; chosen by trial
+MOST_AXIS = 10**7  # values along one axis, which is kept in memory (80 MB)
+MOST_CHUNKS = 2 * 10**6  # each is a few files; chosen by trial, for the sake of file systems
 
 AnyMeasure = Measure | FunctionMeasure
 
 
 @dataclass(frozen=True, eq=False)
 class Map(Displayed):
-    """What to compute of which rigs.
+    """Definition of a map: what to compute for which rigs.
 
     Parameters
     ----------
     rig : Slider or Machine
-        The base: what does not vary has its values.
+        Base rig, with the values of all parameters that do not vary.
     over : mapping of str to Grid or array_like, optional
-        Parameters by dotted name, of the rig or of the protocol; each spans a dimension.
+        Parameters of the rig or protocol by dotted name with their values; each is a dimension.
     compute : sequence of str, Measure or function
         Measures by name (``status``, ``growth_rate``, ``frequency``, ``edge``, ``stable_values``, ``safety_factor``,
         ``margin``, ``onset``, ``events``, ``threshold``; of sliders ``critical_stiffness``, ``stable_stiffness``), with
         options as records such as ``Events(until=200.0)`` or ``Edge(along="drive.kp")``, or functions of a rig; see
-        `measure`. Unless given the status, of sliders with the critical stiffness.
+        `measure`. By default the status, for sliders with the critical stiffness.
     samples : Samples, mapping of str to array_like, Fit or Draws, optional
-        Parameters that vary together along the dimension ``sample``: spread over ranges, listed, or as a fit allows, in
-        which case the rig gets the fit's friction as in `predict`.
+        Parameters that vary together along the dimension ``sample``: from ranges, lists, or draws of a fit, in which
+        case the rig gets the fit's friction as in `predict`.
     protocol : Protocol or piece, optional
-        For measures that simulate.
+        Protocol of measures that simulate.
     chunk : int, optional
-        Points computed in one go; chosen by what they cost unless given.
+        Points per chunk; by default chosen by their cost.
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If anything is wrong; lists every problem.
     """
 
     rig: Slider | Machine
@@ -82,7 +82,7 @@ class Map(Displayed):
             message = f"got {self.rig!r}; allowed: a Slider or Machine, such as read_rig gives"
             raise ParameterError([Problem("rig", message)])
         self._set("protocol", Protocol.of(self.protocol))
-        self._set("compute", _measures(usual(self.rig) if self.compute is None else self.compute, problems))
+        self._set("compute", _measures(default_measures(self.rig) if self.compute is None else self.compute, problems))
         self._read_samples(problems)
         self._read_axes(problems)
         whole = isinstance(self.chunk, int) and not isinstance(self.chunk, bool)
@@ -121,7 +121,7 @@ class Map(Displayed):
             elif isinstance(given, Mapping):
                 found = self._resolved(given, "map.samples.over", problems)
             else:
-                rig, found = _of_fit(self.rig, given)
+                rig, found = _fit_draws(self.rig, given)
                 self._set("rig", rig)
             roles = {name: address.role for name, address in self.known().items()}
             self._set("sampling", make_sampling(found, roles))
@@ -132,11 +132,11 @@ class Map(Displayed):
             problems += error.problems
 
     def _extremes(self, name: str) -> list[dict[str, Any]]:
-        """Some values of a sampled parameter, its ends among them."""
+        """Values of a sampled parameter that include its smallest and largest."""
         if isinstance(self.sampling, Generated):
             return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
         if self.sampling is None:
-            raise InternalError("self.sampling is not None")
+            raise InternalError("the map has no samples")
         column = self.sampling.part(0, self.sampling.points)[name]
         return [{name: column.min()}, {name: column.max()}]
 
@@ -164,7 +164,7 @@ class Map(Displayed):
             problems += (p.under("map.over") for p in self._allowed_together())
 
     def _allowed_together(self) -> tuple[Problem, ...]:
-        """What is wrong with the corners of the map, where several axes meet."""
+        """Problems of the rig at the corners of the map, where several axes are at their ends."""
         known = self.rig.parameters()
         axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
         corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
@@ -179,7 +179,7 @@ class Map(Displayed):
         return self.rig.parameters() | protocol_parameters(self.rig, self.protocol)
 
     def _resolved(self, given: Mapping[str, Any], place: str, problems: list[Problem]) -> dict[str, Any]:
-        """By full name; what is wrong with names is added to the problems."""
+        """Values by full name; unknown and repeated names are added to the problems."""
         found: dict[str, Any] = {}
         if not isinstance(given, Mapping):
             problems.append(Problem(place, f"got {given!r}; allowed: names and their values"))
@@ -195,14 +195,14 @@ class Map(Displayed):
         return found
 
     def _allowed(self, name: str, values: Any) -> tuple[Problem, ...]:
-        """What the rig has against this parameter being varied."""
+        """Problems of varying a parameter through these values."""
         if name.startswith("protocol."):
             if any(one.moves for one in self.compute):
                 return ()
             return (Problem(name, "varies, but nothing that is computed simulates the protocol; add 'events'"),)
         role = self.known()[name].role
         if any(one.moves for one in self.compute) and role.adds_state:
-            return ()  # simulated regime by regime
+            return ()  # cases with and without the state are simulated as separate groups
         try:
             operating_point(self.rig, {name: np.asarray(values, dtype=float)}, scan=True)
         except ParameterError as error:
@@ -233,13 +233,13 @@ class Map(Displayed):
         return math.prod(self.shape)
 
     def outputs(self) -> tuple[Output, ...]:
-        """All arrays of the map."""
+        """Declarations of all arrays of the map."""
         varied = [n for n in self.varied if n in self.rig.parameters()]
         return tuple(output for one in self.compute for output in one.outputs(self.rig, varied))
 
     @cached_property
     def chunks(self) -> tuple[int, ...]:
-        """Points of a chunk along each dimension: whole last dimensions, then part of the one before."""
+        """Number of points of a chunk along each dimension: whole last dimensions, and a part of the one before."""
         target = self.chunk or self._suited_chunk()
         found: list[int] = []
         for size in reversed(self.shape):
@@ -251,9 +251,9 @@ class Map(Displayed):
 
     @cached_property
     def seconds(self) -> float:
-        """About how long a point takes on one core."""
+        """CPU time per point, s, estimated."""
         probes = self.probes()
-        return float(sum(one.seconds(self.rig, self.protocol, _for(one, probes)) for one in self.compute))
+        return float(sum(one.seconds(self.rig, self.protocol, _relevant(one, probes)) for one in self.compute))
 
     def _suited_chunk(self) -> int:
         """Points that take about half a second."""
@@ -263,7 +263,7 @@ class Map(Displayed):
         return max(1, int(max(min(points, self.size / LEAST_CHUNKS), min(points, SHORT / seconds))), least)
 
     def probes(self) -> dict[str, Any]:
-        """Parameters at some points of the map, always the same."""
+        """Parameters at some random points of the map, always the same."""
         generator = np.random.default_rng(0)
         count = min(PROBES, self.size)
         found = {axis.name: generator.choice(axis.values, count) for axis in self.axes}
@@ -274,7 +274,7 @@ class Map(Displayed):
         return found
 
     def definition(self) -> dict[str, Any]:
-        """Plain data that tells whether two maps are the same."""
+        """JSON-ready dict that identifies the map."""
         return {
             "rig": rig_definition(self.rig, self.protocol),
             "compute": {one.name: one.definition() for one in self.compute},
@@ -290,13 +290,13 @@ class Map(Displayed):
         return f"map of {what} over {' x '.join(parts)}: {self.size:,} points"
 
 
-def usual(rig: Slider | Machine) -> tuple[str, ...]:
-    """What is computed unless something is said."""
+def default_measures(rig: Slider | Machine) -> tuple[str, ...]:
+    """Default measures for a rig."""
     return ("status", "critical_stiffness") if isinstance(rig, Slider) else ("status", "growth_rate")
 
 
 def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:
-    """Parameters of a protocol by dotted name, in the units in which they are done to a rig."""
+    """Parameters of a protocol by dotted name, in the units used for this rig."""
     reader = TableReader()
     with reader.of_machine(rig if isinstance(rig, Machine) else None):
         return {
@@ -305,19 +305,19 @@ def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, 
         }
 
 
-def _for(one: AnyMeasure, vary: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters that matter for a measure: those of the protocol only where something moves."""
+def _relevant(one: AnyMeasure, vary: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters that affect a measure: those of the protocol only if it simulates."""
     return {name: a for name, a in vary.items() if one.moves or not name.startswith("protocol.")}
 
 
 def evaluate(
     rig: Slider | Machine, protocol: Protocol, compute: Iterable[AnyMeasure], vary: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """All outputs of all measures at points given as arrays that broadcast; (..., extra) each."""
+    """Arrays of all measures at broadcastable points, shape (..., extra) each."""
     shape = np.broadcast_shapes(*(np.shape(a) for a in vary.values()))
     results: dict[str, Any] = {}
     for one in compute:
-        own = _for(one, vary)
+        own = _relevant(one, vary)
         found = one.arrays(rig, protocol, own)
         for output in one.outputs(rig, [n for n in own if n in rig.parameters()]):
             extra = tuple(size for _, size in output.extra)
@@ -346,7 +346,7 @@ def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
             else:
                 law = find_law(Measure, one)
                 if not issubclass(law, Measure):
-                    raise InternalError("issubclass(law, Measure)")
+                    raise InternalError(f"{law.__name__} is registered as a measure and is none")
                 found.append(law())
         except ParameterError as error:
             problems += [p.under("map.compute") for p in error.problems]
@@ -355,8 +355,8 @@ def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
     return tuple(found)
 
 
-def _of_fit(rig: Slider | Machine, given: Any) -> tuple[Slider, dict[str, Any]]:
-    """The rig with a fit's friction, and draws of the parameters."""
+def _fit_draws(rig: Slider | Machine, given: Any) -> tuple[Slider, dict[str, Any]]:
+    """Rig with a fit's friction, and draws of its parameters."""
     from steadyslip.experiments import Draws, Fit
     from steadyslip.experiments.answers.predict import transferred
 
@@ -371,7 +371,7 @@ def _of_fit(rig: Slider | Machine, given: Any) -> tuple[Slider, dict[str, Any]]:
 
 
 def rig_definition(rig: Slider | Machine, protocol: Protocol) -> dict[str, Any]:
-    """Plain data that tells whether two rigs and protocols are the same, laws of other packages by their text."""
+    """JSON-ready dict that identifies rig and protocol; laws of other packages by hash of their source."""
     foreign = {
         type(record).__qualname__: source_digest(type(record))
         for record in (*_records(rig), *_records(protocol))
@@ -379,7 +379,7 @@ def rig_definition(rig: Slider | Machine, protocol: Protocol) -> dict[str, Any]:
     }
     try:
         tables = tomllib.loads(rig_to_text(rig, protocol))
-    except ParameterError:  # a law without a name, which no file can refer to
+    except ParameterError:  # a law without a name cannot be written as TOML
         tables = {"description": f"{rig!r} {protocol!r}"}
     return tables | ({"laws": foreign} if foreign else {})
 
@@ -394,7 +394,7 @@ def _records(record: FrozenRecord) -> Iterator[FrozenRecord]:
 
 
 def differences(old: Any, new: Any, name: str = "map") -> list[str]:
-    """What differs between two definitions, in words."""
+    """Differences between two definitions, one line of text each."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         found = []
         for key in dict.fromkeys(itertools.chain(old, new)):
@@ -410,6 +410,6 @@ def _plain(value: Any) -> str:
 
 
 def roles(plan: Map) -> dict[str, Parameter]:
-    """Units and meanings of all parameters that vary."""
+    """Declarations (unit, meaning) of all parameters that vary."""
     known = plan.known()
     return {name: known[name].role for name in plan.varied}

@@ -1,4 +1,4 @@
-"""The table ``[map]`` of a rig file to a `Map`; every problem of the file is found and reported at once."""
+"""Reading of the table ``[map]`` of a rig file as a `Map`, with all problems of the file reported together."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
     Parameters
     ----------
     path : path
-        TOML file; a fit named in it is looked for beside it.
+        TOML file; a path of a fit in it is relative to its folder.
     changes : iterable of str
-        Values that replace or complete those of the file, as ``"map.over.contact.angle.points=200"``.
+        Values that replace or add to those of the file, as ``"map.over.contact.angle.points=200"``.
 
     Returns
     -------
@@ -41,25 +41,25 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
     Raises
     ------
     RigFileError
-        Listing everything that is wrong.
+        If anything is wrong; lists every problem.
     """
     return map_from_text(text_of(path), str(path), changes, Path(path).parent)
 
 
 @checked()
 def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), folder: Path = Path()) -> Map:
-    """Read the text of such a file; see `read_map`."""
+    """Read a map from the text of a rig file; see `read_map`."""
     spec = read_contents(text, source, changes, (TABLE,))
     settings = spec.further.get(MAP)
-    plan = _Plan(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None
+    plan = _MapReader(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None
     spec.refuse(*(plan.placed() if plan is not None else ()))
     if plan is None or plan.found is None:
-        raise InternalError("a map, or problems")
+        raise InternalError("the file has neither a map nor problems")
     return plan.found
 
 
-class _Plan:
-    """The map that a table means for the rig of its file, and what is wrong with it beyond the table alone."""
+class _MapReader:
+    """Translation of a table to a map for the rig of its file, with the problems that depend on the rig."""
 
     def __init__(self, spec: RigFileContents, settings: MapSettings, folder: Path) -> None:
         self.problems: list[Problem] = []
@@ -67,7 +67,7 @@ class _Plan:
         self.spec, self.folder = spec, folder
         rig = spec.given
         if rig is None:
-            raise InternalError("a rig")
+            raise InternalError("a map was read without a rig")
         self.rig = rig
         self.known = rig.parameters() | protocol_parameters(rig, spec.protocol or Protocol())
         over, sampled = settings.over or {}, (settings.samples.over if settings.samples else None) or {}
@@ -82,7 +82,7 @@ class _Plan:
             self.problems += error.problems
 
     def placed(self) -> list[Problem]:
-        """The problems with their lines: full names stand in the file as they are written there."""
+        """Problems with the line numbers of their keys, which may be shortened names in the file."""
         return [Problem(p.name, p.message, p.line or self._line(p.name)) for p in self.problems]
 
     def _line(self, name: str) -> int | None:
@@ -94,7 +94,7 @@ class _Plan:
         return self.spec.line(name)
 
     def _measures(self, settings: MapSettings) -> list[Any] | None:
-        """What is computed; results whose options are wrong already are left out, unless nothing else is left."""
+        """Measures to compute, without those whose options are already reported, unless none is left."""
         names = [p.name.split(".") for p in self.spec.problems]
         faulty = {parts[1] for parts in names if len(parts) > 2 and parts[0] == MAP}
         every = settings.measures()
@@ -103,7 +103,7 @@ class _Plan:
         return [one for one in every if one not in faulty] or (["status"] if every else [])
 
     def _whole(self, place: str, over: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """Those that have both ends; of the others at least the name is checked."""
+        """Parameters with both ends of a range; of the others the names are checked."""
         found = []
         for name, one in over.items():
             if isinstance(one, RangeSettings) and None in (one.start, one.stop):
@@ -116,14 +116,14 @@ class _Plan:
         return found
 
     def _per_area(self, place: str, over: Mapping[str, Any]) -> dict[str, Any]:
-        """Where the rig or a contact has an area, values are for the whole of it, as everywhere in its file."""
+        """Values per unit area; where the rig or a contact has an area, its file gives totals."""
         found: dict[str, Any] = {}
         for name, one in over.items():
             found[name] = one
             try:
                 full = resolve(name, self.known)
             except UnknownNameError:
-                continue  # the map will say so
+                continue  # reported by Map
             role, area = self.known[full].role, self.rig.area_of(full)
             if area is None:
                 continue
@@ -141,12 +141,12 @@ class _Plan:
 
     def _samples(self, settings: SampleSettings) -> Any:
         if settings.fit is not None:
-            return self._of_fit(settings, settings.fit)
+            return self._fit_draws(settings, settings.fit)
         whole = dict(self._whole("samples.over", settings.over or {}))
         found = replace(settings, over=whole, points=settings.points or 1).samples()
         return replace(found, over=self._per_area("map.samples.over", found.over))
 
-    def _of_fit(self, settings: SampleSettings, name: str) -> Any:
+    def _fit_draws(self, settings: SampleSettings, name: str) -> Any:
         from steadyslip.experiments import load_fit, normal_draws
 
         try:

@@ -1,7 +1,7 @@
-"""What a map can show: each measure turns rigs, given as arrays of parameters, into named arrays.
+"""Measures: quantities of a map, which turn arrays of rig parameters into named arrays of results.
 
-A measure is a record like a law: registered under the word used in ``[map] compute``, its options are its fields.
-Any other function of a rig becomes one by `measure`.
+A measure is a record like a law, registered under its word in ``[map] compute``, with its options as fields. `measure`
+makes one of any other function of a rig.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ from steadyslip.nonlinear.kicks.kicks import KICKS, OF_MACHINES, kicks_of
 from steadyslip.nonlinear.kicks.places import place_problems
 from steadyslip.protocol import Protocol
 
-SECONDS_A_STEP = 4e-8  # of a lane's step on one core; decides no more than the size of chunks
-SECONDS_OF_DELAY = 1e-2  # to count infinitely many roots
-PROBES = 64
-NOT_DONE = -1
+SECONDS_A_STEP = 4e-8  # CPU time of a step in a lane, measured; only sets the size of chunks
+SECONDS_OF_DELAY = 1e-2  # CPU time to count the roots of a rig with delay, measured; only sets the size of chunks
+PROBES = 64  # points at which the cost of a map is estimated; chosen by trial
+NOT_DONE = -1  # integer stored where nothing is computed
 
 
 @dataclass(frozen=True)
 class Output:
-    """One array that a measure gives.
+    """Declaration of one array of a measure.
 
     Attributes
     ----------
     name, unit, meaning : str
     flags : tuple of str
-        What the numbers 0, 1, ... stand for; such arrays hold small integers, -1 where nothing is computed yet.
+        Meanings of the numbers 0, 1, ...; such arrays hold small integers, -1 where nothing is computed yet.
     extra : tuple of (str, int)
-        Dimensions besides those of the map, with their sizes.
+        Name and size of each dimension besides those of the map.
     """
 
     name: str
@@ -71,32 +71,32 @@ class Output:
 
 
 class Measure(FrozenRecord, family="measure"):
-    """Base of what a map can show.
+    """Base class of the quantities of a map.
 
-    A subclass is registered under a name, lists its `outputs` and computes them in `arrays`. Results must depend
-    on the parameters of a point alone, not on which other points are computed with it. Where an output has
-    further dimensions, shorter arrays are padded.
+    A subclass is registered under a name, declares its `outputs` and computes them in `arrays`. The result at a point
+    must depend on its parameters alone, not on which other points are computed with it. Arrays shorter than declared in
+    further dimensions are padded.
     """
 
     moves: ClassVar[bool] = False
-    """Whether the protocol matters; otherwise parameters of the protocol that vary are left out."""
+    """True if the protocol matters; otherwise its varying parameters are not passed to the measure."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        """The arrays that it gives where the named parameters vary."""
+        """Declarations of the arrays, if the named parameters vary."""
         raise NotImplementedError
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        """The outputs by name, for parameters in SI units that broadcast against each other."""
+        """Arrays by output name, for parameters in SI units that broadcast against each other."""
         raise NotImplementedError
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
-        """What is missing or wrong with it for this rig."""
+        """Problems of computing it for this rig."""
         yield from ()
 
     def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
-        """About how long one point takes on one core; `probes` are parameters at some points of the map.
+        """CPU time per point (s), estimated; `probes` are parameters at some points of the map.
 
-        Must not depend on a clock: the size of chunks follows from it, and the same map gets the same chunks.
+        Must be reproducible (not measured), because chunk sizes depend on it and the same map must get the same chunks.
         """
         present = [name for name in probes if name in rig.parameters()]
         model = operating_point(rig, None, present).model
@@ -105,7 +105,7 @@ class Measure(FrozenRecord, family="measure"):
         return 1.2e-7 if has_closed_form(model) else 4e-6 if model.is_single else 2e-5
 
     def definition(self) -> dict[str, Any]:
-        """Name and options, to tell whether two measures are the same."""
+        """Name and options as JSON-ready dict; equal for equal measures."""
         options = {item.name: getattr(self, item.name) for item in fields(self)}
         found = {"name": self.name, **{name: value for name, value in options.items() if value is not None}}
         if not type(self).__module__.startswith("steadyslip."):
@@ -113,10 +113,10 @@ class Measure(FrozenRecord, family="measure"):
         return found
 
 
-def block_of(rig: Slider | Machine) -> Slider:
-    """The slider that a rig is, of which that was asked before."""
+def as_slider(rig: Slider | Machine) -> Slider:
+    """Return the rig as a `Slider`; an internal error for a machine, which `Measure.problems` should have refused."""
     if isinstance(rig, Machine):
-        raise InternalError("a slider")
+        raise InternalError("a measure of sliders was computed for a machine")
     return rig
 
 
@@ -131,7 +131,7 @@ class GrowthRate(Measure, name="growth_rate"):
 
 
 class Frequency(Measure, name="frequency"):
-    """Frequency and damping ratio of the leading mode: 0 and ±1 where it does not oscillate."""
+    """Frequency and damping ratio of the leading mode; 0 and ±1 where it does not oscillate."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (
@@ -154,7 +154,7 @@ def _leading(point: OperatingPoint) -> Any:
 
 
 class StabilityStatus(Measure, name="status"):
-    """Stable, unstable (ill-posed included), or no steady sliding."""
+    """Stability of steady sliding: stable, unstable (ill-posed included), or no steady sliding."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output("status", "1", "stability of steady sliding", STATUS),)
@@ -186,13 +186,13 @@ class Events(Measure, name="events"):
         if isinstance(rig, Machine):
             meaning = "contact that was lost where a run ended so"
             ended = (*ended, Output("outcome_contact", "1", meaning, ("none", *rig.contacts)))
-        meant = (Output(name, event_unit(name), _in_words(name)) for name in event_names(rig))
+        meant = (Output(name, event_unit(name), _meaning(name)) for name in event_names(rig))
         return (*ended, *meant)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         found = self._run(rig, protocol, vary)
         ended = {"outcome": found.status_code, "end_time": found.end}
-        return {**ended, **_numbered(rig, "outcome_contact", found.contact), **found.events}
+        return {**ended, **_contact_numbers(rig, "outcome_contact", found.contact), **found.events}
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         if self.until is None and protocol.until is None:
@@ -211,16 +211,16 @@ class Events(Measure, name="events"):
         )  # fmt: skip
 
 
-def _numbered(rig: Slider | Machine, name: str, contact: np.ndarray) -> dict[str, np.ndarray]:
-    """Names of contacts of a machine as numbers, for the words of an output; nothing of a slider."""
+def _contact_numbers(rig: Slider | Machine, name: str, contact: np.ndarray) -> dict[str, np.ndarray]:
+    """Contact names of a machine as numbers, for an output with words; empty for a slider."""
     if not isinstance(rig, Machine):
         return {}
     numbers = {own: number for number, own in enumerate(("", *rig.contacts))}
     return {name: np.vectorize(numbers.__getitem__, otypes=[int])(contact)}
 
 
-def _in_words(name: str) -> str:
-    """What a column of events is, and of which contact."""
+def _meaning(name: str) -> str:
+    """Meaning of a column of event statistics, with its contact."""
     contact, _, plain = name.rpartition(".")
     return plain.replace("_", " ") + (f" of {contact}" if contact else "")
 
@@ -253,8 +253,9 @@ class KickThreshold(Measure, name="threshold"):
             rig, vary, self.kick, at=self.at, direction=direction, reference=self.reference, precision=self.precision,
             threads=1, progress=False,
         )  # fmt: skip
-        return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high,
-                "threshold_limit": found.beyond} | _numbered(rig, "threshold_contact", found.contact)  # fmt: skip
+        numbers = {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high}
+        kinds = {"threshold_limit": found.beyond} | _contact_numbers(rig, "threshold_contact", found.contact)
+        return numbers | kinds
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         if self.kick not in (known := kicks_of(rig)):
@@ -270,7 +271,7 @@ class KickThreshold(Measure, name="threshold"):
 
 @dataclass(frozen=True)
 class FunctionMeasure:
-    """A function of a rig as a measure; made by `measure`."""
+    """Measure that calls a function of a rig; made by `measure`."""
 
     name: str
     function: Callable[..., Any]
@@ -292,7 +293,7 @@ class FunctionMeasure:
         return {self.name: found.reshape(shape)}
 
     def _at(self, rig: Slider | Machine, point: dict[str, float]) -> float:
-        """NaN where the question has no answer; any other failure names the point."""
+        """Result at one point: NaN for an error of this package; other exceptions are reported with the point."""
         try:
             return float(self.function(rig.with_values(point)))
         except SteadyslipError:
@@ -316,14 +317,14 @@ class FunctionMeasure:
 
 
 def source_digest(thing: Any) -> str:
-    """A short name for a function or class: its text, and what it holds (closure, defaults, attributes)."""
+    """Short hash of a function or class: of its source and of the values it holds (closure, defaults, attributes)."""
     if isinstance(thing, partial):
         text = f"{source_digest(thing.func)} {thing.args!r} {sorted(thing.keywords.items())!r}"
     else:
         written = thing if inspect.isroutine(thing) or isinstance(thing, type) else type(thing)
         try:
             text = inspect.getsource(written)
-        except (OSError, TypeError):  # typed at a prompt, or compiled
+        except (OSError, TypeError):  # without source: typed at a prompt, or compiled
             code = getattr(thing, "__code__", None)
             text = repr((code.co_code, code.co_consts, code.co_names)) if code else repr(written)
         held = [getattr(thing, name, None) for name in ("__defaults__", "__kwdefaults__")]
@@ -342,22 +343,22 @@ def measure(
     arrays: bool = False,
     seconds: float | None = None,
 ) -> Any:
-    """Make a function of a rig into something that a map can show; usable as a decorator.
+    """Make a measure of a function of a rig; usable as a decorator.
 
     Parameters
     ----------
     function : callable
-        ``function(rig)`` gives a number; NaN, or one of this package's exceptions, where there is none. With
-        `arrays`, ``function(rig, vary)`` gives an array for parameters, by dotted name, that broadcast. It must depend
-        on nothing else: maps are computed in several processes and may be continued another day. Its text, and
-        what it holds, tell whether it is still the same then.
+        ``function(rig)`` returns a number; NaN, or an exception of this package, means no value. With `arrays`,
+        ``function(rig, vary)`` returns an array for broadcastable parameters by dotted name. The result must depend on
+        nothing else, because maps are computed in several processes and may be continued later; a hash of the
+        function's source and values detects changes.
     name : str, optional
-        Of the array; the function's own unless given.
+        Name of the array; by default that of the function.
     unit : str
     arrays : bool
-        Whether the function takes arrays.
+        True if the function takes arrays.
     seconds : float, optional
-        About how long one point takes; 1 ms unless given (1 us with `arrays`). Decides the size of chunks.
+        CPU time per point; by default 1 ms (1 µs with `arrays`). Determines the size of chunks.
 
     Returns
     -------

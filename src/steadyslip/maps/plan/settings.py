@@ -1,4 +1,4 @@
-"""The table ``[map]`` of a file: what to compute, over which parameters."""
+"""Options of the table ``[map]`` of a file."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from steadyslip.core.records import Settings, named, option, part, parts, settin
 from steadyslip.maps.plan.axes import MOST_POINTS, SAMPLERS, SPACINGS, Grid, Samples
 from steadyslip.maps.plan.measures import Measure
 
-MOST_GIVEN = 2**24  # points of a chunk, where somebody says how many
-FIT_POINTS = 1000
-LARGEST_SEED = 2**63 - 1
+MOST_GIVEN = 2**24  # largest chunk that a file may ask for, points: results of 8 bytes then have 128 MiB
+FIT_POINTS = 1000  # default number of draws from a fit: quantiles at 2.5 % have an error of 0.5 %
+LARGEST_SEED = 2**63 - 1  # largest integer of TOML
 
 
 class RangeSettings(Settings):
@@ -93,7 +93,7 @@ class MapSettings(Settings):
                 yield Problem(one.name, f"options of something that is not computed; add {one.name!r} to map.compute")
 
     def measures(self) -> list[Any] | None:
-        """What is computed: with options as a record, else by name; None where nothing is said."""
+        """Measures to compute, as records where they have options, else by name; None if the file does not choose."""
         if self.compute is None:
             return None
         with_options = {one.name: one for one in self.options}

@@ -1,9 +1,9 @@
-"""A map on disk: a Zarr group with one array for each result, and a mark for each finished chunk.
+"""Store of a map on disk: a Zarr group with one array per result, and a checksum ("mark") per finished chunk.
 
-Everything is laid out when the store is made; later only chunks are written, each by one process, whole files moved
-into place. A chunk's mark is written last and holds the checksum of the chunk's files, so that a chunk counts as done
-only if all its files are there and are those that were written. Arrays that hold nothing but the fill value have no
-file, which the checksum covers as well.
+All arrays are created with the store; later only chunks are written, each by one process, by moving whole files into
+place. A chunk's mark is written last and is the checksum of the chunk's files, so that a chunk counts as done only if
+all its files are those that were written. Zarr writes no file for a chunk of fill values only, which the checksum
+covers as well.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from steadyslip.maps.plan.axes import COMPLETE, SAMPLE
 from steadyslip.maps.plan.map import Map, differences
 from steadyslip.maps.store.layout import coordinates, lay_out, read_layout
 
-_WRITTEN = 1 << 32  # added to every checksum, so that none is the zero of a chunk not done
-_MARK = 8  # bytes
+_CHECKSUM_OFFSET = 1 << 32  # added to every checksum, so that none is zero, the fill value
+_MARK = 8  # bytes of a mark
 
 
 class Store:
-    """An open map.
+    """Open map.
 
     Attributes
     ----------
     path : Path
     layout : MapLayout
-        What its metadata say.
+        Verified metadata.
     """
 
     def __init__(self, path: Path) -> None:
@@ -68,15 +68,15 @@ class Store:
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise self.damage("zarr.json", error) from error
         self._arrays: dict[str, Any] = {}
-        self._intact: set[int] = set()  # chunks whose files have been seen to be those that were written
+        self._intact: set[int] = set()  # chunks whose checksum was verified
 
     def array(self, name: str) -> Any:
-        """One of its Zarr arrays."""
+        """Zarr array by name (cached)."""
         if name not in self._arrays:
             self._arrays[name] = self.group[name]
         return self._arrays[name]
 
-    # -- what it holds -----------------------------------------------------------------------------------
+    # -- content -----------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:
@@ -84,7 +84,7 @@ class Store:
         return int(np.prod(self.grid, dtype=int))
 
     def read(self, name: str, region: Any = ...) -> np.ndarray:
-        """Values of one of its arrays, fill values where no chunk is done.
+        """Values of an array; fill values where no chunk is done.
 
         Raises
         ------
@@ -93,12 +93,12 @@ class Store:
         """
         for number in self._touched(name, region):
             if number not in self._intact and (mark := self._mark(number)):
-                if not self._holds(number, mark):
+                if not self._is_intact(number, mark):
                     raise self.damage(name, ValueError(f"the files of chunk {number} are not those that were written"))
                 self._intact.add(number)
         try:
             values = np.asarray(self.array(name)[region])
-        except (ValueError, RuntimeError, OSError) as error:  # as Zarr says it
+        except (ValueError, RuntimeError, OSError) as error:  # errors of Zarr and its codecs
             raise self.damage(name, error) from error
         words = self.layout.arrays[name].attributes.get("flag_meanings")
         if words is not None and values.size and not (values.min() >= -1 and values.max() + 1 < len(words.split())):
@@ -106,7 +106,7 @@ class Store:
         return values
 
     def _touched(self, name: str, region: Any) -> Iterator[int]:
-        """Chunks that hold a part of a result or of generated samples, or lie between."""
+        """Chunks that a region of a result or of generated samples overlaps (or lies around)."""
         axes = self.dims if name in self.results else self.dims[-1:] if name in self.generated else ()
         first = len(self.dims) - len(axes)
         given = list(region) if isinstance(region, tuple) else [region]
@@ -121,23 +121,23 @@ class Store:
             yield int(np.ravel_multi_index((0,) * first + indices, self.grid))
 
     def damage(self, what: str, error: Exception) -> NotAvailable:
-        """What to say of files that cannot be read."""
+        """Error for files that cannot be read."""
         return NotAvailable(f"{str(self.path)!r} is damaged ({what}: {error}); compute the map again to repair it")
 
     def rig(self) -> Slider | Machine:
-        """The base rig.
+        """Base rig.
 
         Raises
         ------
         NotAvailable
-            If it has a law that no file can refer to.
+            If it has a law that cannot be written to a file.
         """
         if not self.rig_text:
             raise NotAvailable(f"the rig of {str(self.path)!r} has a law without a name, which cannot be read back")
         return rig_from_text(self.rig_text, str(self.path))
 
     def region(self, number: int) -> tuple[slice, ...]:
-        """The points of a chunk."""
+        """Region of a chunk, a slice per dimension."""
         indices = np.unravel_index(number, self.grid)
         return tuple(
             slice(int(i) * c, min((int(i) + 1) * c, n))
@@ -145,7 +145,7 @@ class Store:
         )
 
     def points(self, number: int) -> int:
-        """How many points a chunk has."""
+        """Number of points of a chunk."""
         return int(np.prod([part.stop - part.start for part in self.region(number)], dtype=int))
 
     @property
@@ -154,9 +154,9 @@ class Store:
         return tuple(dim for dim in self.dims if dim != SAMPLE) + self.sampled
 
     def parameters(self, region: tuple[slice, ...], generated: bool = False) -> dict[str, Any]:
-        """Stored values of the parameters that vary, shaped so that they broadcast over a chunk.
+        """Stored values of the parameters that vary, shaped to broadcast over a chunk.
 
-        Those that are `generated` are there only once their chunk is done.
+        `generated` adds those that are stored only with their chunk.
         """
         found = {}
         for i, dim in enumerate(self.dims):
@@ -173,7 +173,7 @@ class Store:
         """Write a chunk's arrays, then its mark; `samples` are generated parameters, (n,)."""
         region = self.region(number)
         for file in self._files(number):
-            check_room(file).unlink(missing_ok=True)  # what is left of a damaged chunk must not be read
+            check_room(file).unlink(missing_ok=True)  # files of a damaged chunk must not be read
         for name, values in results.items():
             array = self.array(name)
             extra = (slice(None),) * (array.ndim - len(region))
@@ -184,15 +184,15 @@ class Store:
         self.marks[np.unravel_index(number, self.grid)] = np.uint64(self._checksum(number))
 
     def is_done(self, number: int) -> bool:
-        """Whether a chunk has a mark."""
+        """True if a chunk has a mark."""
         return self._mark(number) != 0
 
     def damaged(self) -> list[int]:
         """Chunks with a mark whose files are not those that were written."""
-        return [n for n, mark in enumerate(self._marks()) if mark != 0 and not self._holds(n, int(mark))]
+        return [n for n, mark in enumerate(self._marks()) if mark != 0 and not self._is_intact(n, int(mark))]
 
     def forget(self, number: int) -> None:
-        """Take a chunk's mark away."""
+        """Remove a chunk's mark."""
         self.marks[np.unravel_index(number, self.grid)] = np.uint64(0)
 
     def pending(self) -> list[int]:
@@ -203,14 +203,14 @@ class Store:
         """Number of chunks with a mark, damaged or not."""
         return int(np.count_nonzero(self._marks()))
 
-    def _holds(self, number: int, mark: int) -> bool:
+    def _is_intact(self, number: int, mark: int) -> bool:
         try:
             return mark == self._checksum(number)
         except UnreadableFile:
             return False
 
     def _marks(self) -> np.ndarray:
-        """Of all chunks; only files that are there are looked at."""
+        """Marks of all chunks, (count,); only existing files are read."""
         found = np.zeros(self.grid, dtype=np.uint64)
         self._collect(found, inside(self.path, f"{COMPLETE}/c"), ())
         return found.reshape(-1)
@@ -226,7 +226,7 @@ class Store:
             return
         for entry in entries:
             if not entry.name.isdecimal() or len(entry.name) > 9 or int(entry.name) >= self.grid[len(at)]:
-                continue  # what a process that was killed left
+                continue  # left by a process that was killed
             here = (*at, int(entry.name))
             if len(here) == len(self.grid):
                 found[here] = self._mark_in(Path(entry.path))
@@ -238,7 +238,7 @@ class Store:
         return self._mark_in(inside(self.path, "/".join([COMPLETE, "c", *(str(int(i)) for i in indices)])))
 
     def _mark_in(self, file: Path) -> int:
-        """A mark; 0 if there is none, or it is damaged."""
+        """Mark in a file; 0 if the file is missing or damaged."""
         try:
             content = read_bytes(file, _MARK, links=False)
         except UnreadableFile:
@@ -246,12 +246,12 @@ class Store:
         return int.from_bytes(content, "little") if len(content) == _MARK else 0
 
     def _has_samples(self, number: int) -> bool:
-        """Whether a chunk is the one that writes the sample parameters of its part of the sample dimension."""
+        """True if a chunk stores the sample parameters of its part of the sample dimension."""
         indices = np.unravel_index(number, self.grid)
         return bool(self.generated) and not any(int(i) for i in indices[:-1])
 
     def _files(self, number: int) -> list[Path]:
-        """The files of a chunk, in a fixed order."""
+        """Files of a chunk, in a fixed order."""
         indices = tuple(int(i) for i in np.unravel_index(number, self.grid))
         rank = {name: len(one.shape) for name, one in self.layout.arrays.items()}
         keys = [(name, (*indices, *(0,) * (rank[name] - len(indices)))) for name in self.results]
@@ -267,10 +267,10 @@ class Store:
                 total = zlib.crc32(read_bytes(file, most, links=False), zlib.crc32(b"+", total))
             else:
                 total = zlib.crc32(b"-", total)
-        return total | _WRITTEN
+        return total | _CHECKSUM_OFFSET
 
     def tidy(self) -> None:
-        """Remove what processes that were killed left half written."""
+        """Remove unfinished files of processes that were killed."""
         for file in self.path.rglob("*.partial"):
             with suppress(OSError):
                 file.unlink()
@@ -278,24 +278,24 @@ class Store:
             shutil.rmtree(folder, ignore_errors=True)
 
     def restore(self, plan: Map) -> None:
-        """Write coordinates again that are not those of the map, which no mark covers."""
+        """Write damaged coordinates again, which no mark covers."""
         for name, values in coordinates(plan).items():
             inside(self.path, f"{name}/c/0")
             try:
                 intact = np.array_equal(np.asarray(self.array(name)[:]), values)
-            except Exception:  # damaged, whatever zarr says of it
+            except Exception:  # damaged files may raise anything in Zarr
                 intact = False
             if not intact:
                 self.array(name)[:] = values
 
     @contextmanager
-    def held(self) -> Iterator[None]:
-        """Keep a second run of the same map away for the time being, where the system can.
+    def locked(self) -> Iterator[None]:
+        """Context that locks the map against a second run, where the system supports it.
 
         Raises
         ------
         NotAvailable
-            If there is one already.
+            If another run has the lock.
         """
         try:
             import fcntl
@@ -309,15 +309,15 @@ class Store:
                 if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
                     message = f"another run is working on {str(self.path)!r}; wait for it, or end it first"
                     raise NotAvailable(message) from error
-            yield  # without locks on this file system: as on Windows
+            yield  # also if this file system has no locks
 
     def refuse_other(self, plan: Map) -> None:
-        """Refuse to go on with another map, rig or version than the chunks that are there.
+        """Raise an error unless the stored chunks are of the same map, rig and version.
 
         Raises
         ------
         NotAvailable
-            Saying what differs.
+            With the differences.
         """
         if other := of_another(self.version):
             raise NotAvailable(
@@ -333,12 +333,12 @@ class Store:
 
 
 def open_or_create(path: Path, plan: Map) -> Store:
-    """The store of a map, made if there is none.
+    """Open the store of a map, created if missing.
 
     Raises
     ------
     NotAvailable
-        If something else has that name, or it cannot be written.
+        If the path is something else or another map, or cannot be written.
     """
     if not path.exists():
         _create(path, plan)
@@ -348,7 +348,7 @@ def open_or_create(path: Path, plan: Map) -> Store:
 
 
 def _create(path: Path, plan: Map) -> None:
-    """Lay out a store under a temporary name and move it into place, so that there is never half a store."""
+    """Create a store under a temporary name and move it into place, so that it is never incomplete."""
     new = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.new")
     try:
         new.mkdir()
@@ -356,7 +356,7 @@ def _create(path: Path, plan: Map) -> None:
         os.rename(new, path)
     except Exception as error:
         shutil.rmtree(new, ignore_errors=True)
-        if path.exists():  # somebody else has made it meanwhile, and tidied up
+        if path.exists():  # created by another process meanwhile
             return
         if isinstance(error, OSError):
             raise cannot_write(path, error) from error
@@ -364,12 +364,12 @@ def _create(path: Path, plan: Map) -> None:
 
 
 def cannot_write(path: Path, error: OSError) -> NotAvailable:
-    """What to say of a failure to write."""
+    """Error for a failure to write."""
     return NotAvailable(f"cannot write {str(path)!r}: {(error.strerror or str(error)).lower()}")
 
 
 def check_path(path: Path) -> None:
-    """Refuse a name that no store can have, before anything is computed.
+    """Raise an error for a path that no store can have, before anything is computed.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""The folder of a map as a Zarr store that stays inside itself: regular files of declared sizes, no links.
+"""Zarr store for the folder of a map, restricted to regular files of declared sizes within the folder.
 
-A map may come from a stranger, or be gone on with. Nothing in it is followed out of it, waited for, or unpacked into
-more than its array has room for.
+The folder of a map may come from a stranger. No link is followed, nothing can block, and no chunk may unpack to more
+bytes than its array has.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from steadyslip.files.inputs import UnreadableFile, check_kind, check_room, insi
 from steadyslip.maps.plan.axes import COMPLETE
 
 METADATA = 2**26
-"""Bytes of a file of metadata, at most."""
-_HEAD, _OVERHEAD = 16, 64  # bytes of what Blosc writes before its blocks, and of all that is added to a chunk
+"""Largest size of a metadata file, bytes; chosen by trial, far above those of any map."""
+_HEAD, _OVERHEAD = 16, 64  # bytes of Blosc's header, and bound of all that codecs add to a chunk
 
 
 class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no further
-    """Zarr's store of local files, every access of which is looked at first.
+    """Zarr's store of local files, with checks before each access.
 
-    `sizes` are the bytes that a chunk of an array takes unpacked, by the array's name.
+    `sizes` are the unpacked bytes of a chunk by name of the array.
     """
 
     def __init__(self, root: Path | str, *, read_only: bool = False) -> None:
@@ -35,29 +35,29 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         found.sizes = self.sizes
         return found
 
-    def _look(self, key: str) -> None:
-        """Refuse to read what is not a file of the store, or too large to be one."""
+    def _check_file(self, key: str) -> None:
+        """Raise an error before reading something that is no regular file or too large."""
         path = inside(self.root, key)
         try:
             found = path.lstat()
         except (FileNotFoundError, NotADirectoryError):
             return
         if stat.S_ISDIR(found.st_mode):
-            return  # Zarr finds nothing there
+            return  # Zarr treats it as missing
         check_kind(str(path), found)
         most = METADATA
         if "/c/" in key:
-            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # a mark, a chunk, or nothing of ours
+            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # of a mark or chunk; 64 for unknown arrays
         if found.st_size > most:
             raise UnreadableFile(str(path), f"it has {found.st_size} bytes, more than the {most} that it may have")
 
-    def _sound(self, key: str, found: Any) -> Any:
-        """Refuse a chunk that says of itself that it unpacks into something else than its array holds."""
+    def _checked_chunk(self, key: str, found: Any) -> Any:
+        """Raise an error for a chunk whose header declares another size than its array has."""
         name = key.split("/")[0]
         if found is None or "/c/" not in key or not self.sizes.get(name):
             return found
         content = found.to_bytes()
-        if name == COMPLETE:  # marks are as they are
+        if name == COMPLETE:  # marks are not compressed
             if len(content) != self.sizes[name]:
                 raise UnreadableFile(str(self.root / key), "it is damaged, a mark has another size")
             return found
@@ -67,27 +67,27 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         return found
 
     async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
-        self._look(key)
+        self._check_file(key)
         if prototype is None:  # older versions of Zarr have no default
             from zarr.core.buffer import default_buffer_prototype
 
             prototype = default_buffer_prototype()
         found = await super().get(key, prototype, byte_range)
-        return self._sound(key, found) if byte_range is None else found
+        return self._checked_chunk(key, found) if byte_range is None else found
 
     def get_sync(self, key: str, *, prototype: Any = None, byte_range: Any = None) -> Any:
-        self._look(key)
+        self._check_file(key)
         found = super().get_sync(key, prototype=prototype, byte_range=byte_range)
-        return self._sound(key, found) if byte_range is None else found
+        return self._checked_chunk(key, found) if byte_range is None else found
 
     async def get_partial_values(self, prototype: Any, key_ranges: Any) -> Any:
         wanted = list(key_ranges)
         for key, _ in wanted:
-            self._look(key)
+            self._check_file(key)
         return await super().get_partial_values(prototype, wanted)
 
     async def exists(self, key: str) -> bool:
-        self._look(key)
+        self._check_file(key)
         return bool(await super().exists(key))
 
     async def set(self, key: str, value: Any) -> None:

@@ -1,7 +1,7 @@
-"""How a map is laid out on disk: `MapLayout` says which arrays there are; they are made so, and compared when opened.
+"""Layout of a map on disk: the arrays of a `MapLayout`, created for a new map and verified when one is opened.
 
-Zarr format 3 only; element types and codecs are those listed here, so that nothing that is read can be more than
-numbers. The group's metadata hold those of all arrays, and a checksum of themselves.
+Zarr format 3 only, with a fixed set of element types and codecs, so that reading a map can give nothing but numbers.
+The group's metadata contain those of all arrays, and a checksum of themselves.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
 from steadyslip.maps.plan.measures import NOT_DONE
 from steadyslip.maps.store.folder import METADATA
 
-FORMAT = 2
-MOST_CHUNK = 2**30  # bytes of a chunk of one array
-MOST_EXTRA = 1000  # values of a result at one point
+FORMAT = 2  # version of the layout
+MOST_CHUNK = 2**30  # bytes of a chunk of one array: fits into the memory of any machine
+MOST_EXTRA = 1000  # values of a result at one point; chosen by trial, far above those of any measure
 _VERSIONS = ("numpy", "scipy", "llvmlite", "zarr")
 _TEXTS = ("title", "rig", "definition", "dims", "results", "steadyslip", "versions", "coordinates", "seal")
 _ARRAY = {"shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes",
           "dimension_names", "zarr_format", "node_type", "storage_transformers"}  # fmt: skip
-_FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # what they hold where nothing is computed
+_FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # fill values: nothing computed
 _PACKED, _PLAIN = ("bytes", "blosc", "crc32c"), ("bytes",)
 
 
@@ -42,12 +42,12 @@ Form = tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]
 
 
 class LayoutError(ValueError):
-    """Metadata are not those of a map."""
+    """Error: metadata are not those of a map."""
 
 
 @dataclass(frozen=True)
 class StoredArray:
-    """What the metadata say of one array."""
+    """Metadata of one array."""
 
     dtype: str
     dims: tuple[str, ...]
@@ -61,20 +61,20 @@ class StoredArray:
 
     @property
     def unpacked(self) -> int:
-        """Bytes of a chunk."""
+        """Size of a chunk in memory, bytes."""
         return math.prod(self.chunks) * np.dtype(self.dtype).itemsize
 
 
 @dataclass(frozen=True)
 class MapLayout:
-    """What the metadata of a map say.
+    """Metadata of a map.
 
     Attributes
     ----------
     definition, versions : dict
     version, title, rig_text : str
     dims, results, sampled, generated : tuple of str
-        Dimensions, results, parameters along the sample dimension, and those of them written chunk by chunk.
+        Dimensions; results; parameters along the sample dimension, and those of them that are stored chunk by chunk.
     shape, chunks, grid : tuple of int
     arrays : dict of str to StoredArray
     """
@@ -113,12 +113,12 @@ class MapLayout:
 
 
 def read_layout(path: Path) -> MapLayout:
-    """The layout of the map in a folder.
+    """Read and verify the layout of the map in a folder.
 
     Raises
     ------
     NotAvailable
-        If there is none, or something about it is not as this program writes it.
+        If there is none, or it is not as this program writes it.
     """
     try:
         return _layout(json.loads(read_bytes(path / "zarr.json", METADATA, links=False)))
@@ -131,34 +131,34 @@ def read_layout(path: Path) -> MapLayout:
 
 
 def _layout(document: Any) -> MapLayout:
-    _demand(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
+    _require(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
                                  "node_type": str}), "it is no Zarr group of format 3")  # fmt: skip
-    _demand((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
+    _require((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
     attributes = document["attributes"]
-    _demand("steadyslip_map" in attributes, "it has no steadyslip_map")
+    _require("steadyslip_map" in attributes, "it has no steadyslip_map")
     version = attributes["steadyslip_map"]
-    _demand(version == FORMAT, f"its layout has version {version!r:.20}, and this program reads version {FORMAT}")
-    _demand(fits_form(attributes, {"steadyslip_map": int} | dict.fromkeys(_TEXTS, str)), "its attributes are others")
-    _demand(_seal(document) == attributes["seal"], "it was changed since it was written")
+    _require(version == FORMAT, f"its layout has version {version!r:.20}, and this program reads version {FORMAT}")
+    _require(fits_form(attributes, {"steadyslip_map": int} | dict.fromkeys(_TEXTS, str)), "its attributes are others")
+    _require(_seal(document) == attributes["seal"], "it was changed since it was written")
     definition = _json(attributes, "definition", {"rig": dict, "compute": dict, "over": {str: dict}, "samples": dict})
     dims, results = (tuple(_json(attributes, name, [str])) for name in ("dims", "results"))
     samples = definition["samples"]
     over = samples.get("over", {})
-    _demand(isinstance(over, dict) and all(isinstance(one, dict) for one in over.values()), "samples have no over")
+    _require(isinstance(over, dict) and all(isinstance(one, dict) for one in over.values()), "samples have no over")
     sampled = tuple(over)
-    _demand(dims == (*definition["over"], *([SAMPLE] if samples else [])) and dims, "dims are not those defined")
+    _require(dims == (*definition["over"], *([SAMPLE] if samples else [])) and dims, "dims are not those defined")
     sizes = [one.get("points", one.get("values")) for one in definition["over"].values()]
     sizes += [samples.get("points")] if samples else []
-    _demand(fits_form(sizes, [int]) and all(n > 0 for n in sizes), "the definition has no numbers of points")
+    _require(fits_form(sizes, [int]) and all(n > 0 for n in sizes), "the definition has no numbers of points")
     stored = document["consolidated_metadata"].get("metadata")
-    _demand(isinstance(stored, dict), "the metadata of its arrays are missing")
+    _require(isinstance(stored, dict), "the metadata of its arrays are missing")
     varied = (*definition["over"], *sampled)
     names = (*varied, *results, COMPLETE)
-    _demand(len(set(names)) == len(names) and set(stored) == set(names), "its arrays are not those of its definition")
+    _require(len(set(names)) == len(names) and set(stored) == set(names), "its arrays are not those of its definition")
     arrays = {name: _array(name, stored[name], _PLAIN if name == COMPLETE else _PACKED) for name in names}
-    _demand(results, "it has no results")
+    _require(results, "it has no results")
     chunks = arrays[results[0]].chunks[: len(dims)]
-    _demand(len(chunks) == len(dims), f"{results[0]!r:.60} has {len(chunks)} dimensions")
+    _require(len(chunks) == len(dims), f"{results[0]!r:.60} has {len(chunks)} dimensions")
     found = MapLayout(
         definition, _json(attributes, "versions", {str: str}), attributes["steadyslip"], attributes["title"],
         attributes["rig"], dims, results, sampled, sampled if "method" in samples else (), tuple(sizes), chunks, arrays,
@@ -167,20 +167,20 @@ def _layout(document: Any) -> MapLayout:
     return found
 
 
-def _demand(condition: object, message: str) -> None:
+def _require(condition: object, message: str) -> None:
     if not condition:
         raise LayoutError(message)
 
 
 def _json(attributes: dict[str, Any], name: str, form: Any) -> Any:
     found = json.loads(attributes[name])
-    _demand(fits_form(found, form), f"{name} has another form")
+    _require(fits_form(found, form), f"{name} has another form")
     return found
 
 
 def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> StoredArray:
     def demand(condition: object, what: str) -> None:
-        _demand(condition, f"{name!r:.60}: {what}")
+        _require(condition, f"{name!r:.60}: {what}")
 
     demand(name not in ("", ".", "..", "zarr.json") and not {"/", "\0"} & set(name), "is no name of an array")
     demand(isinstance(stored, dict) and set(stored) == _ARRAY, "its metadata are others")
@@ -214,20 +214,20 @@ def _listed(value: Any) -> list[Any]:
 
 
 def _check_arrays(layout: MapLayout) -> None:
-    """Shapes follow from the definition, and none is larger than a map can be."""
+    """Verify that shapes follow from the definition, and that no array is too large."""
     rank = len(layout.dims)
-    _demand(math.prod(layout.shape) <= MOST_POINTS, f"it has more than {MOST_POINTS:.0e} points")
-    _demand(math.prod(layout.grid) <= MOST_CHUNKS, f"it has {math.prod(layout.grid)} chunks, allowed: {MOST_CHUNKS}")
+    _require(math.prod(layout.shape) <= MOST_POINTS, f"it has more than {MOST_POINTS:.0e} points")
+    _require(math.prod(layout.grid) <= MOST_CHUNKS, f"it has {math.prod(layout.grid)} chunks, allowed: {MOST_CHUNKS}")
     for name, one in layout.arrays.items():
         extra = tuple(zip(one.dims, one.shape, strict=True))[rank:] if name in layout.results else ()
-        _demand(one.form == layout.form(name, extra), f"{name!r:.60} has shape {one.shape} in {one.chunks}")
+        _require(one.form == layout.form(name, extra), f"{name!r:.60} has shape {one.shape} in {one.chunks}")
         if name in layout.results:
             small = math.prod(size for _, size in extra) <= MOST_EXTRA and one.unpacked <= MOST_CHUNK
-            _demand(small, f"a chunk of {name!r:.60} is too large")
+            _require(small, f"a chunk of {name!r:.60} is too large")
         elif name != COMPLETE:
-            _demand(one.dtype == "float64", f"{name!r:.60} has no numbers")
+            _require(one.dtype == "float64", f"{name!r:.60} has no numbers")
             small = name in layout.generated or one.shape[0] <= MOST_AXIS
-            _demand(small, f"{name!r:.60} has more than {MOST_AXIS} values")
+            _require(small, f"{name!r:.60} has more than {MOST_AXIS} values")
 
 
 def _seal(document: dict[str, Any]) -> str:
@@ -238,8 +238,8 @@ def _seal(document: dict[str, Any]) -> str:
 # -- writing
 
 
-def planned(plan: Map) -> MapLayout:
-    """The layout of a map that is to be made."""
+def new_layout(plan: Map) -> MapLayout:
+    """Layout of a new map."""
     from steadyslip import __version__
 
     try:
@@ -268,11 +268,11 @@ def planned(plan: Map) -> MapLayout:
 
 
 def lay_out(path: Path, plan: Map) -> None:
-    """Make all arrays of a map in an empty folder, and the coordinates."""
+    """Create all arrays of a map in an empty folder, and write its coordinates."""
     import zarr
     from zarr.codecs import BloscCodec, BytesCodec, Crc32cCodec
 
-    layout = planned(plan)
+    layout = new_layout(plan)
     group = zarr.create_group(str(path), zarr_format=3)
     group.attrs.update(
         {
@@ -297,12 +297,12 @@ def lay_out(path: Path, plan: Map) -> None:
         )  # fmt: skip
     for name, values in coordinates(plan).items():
         group[name][:] = values
-    with warnings.catch_warnings():  # readers list nothing then; the specification is on its way
+    with warnings.catch_warnings():  # Zarr warns that consolidated metadata are not yet part of format 3
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(str(path))
     _seal_file(path / "zarr.json")
     for file in path.rglob("*"):
-        if file.is_file():  # nothing recalculates these
+        if file.is_file():  # metadata and coordinates cannot be recomputed: write them through to disk
             with open(file, "rb") as written:
                 os.fsync(written.fileno())
 
@@ -314,7 +314,7 @@ def _seal_file(file: Path) -> None:
 
 
 def coordinates(plan: Map) -> dict[str, np.ndarray]:
-    """Parameters whose values are written when the store is made."""
+    """Parameters whose values are written when the store is created."""
     found = {axis.name: axis.values for axis in plan.axes}
     if plan.sampling and not isinstance(plan.sampling, Generated):
         found |= plan.sampling.part(0, plan.sampling.points)
@@ -322,7 +322,7 @@ def coordinates(plan: Map) -> dict[str, np.ndarray]:
 
 
 def versions() -> dict[str, str]:
-    """Of the packages that numbers depend on."""
+    """Versions of the packages that results depend on."""
     from importlib.metadata import version
 
     return {name: version(name) for name in _VERSIONS}

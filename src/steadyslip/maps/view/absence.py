@@ -1,4 +1,4 @@
-"""Why points of a map have no number, in words: asked of the rigs at some of them."""
+"""Explanations of missing values in a map, found by analysing the rigs at some of the points."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from steadyslip.maps.view.cut import View
 from steadyslip.maps.view.result import MapResult
 from steadyslip.model.point import operating_point
 
-ASKED = 12
+ASKED = 12  # points analysed for an explanation, evenly chosen; chosen by trial
 _ABOUT_EDGES = ("critical_stiffness", "safety_factor", "margin", "edge")
-_SAYS = {
+_REASONS = {
     ABSENT: WORDS[ABSENT],
     UNKNOWN: WORDS[UNKNOWN],
     STABLE: "stable at every value",
@@ -23,9 +23,9 @@ _INFINITE = {"growth_rate": "ill-posed", "threshold": "no kick in the range fail
 
 
 def without_number(found: MapResult, view: View, name: str, hatched: bool = False) -> str:
-    """What it means that points of a picture have no number of a result; empty where all have one.
+    """Explanation of the points of a figure without a value of a result; empty if there are none.
 
-    `hatched`: the picture tells already where there is no steady sliding, or numbers are out of range.
+    `hatched`: the figure already marks points without steady sliding or out of range.
     """
     values = np.asarray(view.values[name], dtype=float)
     if hatched:
@@ -43,7 +43,7 @@ def without_number(found: MapResult, view: View, name: str, hatched: bool = Fals
 
 
 def points_at(view: View, rows: np.ndarray) -> list[dict[str, float]]:
-    """Parameters of the rig at some of a picture's places, by their indices (n, dimensions)."""
+    """Parameters of the rig at some of a figure's points, given by their indices (n, dimensions)."""
     points = []
     for row in rows[np.unique(np.linspace(0, len(rows) - 1, ASKED).astype(int))]:
         place = {n: float(p[i]) for n, p, i in zip(view.names, view.places, row[::-1], strict=True)}
@@ -52,13 +52,13 @@ def points_at(view: View, rows: np.ndarray) -> list[dict[str, float]]:
 
 
 def _reasons(found: MapResult, view: View, rows: np.ndarray) -> list[str]:
-    """Of single rigs; none are told of samples, of which a picture shows medians."""
+    """Reason for each point; none for samples, whose medians the figure shows."""
     try:
         rig = found.rig
         points = points_at(view, rows) if not view.bands else []
         asked = [operating_point(rig, one) for one in points]
         if isinstance(rig, Machine):
-            return [_SAYS[int(status(one))] for one in asked]
+            return [_REASONS[int(status(one))] for one in asked]
         return [str(without_edge(one)) for one in asked]
     except (NotAvailable, ParameterError):
         return []

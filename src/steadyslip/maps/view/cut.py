@@ -1,4 +1,4 @@
-"""The part of a map that fits into a picture: one or two parameters vary, others are held, samples are summed up."""
+"""Section of a map for a figure: one or two parameters vary, others are held, samples are summarised."""
 
 from __future__ import annotations
 
@@ -25,36 +25,36 @@ from steadyslip.maps.plan.axes import SAMPLE
 from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
-MOST = 500  # points along an axis: more than a picture shows
-MOST_IN_ALL = 2 * 10**7  # values read, samples included
-MOST_SCATTERED = 5000
-BAND = (0.025, 0.5, 0.975)
+MOST = 500  # points along an axis: more than a figure resolves
+MOST_IN_ALL = 2 * 10**7  # values read, samples included: 160 MB
+MOST_SCATTERED = 5000  # points of a scatter plot; chosen by trial, as more overlap
+BAND = (0.025, 0.5, 0.975)  # quantiles of samples: median and 95 % band
 FAILING = ("safety_factor", "margin")
-"""Results that a sample lacks because it is stable at every stiffness, or has failed: at none, or no steady sliding."""
+"""Results that a sample lacks if it is stable at all stiffnesses, or fails (stable at none, no steady sliding)."""
 
 
 @dataclass(frozen=True, eq=False)
 class View(ReadOnly):
-    """Numbers of a picture, in SI units.
+    """Numbers of a figure, in SI units.
 
     Attributes
     ----------
     names : tuple of str
         Parameters on the axes, x first.
     places : tuple of ndarray
-        Their values: of a grid, or of scattered points one by one.
+        Values of these parameters: of the grid, or of each scattered point.
     values : dict of str to ndarray
-        Results, (nx,), (ny, nx), or (m,) if scattered, with further dimensions of the result behind; medians of
+        Results, (nx,), (ny, nx), or (m,) if scattered, with further dimensions of the result at the end; medians over
         samples.
     bands : dict of str to ndarray
-        Quantiles of samples at 2.5, 50 and 97.5 %, first axis; empty without samples. For the results in `FAILING`
-        samples without a value count as failures, below all others; for other results they are left out.
+        2.5, 50 and 97.5 % quantiles over samples, first axis; empty without samples. For results in `FAILING`, samples
+        without a value count as failures, below all others; for others they are left out.
     missing : dict of str to ndarray
-        Share of the samples without a value, for the results in `bands`.
+        Share of samples without a value, for the results in `bands`.
     shares : dict of str to ndarray
-        For results that are kinds: share of the samples of each kind, first axis; empty without samples.
+        For results that are kinds: share of samples of each kind, first axis; empty without samples.
     held : dict of str to float
-        Other parameters and the values at which they are held.
+        Other parameters and their fixed values.
     scattered : bool
     """
 
@@ -69,7 +69,7 @@ class View(ReadOnly):
 
 
 def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = None) -> tuple[str, ...]:
-    """Full names of the parameters on the axes; the first ones of the map unless given, and not that of the facets.
+    """Full names of the parameters on the axes; by default the map's first ones, except that of the facets.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = 
 
 
 def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Mapping[str, Any] | None = None) -> View:
-    """Read a view.
+    """Read a section of a map.
 
     Parameters
     ----------
@@ -110,19 +110,19 @@ def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Map
         Full names of one or two parameters.
     results : sequence of str
     at : mapping of str to float or str, optional
-        Where to hold other parameters; nearest to the rig's own values unless given.
+        Fixed values of other parameters; by default those nearest to the rig's own.
 
     Raises
     ------
     ParameterError
         If a name or value is wrong.
     """
-    with _damage_told(found):
-        return _taken(found, found.dataset, names, results, at or {})
+    with _damage_reported(found):
+        return _read_view(found, found.dataset, names, results, at or {})
 
 
 @contextmanager
-def _damage_told(found: MapResult) -> Iterator[None]:
+def _damage_reported(found: MapResult) -> Iterator[None]:
     try:
         yield
     except (ValueError, RuntimeError) as error:
@@ -131,8 +131,10 @@ def _damage_told(found: MapResult) -> Iterator[None]:
         raise found.store.damage("results", error) from error
 
 
-def _taken(found: MapResult, data: Any, names: Sequence[str], results: Sequence[str], at: Mapping[str, Any]) -> View:
-    held, place = _held(found, data, names, at)
+def _read_view(
+    found: MapResult, data: Any, names: Sequence[str], results: Sequence[str], at: Mapping[str, Any]
+) -> View:
+    held, place = _fixed_values(found, data, names, at)
     scattered = names[0] not in found.dims
     steps: dict[str, slice] = {}
     free = [n for n in names if n in found.dims]
@@ -163,15 +165,15 @@ def _taken(found: MapResult, data: Any, names: Sequence[str], results: Sequence[
         else:
             absent = np.mean(~np.isfinite(numbers), axis=axis)
             if result in FAILING:
-                numbers, absent = _with_failures(numbers, _always(found, part, order), result)
+                numbers, absent = _with_failures(numbers, _stable_samples(found, part, order), result)
             bands[result] = _quantiles(numbers, axis)
             values[result] = np.where(np.isinf(bands[result][1]), np.nan, bands[result][1])
             missing[result] = absent
     return View(tuple(names), places, values, bands, shares, held, scattered, missing)
 
 
-def _always(found: MapResult, part: Any, order: Sequence[str]) -> Array | None:
-    """Where samples are stable; None where the map does not tell."""
+def _stable_samples(found: MapResult, part: Any, order: Sequence[str]) -> Array | None:
+    """Mask of samples that are stable; None if the map has no status."""
     if "status" not in part:
         return None
     stable: Array = np.asarray(part["status"].transpose(*order).values) == STABLE
@@ -179,7 +181,7 @@ def _always(found: MapResult, part: Any, order: Sequence[str]) -> Array | None:
 
 
 def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[Array, Array]:
-    """Samples without a value made comparable: failures below all others, stable ones without an edge above."""
+    """Values with missing ones made comparable (failed: lowest, stable without an edge: infinite), share of failed."""
     none = ~np.isfinite(numbers)
     always = np.zeros_like(none) if stable is None else none & stable
     failed = none & ~always
@@ -188,18 +190,18 @@ def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[A
 
 
 def _quantiles(numbers: Array, axis: int) -> Array:
-    """Of what exists, infinite values included; NaN where nothing does."""
+    """Quantiles in `BAND` of existing values, infinite ones included; NaN where there are none."""
     empty = np.all(np.isnan(numbers), axis=axis, keepdims=True)
-    # where some are infinite, one of the samples: there is nothing between a number and infinity
+    # with infinite values take one of the samples, because interpolation with infinity is undefined
     method: Any = "closest_observation" if np.isinf(numbers).any() else "linear"
     found = np.nanquantile(np.where(empty, 0.0, numbers), BAND, axis=axis, method=method)
     return np.asarray(np.where(np.squeeze(empty, axis), np.nan, found))
 
 
-def _held(
+def _fixed_values(
     found: MapResult, data: Any, names: Sequence[str], at: Mapping[str, Any]
 ) -> tuple[dict[str, float], dict[str, int]]:
-    """Values and positions along the dimensions that are not shown."""
+    """Values and indices along the dimensions that are not shown."""
     others = [dim for dim in found.dims if dim not in (*names, SAMPLE)]
     known, problems, wanted = dict.fromkeys(others), [], {}
     if not isinstance(at, Mapping):
@@ -225,7 +227,7 @@ def _held(
 
 
 def own_value(found: MapResult, name: str) -> float | None:
-    """The base rig's own value of a parameter; None if it is unknown."""
+    """Value of a parameter in the base rig; None if unknown."""
     try:
         rig = found.rig
         return rig.value(name)

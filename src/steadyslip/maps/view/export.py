@@ -1,4 +1,4 @@
-"""A map as one netCDF or Parquet file, written chunk by chunk so that memory stays small."""
+"""Export of a map to one netCDF or Parquet file, chunk by chunk so that memory stays small."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steadyslip.files.output import whole_file
 from steadyslip.maps.store.arrays import Store
 
 Read = Callable[..., np.ndarray]
-"""Reads an array of a store, or a region of it, by name."""
+"""Function that reads an array of a store, or a region of it, by name."""
 
 FROM_STORE = ("title", "rig", "definition", "steadyslip", "versions")
 
@@ -61,7 +61,7 @@ def _variable(file: Any, store: Store, name: str) -> Any:
 
 
 def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
-    """Chunks of a size that readers of netCDF cope with."""
+    """Chunk sizes limited to `most` values in all, which readers of netCDF handle well."""
     found: list[int] = []
     for size in reversed(chunks):
         found.append(max(1, min(size, most)))
@@ -70,7 +70,7 @@ def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
 
 
 def to_parquet(store: Store, read: Read, path: str | PathLike[str]) -> None:
-    """Write one row for each point, parameters first; words for what is one of several kinds.
+    """Write one row per point, parameters first; results that are kinds as words.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Arrays of a map for xarray: read from disk when they are used, and a damaged file is told as everywhere else."""
+"""xarray variables that are read from a store on use, with its checks for damage."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steadyslip.maps.store.arrays import Store
 
 
 class StoredValues(BackendArray):
-    """One array of a store, read by `Store.read`."""
+    """Array of a store, read by `Store.read`."""
 
     def __init__(self, store: Store, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         self.store, self.name, self.shape, self.dtype = store, name, shape, dtype
@@ -27,7 +27,7 @@ class StoredValues(BackendArray):
 
 
 def lazily(data: Any, store: Store) -> Any:
-    """The dataset with its variables read through the store."""
+    """Dataset with its variables read through the store."""
     import xarray as xr
 
     found = {}

@@ -1,4 +1,4 @@
-"""A map that is computed, or partly so: its numbers, what they say in short, files and pictures of it."""
+"""Computed map (or part of one): values, summary, export and figures."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from steadyslip.machine.slider import Slider
 from steadyslip.maps.store.arrays import Store
 from steadyslip.maps.view import export
 
-BLOCK = 2**22  # points read at a time
+BLOCK = 2**22  # values read at a time: 32 MiB
 LINEAR = (
     "critical_stiffness", "safety_factor", "margin", "stable_stiffness", "growth_rate", "edge", "stable_values",
     "frequency", "damping_ratio",
 )  # fmt: skip
-"""Results that are missing where there is no steady sliding, or numbers are out of range, which `status` tells."""
+"""Results that are missing without steady sliding or out of range, which only `status` distinguishes."""
 
 
 class MapResult(Displayed):
-    """A map on disk.
+    """Map on disk.
 
-    Opening it reads no results; `dataset` reads what is asked of it. A map that is still being computed can be opened
-    as well, and shows what is finished.
+    Opening reads no results; `dataset` reads on demand. A map that is still being computed can be opened too, and
+    contains what is finished.
     """
 
     def __init__(self, store: Store) -> None:
@@ -45,12 +45,12 @@ class MapResult(Displayed):
 
     @property
     def store(self) -> Store:
-        """How it lies on disk."""
+        """Store of the map."""
         return self._store
 
     @property
     def rig(self) -> Slider | Machine:
-        """The base rig; NotAvailable if it has a law that no file can refer to."""
+        """Base rig; NotAvailable if it has a law that cannot be written to a file."""
         return self._store.rig()
 
     @property
@@ -74,17 +74,17 @@ class MapResult(Displayed):
 
     @property
     def results(self) -> tuple[str, ...]:
-        """Names of the arrays computed."""
+        """Names of the computed arrays."""
         return self._store.results
 
     @property
     def finished(self) -> tuple[int, int]:
-        """Number of chunks that are done, and of all."""
+        """Number of finished chunks, and of all."""
         return self._store.marked(), self._store.count
 
     @property
     def complete(self) -> bool:
-        """Whether every chunk is done."""
+        """True if every chunk is done."""
         done, count = self.finished
         return done == count
 
@@ -94,12 +94,12 @@ class MapResult(Displayed):
 
     @property
     def dataset(self) -> Any:
-        """An xarray.Dataset that reads from disk what is used of it; units are in the attributes.
+        """xarray.Dataset that reads from disk on demand; units are in the attributes.
 
         Raises
         ------
         NotAvailable
-            If a file is damaged; of chunks, when they are read.
+            If a file is damaged; for chunks, when they are read.
         """
         import xarray as xr
 
@@ -113,12 +113,12 @@ class MapResult(Displayed):
                 decode_times=False,
                 mask_and_scale=False,
             )
-        except (ValueError, RuntimeError, OSError) as error:  # coordinates are read at once
+        except (ValueError, RuntimeError, OSError) as error:  # coordinates are read immediately
             raise self._store.damage("coordinates", error) from error
         return lazily(data, self._store)
 
     def words(self, name: str) -> tuple[str, ...]:
-        """What the numbers 0, 1, ... of an array of kinds stand for; empty for other arrays."""
+        """Meanings of the numbers 0, 1, ... of a result that is one of several kinds; empty for numeric results."""
         meanings = str(self._store.layout.arrays[self._known(name)].attributes.get("flag_meanings", ""))
         return tuple(word.replace("_", " ") for word in meanings.split()[1:])
 
@@ -134,19 +134,23 @@ class MapResult(Displayed):
         return str(self._store.layout.arrays[name].attributes["units"])
 
     def along(self, name: str) -> str | None:
-        """The parameter that a result is about, where it is about one in particular."""
+        """Parameter along which a result is an edge, if it was chosen; else None."""
         given = self._store.layout.definition["compute"].get(name, {})
         return given.get("along") if isinstance(given, dict) else None
 
     def area(self, name: str) -> float | None:
-        """Contact area (m^2) for which people get a result or parameter as a total; None where in its own unit."""
+        """Contact area (m^2) by which a result or parameter is shown as a total; None if it is shown in its own
+        unit.
+        """
         try:
             return self.rig.area_of(name)
         except (NotAvailable, ParameterError):
             return None
 
     def statistics(self) -> dict[str, dict[str, float]]:
-        """What the finished chunks hold: shares of kinds; of numbers the least, the greatest and how many exist."""
+        """Statistics of the finished chunks: shares of kinds; for numbers the range and the share of points
+        with a value.
+        """
         store = self._store
         pending = store.pending()
         total = self.size - sum(store.points(number) for number in pending)
@@ -169,7 +173,7 @@ class MapResult(Displayed):
         return found
 
     def _blocks(self, name: str) -> Iterator[np.ndarray]:
-        """A result in pieces of many chunks; those of which nothing is computed are left out."""
+        """Blocks of a result, each of many chunks, without blocks of which nothing is computed."""
         store = self._store
         marks = store.marks_of_grid() != 0
         extra = int(np.prod(store.layout.arrays[name].shape[len(self.dims) :], dtype=int))
@@ -222,7 +226,7 @@ class MapResult(Displayed):
         return f"<MapResult: {self._store.layout.title}, {done} of {count} chunks>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units: what is computed, how far, and its statistics."""
+        """Result as JSON-ready dict in SI units: content, progress and statistics."""
         (done, count), statistics = self.finished, self.statistics()
         ends = {name: {k: v for k, v in one.items() if k in ("low", "high")} for name, one in statistics.items()}
         scaled = {name: outside(self.unit(name), self.area(name)) for name, one in ends.items() if one}
@@ -242,7 +246,7 @@ class MapResult(Displayed):
         } | ({"forces": {"area": self.area(next(iter(forces))), "statistics": forces}} if forces else {})
 
     def to_netcdf(self, path: str | PathLike[str]) -> None:
-        """Write one netCDF file; what is not computed yet is missing there.
+        """Write one netCDF file; unfinished parts are missing values.
 
         Raises
         ------
@@ -262,7 +266,7 @@ class MapResult(Displayed):
         export.to_parquet(self.store, self.read, path)
 
     def plot(self, x: str | None = None, y: str | None = None, show: str | None = None, **options: Any) -> Any:
-        """Draw it; see `steadyslip.figures.map_figure`."""
+        """Draw the map; see `steadyslip.figures.map_figure`."""
         return draw(self, x=x, y=y, show=show, **options)
 
 
@@ -273,7 +277,7 @@ def open_map(path: str | PathLike[str]) -> MapResult:
     Raises
     ------
     NotAvailable
-        If there is none.
+        If it does not exist.
     """
     target = Path(path)
     if not target.exists():

@@ -1,4 +1,4 @@
-"""One chunk of a map: read which points, compute, write, mark. What every worker does, on any engine."""
+"""Computation of one chunk of a map: read its parameters, compute, store, mark as done; the same on all engines."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from steadyslip.protocol import Protocol
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker has to know; small, since it is sent with every chunk.
+    """Description of a map for workers; small, because it is sent with every chunk.
 
     Attributes
     ----------
     path : str
-        Of the store, the same on all machines. Coordinates are read from there.
+        Path of the store, valid on all machines; coordinates are read from there.
     version : str
-        Of the package that made the job.
+        Version of the package that made the job.
     """
 
     path: str
@@ -46,15 +46,15 @@ class Job:
 
 @dataclass(frozen=True)
 class Done:
-    """What a worker says of a chunk.
+    """Report of a worker about a chunk.
 
     Attributes
     ----------
     number, points : int
     seconds : float
-        That it took, 0 if it was done already.
+        Time taken; 0 if the chunk was done already.
     problem : str
-        Why it could not be done; empty otherwise.
+        Reason why it could not be computed; empty if it was.
     """
 
     number: int
@@ -64,7 +64,7 @@ class Done:
 
 
 def job_of(plan: Map, path: Path) -> Job:
-    """The job of a map that is kept at `path`."""
+    """Job for a map stored at `path`."""
     from steadyslip import __version__
 
     sampling = plan.sampling if isinstance(plan.sampling, Generated) else None
@@ -72,9 +72,9 @@ def job_of(plan: Map, path: Path) -> Job:
 
 
 def do_chunk(job: Job, number: int) -> Done:
-    """Compute and write one chunk, unless it is there already.
+    """Compute and store one chunk, unless it is done already.
 
-    Failures come back as `Done.problem`: exceptions lose their text on the way through some engines.
+    Errors are returned as `Done.problem`, because exceptions lose their text on the way through some engines.
     """
     from steadyslip import __version__
 
@@ -86,9 +86,9 @@ def do_chunk(job: Job, number: int) -> Done:
         if not Path(job.path).exists():
             message = f"a worker does not see {job.path!r}; give a folder that all machines share"
             return Done(number, 0, 0.0, message)
-        store = _opened(job.path, _stamp(job.path))
+        store = _open_store(job.path, _stamp(job.path))
         points = store.points(number)
-        if store.is_done(number):  # by a worker that was thought lost
+        if store.is_done(number):  # by a worker that was believed lost
             return Done(number, points, 0.0)
         region = store.region(number)
         vary = store.parameters(region)
@@ -97,14 +97,14 @@ def do_chunk(job: Job, number: int) -> Done:
             samples = job.sampling.part(region[-1].start, region[-1].stop)
             vary |= samples
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore", OutOfRangeWarning)  # the map's text says of what its points have none
+            warnings.simplefilter("ignore", OutOfRangeWarning)  # the summary of the map counts points out of range
             results = evaluate(job.rig, job.protocol, job.compute, vary)
         store.write(number, results, samples)
     except OSError as error:
         return Done(number, 0, 0.0, str(cannot_write(Path(job.path), error)))
     except SteadyslipError as error:
         return Done(number, 0, 0.0, str(error))
-    except Exception as error:  # of a measure that is not ours
+    except Exception as error:  # of a user's measure
         place = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{place.name}, line {place.lineno} of {Path(place.filename).name}"
         return Done(number, 0, 0.0, f"chunk {number} failed with {type(error).__name__}: {error} (in {where})")
@@ -112,11 +112,11 @@ def do_chunk(job: Job, number: int) -> Done:
 
 
 @lru_cache(maxsize=1)
-def keep_memory() -> None:
-    """Have a worker process reuse the memory of arrays instead of handing it back after each of them.
+def reuse_memory() -> None:
+    """Make a worker process reuse the memory of arrays instead of returning it to the system.
 
-    Kernels make and drop arrays of some 100 kB all the time. Dask starts its workers with a setting of the GNU C
-    library that returns such blocks to the system at once, which makes them half as fast; here that is undone.
+    Kernels allocate and free arrays of some 100 kB all the time. Dask sets the GNU C library of its workers to return
+    such blocks at once, which doubles the time; this restores the usual behaviour.
     """
     if platform.libc_ver()[0] != "glibc":
         return
@@ -126,12 +126,12 @@ def keep_memory() -> None:
         library.mallopt(_MMAP_THRESHOLD, 2**25)
 
 
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of malloc.h
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD of malloc.h
 
 
 @lru_cache(maxsize=4)
-def _opened(path: str, stamp: tuple[int, int]) -> Store:
-    """A store that stays open from chunk to chunk, until another one takes its place."""
+def _open_store(path: str, stamp: tuple[int, int]) -> Store:
+    """Store that stays open from chunk to chunk, until another one is made at its path."""
     return Store(Path(path))
 
 

@@ -1,6 +1,6 @@
-"""Chunks on a Dask cluster: workers compute and write, the driver only says which chunk is next.
+"""Execution of chunks on a Dask cluster: workers compute and store, this process hands out chunk numbers.
 
-What is finished is known from the store alone, so that nothing depends on what a scheduler or a worker remembers.
+Which chunks are finished is read from the store only, independent of the memory of scheduler and workers.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from typing import Any
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.maps.store.arrays import Store
-from steadyslip.maps.work.chunk import Done, Job, do_chunk, keep_memory
+from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
 LOCAL = "local"
-PATIENCE = 3  # times that a chunk's worker may die
-WAIT = 600.0  # seconds to wait for a scheduler that is lost
-COUNT = 5.0  # seconds between looks at how many workers there are
-RETRY = 2.0  # seconds between attempts
-CONNECT = 30.0  # seconds to wait for an answer
+PATIENCE = 3  # deaths of workers on the same chunk before giving up
+WAIT = 600.0  # s without a finished chunk before a lost scheduler is given up; restarts take minutes
+COUNT = 5.0  # s between counts of the workers, which may come and go
+RETRY = 2.0  # s between attempts to connect
+CONNECT = 30.0  # s to wait for an answer; Dask's own default
 
 
 class _Lost(Exception):
-    """The scheduler has forgotten what it was asked."""
+    """Error: the scheduler has lost tasks."""
 
 
 def run_cluster(
     job: Job, store: Store, chunks: Sequence[int], report: Callable[[Done], None], address: str, workers: int,
     note: Callable[[str], None],
 ) -> None:  # fmt: skip
-    """All chunks on the scheduler at `address`, or on one made for the purpose (``local``).
+    """Compute all chunks on the scheduler at `address`, or on a local cluster made for it (``local``).
 
     Raises
     ------
@@ -56,7 +56,7 @@ def run_cluster(
         try:
             with _client(address, min(workers, len(left))) as client:
                 connected = True
-                for done in _flow(client, job, left):
+                for done in _finished_chunks(client, job, left):
                     left.remove(done.number)
                     since = time.monotonic()
                     report(done)
@@ -69,13 +69,13 @@ def run_cluster(
             note(f"the scheduler at {address!r} is lost; trying again")
             time.sleep(RETRY)
             pending = set(store.pending())
-            for number in [n for n in left if n not in pending]:  # finished, but nobody was told
+            for number in [n for n in left if n not in pending]:  # finished, but not reported
                 left.remove(number)
                 report(Done(number, store.points(number), 0.0))
 
 
-def _flow(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
-    """Chunks as they are finished; a few for each worker are under way, whatever the size of the map."""
+def _finished_chunks(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
+    """Yield chunks as they finish; two per worker are submitted at a time, independent of the size of the map."""
     from distributed import as_completed
 
     run = uuid.uuid4().hex[:8]
@@ -118,8 +118,8 @@ def _flow(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
 
 
 def _do_chunk(job: Job, number: int) -> Done:
-    """What a Dask worker runs."""
-    keep_memory()
+    """Task of a Dask worker."""
+    reuse_memory()
     return do_chunk(job, number)
 
 
@@ -134,7 +134,7 @@ def _client(address: str, workers: int) -> Iterator[Any]:
         logger.setLevel(logging.CRITICAL)
     try:
         if address == LOCAL:
-            unwatched = {"distributed.worker.profile.enabled": False}  # its samples cost some percent
+            unwatched = {"distributed.worker.profile.enabled": False}  # Dask's profiler costs some percent of the time
             with (
                 dask.config.set(unwatched),
                 LocalCluster(

@@ -1,4 +1,4 @@
-"""Chunks on the cores of this machine: worker processes that may die without harm."""
+"""Execution of chunks on the cores of this machine, by processes whose death does no harm."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import Any
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.progress import interrupts_held
-from steadyslip.maps.work.chunk import Done, Job, do_chunk, keep_memory
+from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
-PATIENCE = 8  # times that workers may die without a single chunk being finished in between
-WATCH = 0.5  # seconds between a worker's looks at whether its driver lives
+PATIENCE = 8  # deaths of worker pools in a row without a finished chunk before giving up; chosen by trial
+WATCH = 0.5  # s between a worker's checks that its parent is alive
 
 
 def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) -> None:
-    """All chunks, one after the other, in this process; Ctrl-C takes effect between them."""
+    """Compute all chunks one after the other in this process; Ctrl-C takes effect between them."""
     with interrupts_held() as interrupted:
         for number in chunks:
             done = do_chunk(job, number)
@@ -33,19 +33,19 @@ def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) ->
 
 
 def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], workers: int) -> None:
-    """All chunks on a number of processes; `report` may raise to stop.
+    """Compute all chunks on a number of processes; `report` may raise an exception to stop.
 
     Raises
     ------
     NotAvailable
-        If workers die again and again.
+        If workers die repeatedly.
     """
     left, deaths = list(chunks), 0
     while left:
         before = len(left)
         try:
             with _workers(min(workers, len(left))) as pool:
-                for done in _flow(pool, job, left):
+                for done in _finished_chunks(pool, job, left):
                     left.remove(done.number)
                     report(done)
         except BrokenProcessPool as error:
@@ -58,13 +58,13 @@ def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], w
                 raise NotAvailable(message) from error
 
 
-def _flow(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
-    """Chunks as they are finished; no more are handed out than keep the workers busy."""
+def _finished_chunks(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
+    """Yield chunks as they finish; two per worker are submitted at a time."""
     waiting = iter(list(chunks))
     ahead: set[Future[Done]] = set()
     while True:
         while len(ahead) < 2 * pool._max_workers and (number := next(waiting, None)) is not None:
-            with _deaf_to_interrupts():
+            with _interrupts_blocked():
                 ahead.add(pool.submit(do_chunk, job, number))
         if not ahead:
             return
@@ -81,15 +81,15 @@ def _flow(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
 
 @contextmanager
 def _workers(count: int) -> Iterator[Any]:
-    """Processes that need no guard in the caller's script, and take functions typed at a prompt."""
+    """Pool of processes that needs no main guard in the caller's script, and accepts functions typed at a prompt."""
     from loky import ProcessPoolExecutor
     from loky.backend import resource_tracker as loky_tracker
 
     if hasattr(signal, "pthread_sigmask"):
-        for tracker in (resource_tracker, loky_tracker):  # started later, they would let signals through again
+        for tracker in (resource_tracker, loky_tracker):  # if started later, they would unblock SIGINT
             tracker.ensure_running()
-    with _deaf_to_interrupts():
-        pool = ProcessPoolExecutor(count, initializer=_prepared, initargs=(os.getpid(),))
+    with _interrupts_blocked():
+        pool = ProcessPoolExecutor(count, initializer=_set_up_worker, initargs=(os.getpid(),))
     try:
         yield pool
     except BaseException:
@@ -99,12 +99,12 @@ def _workers(count: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Processes and threads that begin meanwhile never see Ctrl-C; this one sees it afterwards.
+def _interrupts_blocked() -> Iterator[None]:
+    """Context in which new processes and threads start with Ctrl-C blocked; this process gets it afterwards.
 
-    A worker that it ended while it was starting would leave the pool waiting for it.
+    A worker killed by Ctrl-C while it starts would leave the pool waiting for it.
     """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows: `_prepared` alone
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: workers only ignore it once `_set_up_worker` has run
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
@@ -114,18 +114,18 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _prepared(driver: int) -> None:
-    """Set up a worker. Ctrl-C is for the driver, which ends the workers."""
+def _set_up_worker(driver: int) -> None:
+    """Set up a worker: Ctrl-C is left to the parent, which ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if "fork" in multiprocessing.get_all_start_methods():
-        # The lock of the compressor has then no name that a worker ended by force would leave behind.
+        # with fork the compressor's lock has no name, which a killed worker would leave behind in the system
         multiprocessing.set_start_method("fork", force=True)
-    keep_memory()
-    threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
+    reuse_memory()
+    threading.Thread(target=_exit_with_parent, args=(driver,), daemon=True).start()
 
 
-def _end_with(driver: int) -> None:
-    """End this worker soon after its driver was killed; it would wait for work forever."""
+def _exit_with_parent(driver: int) -> None:
+    """End this worker soon after its parent was killed; it would wait for work forever."""
     while os.getppid() == driver:
         time.sleep(WATCH)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""Compute a map: lay out or open its store, and have the missing chunks done."""
+"""Computation of a map: create or open its store, and compute the missing chunks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from steadyslip.maps.work.cluster import run_cluster
 from steadyslip.maps.work.local import run_here, run_local
 from steadyslip.motion.engine import available_cores
 
-SHORT = 2.0  # seconds of work for which no processes are started
+SHORT = 2.0  # s of work that is done without further processes, which take a second to start
 
 
 @checked()
@@ -34,33 +34,33 @@ def run_map(
     cluster: str | None = None,
     progress: bool | None = None,
 ) -> MapResult:
-    """Compute a map, or what is missing of it.
+    """Compute a map, or the missing part of it.
 
-    Every finished chunk is on disk with a mark. After Ctrl-C, a kill or a power failure the same call goes on;
-    chunks that are damaged are found and computed again.
+    Each finished chunk is stored with a checksum. After Ctrl-C, a kill or a power failure the same call continues;
+    damaged chunks are detected and computed again.
 
     Parameters
     ----------
     plan : Map
     path : path
-        Folder ending in ``.zarr``, made if missing.
+        Folder ending in ``.zarr``, created if missing.
     workers : int, optional
-        Processes; all cores unless given, and none besides this one where the work is too short for them.
+        Number of processes; by default one per core, or only this one for short work.
     cluster : str, optional
         Compute on Dask: address of a scheduler such as ``tcp://host:8786``, or ``local`` for workers on this machine.
-        All of them must see `path`, and have this package.
+        All workers must have access to `path` and have this package.
     progress : bool, optional
-        Whether to show a progress bar; on a terminal unless given.
+        True to show a progress bar; by default on a terminal.
 
     Returns
     -------
     MapResult
-        After Ctrl-C, with part of the map missing.
+        After Ctrl-C it is incomplete.
 
     Raises
     ------
     NotAvailable
-        If the path holds another map or something else, or cannot be written; if a chunk fails. What is finished is
+        If the path holds another map or something else, or cannot be written; if a chunk fails. Finished chunks are
         kept.
     ParameterError
         If an argument is wrong.
@@ -69,16 +69,18 @@ def run_map(
     _check(cluster)
     check_path(target)
     try:
-        return _gone_on(plan, open_or_create(target, plan), workers, cluster, progress)
+        return _compute_missing(plan, open_or_create(target, plan), workers, cluster, progress)
     except OSError as error:
         raise cannot_write(target, error) from error
 
 
-def _gone_on(plan: Map, store: Store, workers: int | None, cluster: str | None, progress: bool | None) -> MapResult:
-    """Compute what is missing in a store."""
-    with store.held():
+def _compute_missing(
+    plan: Map, store: Store, workers: int | None, cluster: str | None, progress: bool | None
+) -> MapResult:
+    """Compute the missing chunks of a store."""
+    with store.locked():
         store.restore(plan)
-        _remark(store, plan)
+        _note_differences(store, plan)
         for number in store.damaged():
             store.forget(number)
         missing = store.pending()
@@ -96,8 +98,8 @@ def _check(cluster: str | None) -> None:
         raise ParameterError([Problem("cluster", f"got {cluster!r}; allowed: {allowed}")])
 
 
-def _remark(store: Store, plan: Map) -> None:
-    """Say what does not hinder, but should be known."""
+def _note_differences(store: Store, plan: Map) -> None:
+    """Print notes on differences that do not prevent continuing."""
     then = store.versions
     for name, now in versions().items():
         if then.get(name) != now and store.marked() < store.count:
@@ -108,7 +110,7 @@ def _remark(store: Store, plan: Map) -> None:
 
 
 def _check_space(store: Store) -> None:
-    """Refuse to begin where not even one chunk would fit; how well a whole map packs is not known before."""
+    """Raise an error if the disk is full; the size of a whole map is unknown before it is compressed."""
     free = shutil.disk_usage(store.path).free
     if free < 2**16:
         raise NotAvailable(f"cannot write {str(store.path)!r}: the disk is full")

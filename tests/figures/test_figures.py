@@ -11,7 +11,7 @@ from matplotlib.path import Path
 import steadyslip as ss
 from steadyslip import figures
 from steadyslip.figures import mass
-from steadyslip.figures.axis import axis
+from steadyslip.figures.axis import chart_axis
 from steadyslip.figures.style import display_unit, unmanaged_axes
 from steadyslip.reproduce import paper_rig
 from steadyslip.units import GPa, MPa, deg, m, s, um
@@ -229,12 +229,12 @@ def test_lift_off_is_told_from_lock_up():
 
 def test_islands_and_holes_are_filled_as_such():
     """The filled outlines of a ring: the hole is not part of it."""
-    from steadyslip.figures.regions import filled
+    from steadyslip.figures.regions import region_path
 
     def ring(x, y):
         return np.abs(np.hypot(x - 0.5, y - 0.5) - 0.3) < 0.1
 
-    path = filled(ring, 60)
+    path = region_path(ring, 60)
     assert inside(path, 0.8, 0.5)
     assert not inside(path, 0.5, 0.5)
     assert not inside(path, 0.95, 0.95)
@@ -286,14 +286,14 @@ def test_unknown_names_and_missing_scales_are_said():
 
 def test_default_ranges_suit_the_parameter():
     rig = paper_rig()
-    angle = axis(rig, "angle", None)
+    angle = chart_axis(rig, "angle", None)
     assert (angle.low / deg, angle.high / deg) == pytest.approx((-80, 80))
-    b = axis(rig, "b", None)
+    b = chart_axis(rig, "b", None)
     edge = ss.boundary(rig, "b")[-1].value
     assert b.low < min(edge, 0.016)
     assert b.high > max(edge, 0.016)
     heavy = paper_rig(0.0).with_values({"slider.stiffness": 10 * GPa})
-    mass_axis = axis(heavy, "slider.mass", None)
+    mass_axis = chart_axis(heavy, "slider.mass", None)
     assert (mass_axis.low, mass_axis.log) == (0.0, False)
     assert mass_axis.high > ss.boundary(heavy, "slider.mass")[0].value
 

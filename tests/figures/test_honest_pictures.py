@@ -12,7 +12,7 @@ import steadyslip as ss
 from dimensionless import unit_rig
 from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
-from steadyslip.figures.map_axes import Scale, spaced_by_ratio
+from steadyslip.figures.map_axes import Scale, is_geometric
 from steadyslip.maps.view.cut import _quantiles, _with_failures
 
 
@@ -21,7 +21,7 @@ def test_axes_are_spaced_as_their_grid_is(ratio):
     """Also over less than two decades."""
     for spaced, log in ((np.geomspace, True), (np.linspace, False)):
         values = 3.0 * spaced(1.0, ratio, 7)
-        assert spaced_by_ratio(values) == log
+        assert is_geometric(values) == log
         assert Scale("slider.stiffness", "Pa/m", values).log == log
 
 

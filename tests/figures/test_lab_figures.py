@@ -14,7 +14,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.numerics.noise import autocorrelation, lag_one
 from steadyslip.figures.experiments import fits
-from steadyslip.figures.experiments.corners import region
+from steadyslip.figures.experiments.corners import density_level
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_a_long_name_and_few_samples_leave_a_readable_picture(record):
 
 
 def test_steps_that_are_not_drawn_are_counted(fit, monkeypatch):
-    monkeypatch.setattr(fits, "MOST_STEPS", 1)
+    monkeypatch.setattr(fits, "MAX_STEPS", 1)
     assert fit.plot("steps")[0, 0].get_xlabel().endswith("1 further step is not drawn")
 
 
@@ -122,7 +122,7 @@ def test_a_region_holds_its_share():
     x = np.linspace(-5, 5, 401)
     density = np.exp(-0.5 * (x[:, None] ** 2 + x**2))
     for share in (0.5, 0.68, 0.95):  # of the normal distribution of two: exp(-r²/2) at the radius that holds the share
-        assert region(density, share) == pytest.approx(1 - share, rel=0.01)
+        assert density_level(density, share) == pytest.approx(1 - share, rel=0.01)
 
 
 def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):

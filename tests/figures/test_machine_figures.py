@@ -87,15 +87,16 @@ def test_bars_are_the_stable_values():
 
 def test_what_bars_leave_out_is_said():
     """Every edge is drawn, or counted below the bars and named under the picture."""
-    from steadyslip.figures.machine_verdict import left_out
+    from steadyslip.figures.machine_verdict import undrawn_edges
 
     found = analysed("brake-pad")
     ax = figures.stable_ranges(found)
-    drawn = [one.parameter for one in found.margins if one.edge is not None and one.parameter not in left_out(found)]
+    left = undrawn_edges(found)
+    drawn = [one.parameter for one in found.margins if one.edge is not None and one.parameter not in left]
     assert len(ax.get_yticks()) == len(drawn)
-    assert f"{len(left_out(found))} more edges not drawn" in ax.get_xlabel()
+    assert f"{len(left)} more edges not drawn" in ax.get_xlabel()
     document = ss.report(found, explorer=False).html
-    assert f"the edge of {', '.join(left_out(found))}: a factor of 100 away or more" in document
+    assert f"the edge of {', '.join(undrawn_edges(found))}: a factor of 100 away or more" in document
 
 
 def test_the_leading_mode_and_the_eigenvalues_are_those_of_the_analysis():

@@ -19,7 +19,7 @@ from read_pages import words
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
 from steadyslip.explorer.sketch import sketch
-from steadyslip.figures.inline import drawn
+from steadyslip.figures.inline import figure_html
 from steadyslip.files.standalone import write_page
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.commands import Thresholds
@@ -230,7 +230,7 @@ def test_lists_of_cycles_leave_out_what_reads_the_same():
 
 
 def test_the_same_figure_is_the_same_text():
-    first, second = (drawn(lambda: Figure().add_subplot(), "an empty one") for _ in range(2))
+    first, second = (figure_html(lambda: Figure().add_subplot(), "an empty one") for _ in range(2))
     assert first.startswith("<svg")
     assert first == second
 

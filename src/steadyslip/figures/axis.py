@@ -1,4 +1,4 @@
-"""One axis of a chart: which parameter, over which range, linear or logarithmic, in which unit."""
+"""Axis of a stability chart: parameter, range, linear or logarithmic scale, display unit."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ import numpy as np
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.roles import Parameter
-from steadyslip.figures.style import display_unit, labelled
+from steadyslip.figures.style import axis_label, display_unit
 from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider
 
-_AROUND = 20.0  # a positive parameter is shown from its value (or edge) divided by this, to it times this
-_REACH = 1e3  # an edge further away than this factor is not worth the squeeze
-_MARGIN = 1 / 18  # of its domain left out at the excluded ends of an angle: 10 deg of 180
+_RANGE_FACTOR = 20.0  # default range of a positive parameter: lowest of value and edge / 20 to highest x 20 (by trial)
+_MAX_EDGE_RATIO = 1e3  # edges further from the value than this factor do not widen the default range (by trial)
+_EXCLUDED_END_MARGIN = 1 / 18  # share of a domain left out at each excluded end: 10 deg of 180 for an angle
 
 
 @dataclass(frozen=True)
 class ChartAxis:
-    """A parameter's range on a chart; all values SI except what is said to be `shown`.
+    """Axis of a stability chart for one parameter; values in SI units unless converted by `shown`.
 
     Attributes
     ----------
@@ -45,18 +45,18 @@ class ChartAxis:
     label: str
 
     def at(self, share: Any) -> Any:
-        """Value at a share (0 to 1) of the axis, as drawn."""
+        """SI value at a fraction (0 to 1) of the drawn length of the axis."""
         share = np.asarray(share, float)
         inner = self.low * (self.high / self.low) ** share if self.log else self.low + (self.high - self.low) * share
         return np.clip(inner, self.low, self.high)
 
     def shown(self, value: Any) -> Any:
-        """SI value to the number on the axis."""
+        """Convert an SI value to the display unit of the axis."""
         return value / self.factor
 
 
-def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> ChartAxis:
-    """The axis for a parameter of a rig, over the range given or one that suits the rig.
+def chart_axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> ChartAxis:
+    """Chart axis for a parameter of a rig, over the given range (SI numbers or text with units) or a default one.
 
     Raises
     ------
@@ -70,14 +70,15 @@ def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> ChartAxis:
     value = 0.0 if full == "slider.stiffness" and address.value is None else address.value
     if value is None:
         raise ParameterError([Problem(full, "cannot be drawn: the rig does not have it; give it a value first")])
-    low, high = _default_range(rig, full, address.role, value) if limits is None else _given(full, address.role, limits)
+    role = address.role
+    low, high = _default_range(rig, full, role, value) if limits is None else _checked_range(full, role, limits)
     log = low > 0 and high / low > 100
     typical = value if low <= value <= high and value else math.sqrt(low * high) if log else max(abs(low), abs(high))
-    factor, unit_name = display_unit(address.role.unit, typical, rig.area)
-    return ChartAxis(full, low, high, log, factor, labelled(full, unit_name))
+    factor, unit_name = display_unit(role.unit, typical, rig.area)
+    return ChartAxis(full, low, high, log, factor, axis_label(full, unit_name))
 
 
-def _given(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[float, float]:
+def _checked_range(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[float, float]:
     if isinstance(limits, str) or len(limits) != 2:
         raise ParameterError([Problem(name, f"range {limits!r}; allowed: two values, low and high")])
     low, high = (float(checked_array(name, role, end)) for end in limits)
@@ -87,10 +88,10 @@ def _given(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[float, fl
 
 
 def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tuple[float, float]:
-    """The domain of an angle or share; else around the rig's own value, with its nearest edge in view."""
+    """Default range (SI): all of a bounded domain, otherwise a range around the rig's value and the nearest edge."""
     domain = role.domain
     if np.isfinite(domain.high):
-        margin = _MARGIN * (domain.high - domain.low)
+        margin = _EXCLUDED_END_MARGIN * (domain.high - domain.low)
         return (
             domain.low if domain.low_allowed else domain.low + margin,
             domain.high if domain.high_allowed else domain.high - margin,
@@ -98,7 +99,7 @@ def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tup
     known = rig if rig.parameters()[name].value is not None else rig.with_values({name: value})
     edges = [edge.value for edge in boundary(known, name)]
     nearest = min(edges, key=lambda edge: abs(edge - value), default=value)
-    if value and not 1 / _REACH < abs(nearest / value) < _REACH:
+    if value and not 1 / _MAX_EDGE_RATIO < abs(nearest / value) < _MAX_EDGE_RATIO:
         nearest = value
     if nearest == value == 0:
         raise NotAvailable(f"{name} is zero and has no edge of stability, which leaves no scale; give its range")
@@ -108,4 +109,4 @@ def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tup
         return min(ends) - margin, max(ends) + margin
     if value == 0 or nearest == 0:
         return 0.0, 3 * max(value, nearest)
-    return min(value, nearest) / _AROUND, max(value, nearest) * _AROUND
+    return min(value, nearest) / _RANGE_FACTOR, max(value, nearest) * _RANGE_FACTOR

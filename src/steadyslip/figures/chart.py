@@ -1,4 +1,4 @@
-"""Where steady sliding is stable, in the plane of any two parameters."""
+"""Stability chart: regions of stable, unstable and no steady sliding in the plane of two parameters."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from matplotlib.path import Path
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures import regions
-from steadyslip.figures.axis import ChartAxis, axis
-from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
+from steadyslip.figures.axis import ChartAxis, chart_axis
+from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, add_legend_above, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence
 
-_SAMPLES = 12  # points at which the reason for no steady sliding is asked
+_SAMPLES = 12  # points at which the reason for no steady sliding is computed: time against missing a reason (by trial)
 
 
 def stability_chart(
@@ -60,7 +60,7 @@ def stability_chart(
     UnknownNameError, ParameterError, NotAvailable
         If a name or range is not allowed, or a range has to be given.
     """
-    first, second = axis(rig, x, x_range), axis(rig, y, y_range)
+    first, second = chart_axis(rig, x, x_range), chart_axis(rig, y, y_range)
     if first.name == second.name:
         raise ParameterError([Problem(first.name, "is on both axes; allowed: two different parameters")])
     if not isinstance(points, int) or points < 2:
@@ -72,27 +72,29 @@ def stability_chart(
     ax = axes_or_new(ax)
 
     def draw(code: int, label: str, **style: Any) -> bool:
-        path = regions.filled(lambda a, b: status(a, b) == code, points)
+        path = regions.region_path(lambda a, b: status(a, b) == code, points)
         if len(path):
-            ax.add_patch(PathPatch(_shown(path, first, second), label=label, linewidth=0, **style))
+            ax.add_patch(PathPatch(_display_path(path, first, second), label=label, linewidth=0, **style))
         return len(path) > 0
 
     draw(STABLE, "stable", facecolor=SKY, alpha=0.55)
     draw(UNSTABLE, "unstable", facecolor=ORANGE, alpha=0.45)
-    reasons = _reasons(rig, first, second, status, points)
+    reasons = _absence_reasons(rig, first, second, status, points)
     if draw(ABSENT, f"no steady sliding ({reasons})", facecolor="white", edgecolor=GREY, hatch="///"):
         gone = regions.edges(lambda a, b: status(a, b) == ABSENT, points)
-        ax.plot(*_line(gone, first, second), color=BLACK, linestyle="--", linewidth=1.5, label=f"edge: {reasons}")
+        ax.plot(
+            *_display_points(gone, first, second), color=BLACK, linestyle="--", linewidth=1.5, label=f"edge: {reasons}"
+        )
     line = regions.edges(lambda a, b: status(a, b) == STABLE, points, lambda a, b: status(a, b) != ABSENT)
     if np.isfinite(line).any():
-        ax.plot(*_line(line, first, second), color=BLACK, linewidth=2, label="edge of stability")
+        ax.plot(*_display_points(line, first, second), color=BLACK, linewidth=2, label="edge of stability")
     _mark_own(ax, rig, first, second)
-    _finish(ax, first, second)
+    _set_axes(ax, first, second)
     return ax
 
 
-def _reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) -> str:
-    """Lock-up, lift-off or both, asked at some of the points without steady sliding."""
+def _absence_reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) -> str:
+    """Reasons for no steady sliding (lock-up, lift-off), from up to `_SAMPLES` points of the chart without it."""
     share = np.linspace(0, 1, points)
     b, a = np.nonzero(status(*np.meshgrid(share, share)) == ABSENT)
     if not len(a):
@@ -102,16 +104,16 @@ def _reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) 
 
 
 def absence_reasons(rig: Slider | Machine, points: Sequence[dict[str, float]]) -> str:
-    """Why there is no steady sliding at some points, each kind of reason once."""
+    """Reasons for no steady sliding at the given points (parameter name to SI value), each once, comma-separated."""
     found = [explain_absence(rig.with_values(vary), operating_point(rig, vary)).condition for vary in points]
     return ", ".join(sorted(set(found)))
 
 
-def _shown(path: Path, x: ChartAxis, y: ChartAxis) -> Path:
-    return Path(np.column_stack(_line(path.vertices, x, y)), path.codes)
+def _display_path(path: Path, x: ChartAxis, y: ChartAxis) -> Path:
+    return Path(np.column_stack(_display_points(path.vertices, x, y)), path.codes)
 
 
-def _line(shares: Any, x: ChartAxis, y: ChartAxis) -> tuple[Any, Any]:
+def _display_points(shares: Any, x: ChartAxis, y: ChartAxis) -> tuple[Any, Any]:
     return x.shown(x.at(shares[:, 0])), y.shown(y.at(shares[:, 1]))
 
 
@@ -131,12 +133,11 @@ def _mark_own(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis) -> None:
         )
 
 
-def _finish(ax: Axes, x: ChartAxis, y: ChartAxis) -> None:
+def _set_axes(ax: Axes, x: ChartAxis, y: ChartAxis) -> None:
     ax.set_xscale("log" if x.log else "linear")
     ax.set_yscale("log" if y.log else "linear")
     ax.set_xlim(x.shown(x.low), x.shown(x.high))
     ax.set_ylim(y.shown(y.low), y.shown(y.high))
     ax.set_xlabel(x.label)
     ax.set_ylabel(y.label)
-    # above the axes, where it hides no region, with room for a power of ten on the axis
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.04), ncols=2, frameon=False, borderaxespad=0.2)
+    add_legend_above(ax)

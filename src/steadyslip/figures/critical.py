@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures import mass
-from steadyslip.figures.style import BLACK, CURVES, LINES, axes_or_new, labelled
+from steadyslip.figures.style import BLACK, CURVES, LINES, axes_or_new, axis_label
 from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider
 from steadyslip.units import deg
@@ -48,7 +48,7 @@ def critical_stiffness_against_mass(
     ParameterError
         If an angle is outside ±90 degrees or a mass is not positive.
     """
-    mass.slip_distance(rig)  # refuses rigs that have no such figure before anything is drawn
+    mass.slip_distance(rig)  # raises NotAvailable before anything is drawn
     angles = ANGLES if angles is None else [float(angle) for angle in angles]
     m_star = np.geomspace(1e-4, 0.2, 600) if m_star is None else np.unique(np.asarray(m_star, float))
     if m_star.size < 2 or not np.all(m_star > 0):
@@ -67,7 +67,7 @@ def critical_stiffness_against_mass(
         limit = mass.mass_of_no_stiffness(rig, angle)
         if m_star.min() < limit < m_star.max():
             ax.axvline(limit, color=style["color"], linestyle=":", linewidth=1.2, label="_m*_cr2")
-            _beside(ax, limit, f"$m_{{*cr2}}$, {angle / deg:.4g}°", style["color"])
+            _vertical_text(ax, limit, f"$m_{{*cr2}}$, {angle / deg:.4g}°", style["color"])
     ax.set(xscale="log", yscale="log", xlim=(m_star.min(), m_star.max()))
     ax.set_xlabel("dimensionless mass $m_* = m v_0^2 / (σ_{ss} d_c)$ (1)")
     ax.set_ylabel("dimensionless critical stiffness $κ_{cr} = k_{cr} d_c / σ_{ss}$ (1)")
@@ -77,8 +77,8 @@ def critical_stiffness_against_mass(
     return ax
 
 
-def _beside(ax: Axes, x: float, text: str, colour: str) -> None:
-    """Text along a vertical line, near the bottom where no curve passes."""
+def _vertical_text(ax: Axes, x: float, text: str, colour: str) -> None:
+    """Write text along the vertical line at `x`, near the bottom of the axes, below the curves."""
     ax.annotate(
         text,
         (x, 0.03),
@@ -94,7 +94,7 @@ def _beside(ax: Axes, x: float, text: str, colour: str) -> None:
 
 
 def _limit_height(ax: Axes, kappa: Any) -> None:
-    """Leave out most of the rise towards the asymptotes; nothing to do without curves."""
+    """Cut the y axis at 100 times the lowest value: the curves rise to infinity at m*_cr2."""
     present = kappa[np.isfinite(kappa)]
     if present.size:
         ax.set_ylim(present.min() / 2.5, present.min() * 100)
@@ -114,6 +114,6 @@ def _mark_crossing(ax: Axes, rig: Slider, angles: Sequence[float], m_star: Any) 
 def _lock_up_note(rig: Slider) -> str:
     edges = [e for e in boundary(rig, "contact.angle") if e.kind == "lock-up"]
     if not edges:
-        return labelled("spring angle", "deg")
+        return axis_label("spring angle", "deg")
     value = f"{edges[0].value / deg:.3f}°".replace("-", "−")
     return f"spring angle (lock-up at ψ ≤ {value})"

@@ -1,4 +1,4 @@
-"""Answers to what is done to a rig: gain and phase over the period (a Bode plot), verdicts along a slow change."""
+"""Frequency response (Bode plot) of a rig, and stability at each moment of a slow change."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.format import format_quantity
-from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, display_unit, labelled
+from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, axis_label, display_unit, new_panels
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import FrequencyResponse, FrozenVerdicts
 
-_MARKS = ("o", "s", "^", "D", "v")
+_MARKERS = ("o", "s", "^", "D", "v")
 
 
 def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
-    """Draw gain and phase of small amplitudes as lines, of large ones as marks, and the shift of the mean of those.
+    """Plot gain and phase over the period: linear response as lines, finite amplitudes as marks with their mean shift.
 
     Parameters
     ----------
     found : FrequencyResponse
     ax : sequence of matplotlib.axes.Axes, optional
-        For gain and phase, and for the shift of the mean where there are amplitudes.
+        Two, for gain and phase; a third for the shift of the mean if the response has finite amplitudes.
 
     Returns
     -------
@@ -31,16 +31,14 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
     """
     count = 3 if found.amplitudes.size else 2
     if ax is None:
-        from matplotlib import pyplot as plt
-
-        _, ax = plt.subplots(count, 1, figsize=(6.4, 2.3 * count), layout="constrained", sharex=True)
+        ax = new_panels(count, 1, (6.4, 2.3 * count), sharex=True)
     axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
     unit = "1" if found.units[0] == found.units[1] else f"{found.units[1]}/({found.units[0]})"
     for one, values, label in zip(axes, (found.gain, found.phase), ("small amplitudes", None), strict=False):
         one.plot(found.periods, values, color=BLACK, label=label)
     shifts = np.abs(found.shift[np.isfinite(found.shift)])
     factor, shift_unit = display_unit(found.units[1], float(np.max(shifts, initial=0.0)))
-    rows = zip(found.amplitudes, cycle((BLUE, VERMILION, GREEN, ORANGE)), cycle(_MARKS), strict=False)
+    rows = zip(found.amplitudes, cycle((BLUE, VERMILION, GREEN, ORANGE)), cycle(_MARKERS), strict=False)
     for j, (amplitude, colour, mark) in enumerate(rows):
         style = {"color": colour, "marker": mark, "linestyle": "none", "fillstyle": "none", "markersize": 5}
         for one, values in zip(axes, (found.gains[j], found.phases[j], found.shift[j] / factor), strict=True):
@@ -59,7 +57,7 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
     axes[0].set_ylabel(f"gain ({unit})")
     axes[1].set_ylabel("phase (deg)")
     if count == 3:
-        axes[2].set_ylabel(labelled("shift of the mean", shift_unit))
+        axes[2].set_ylabel(axis_label("shift of the mean", shift_unit))
     axes[-1].set_xlabel("period (s)")
     axes[0].set_title(f"{found.output.replace('_', ' ')} under {found.input.replace('_', ' ')}", fontsize="medium")
     axes[0].legend(fontsize="small")
@@ -67,22 +65,20 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
 
 
 def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
-    """Draw growth rate over time, unstable moments shaded, and the slip rate of the motion beneath.
+    """Plot growth rate over time, with unstable times hatched, and the slip rate of the motion in a second panel.
 
     Parameters
     ----------
     found : FrozenVerdicts
     ax : sequence of matplotlib.axes.Axes, optional
-        Two.
+        Two, for growth rate and slip rate.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes
     """
     if ax is None:
-        from matplotlib import pyplot as plt
-
-        _, ax = plt.subplots(2, 1, figsize=(6.4, 4.8), layout="constrained", sharex=True)
+        ax = new_panels(2, 1, (6.4, 4.8), sharex=True)
     axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
     factor, unit = display_unit("s", float(found.t[-1]))
     t = found.t / factor
@@ -101,6 +97,6 @@ def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
     axes[1].set_yscale("log")
     axes[0].set_ylabel("growth rate (1/s)")
     axes[1].set_ylabel("slip rate (m/s)")
-    axes[1].set_xlabel(labelled("time", unit))
+    axes[1].set_xlabel(axis_label("time", unit))
     axes[1].legend(fontsize="small")
     return axes

@@ -1,4 +1,4 @@
-"""Figures as text that stands inside a page."""
+"""Figures as HTML: inline SVG, or an <img> with a PNG where the SVG would be large."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from matplotlib import pyplot as plt, rc_context
 
 from steadyslip.core.errors import NotAvailable
 
-LARGEST = 90_000
-"""Characters of a drawing; one that is larger becomes pixels."""
-_LOOK: Any = {
+MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
+_SVG_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "steadyslip",
     "font.family": "sans-serif",
@@ -25,20 +24,20 @@ _LOOK: Any = {
 }
 
 
-def drawn(make: Callable[[], Any], words: str, width: float | None = None) -> str:
-    """What a figure draws, as SVG or, where that is large, as a picture; nothing where there is nothing to draw.
+def figure_html(make: Callable[[], Any], words: str, width: float | None = None) -> str:
+    """HTML of a figure: inline SVG, or an <img> with a PNG if the SVG is too long; empty if nothing can be drawn.
 
     Parameters
     ----------
     make : callable
         Returns the Axes, or an array of them.
     words : str
-        What it shows, for those who cannot see it.
+        Text alternative for screen readers.
     width : float, optional
-        Inches.
+        Width of the figure in inches; the height is scaled with it.
     """
     known = set(plt.get_fignums())
-    with rc_context(_LOOK):
+    with rc_context(_SVG_STYLE):
         try:
             axes = make()
             found = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
@@ -47,9 +46,9 @@ def drawn(make: Callable[[], Any], words: str, width: float | None = None) -> st
             text = io.StringIO()
             found.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
             svg = text.getvalue()
-            if len(svg) <= LARGEST:
-                return _inline(svg[svg.index("<svg") :], words)
-            data = _pixels(found)
+            if len(svg) <= MAX_SVG_LENGTH:
+                return _page_svg(svg[svg.index("<svg") :], words)
+            data = _png_base64(found)
         except (NotAvailable, ValueError):
             return ""
         finally:
@@ -58,8 +57,8 @@ def drawn(make: Callable[[], Any], words: str, width: float | None = None) -> st
     return f'<img alt="{html.escape(words)}" src="data:image/png;base64,{data}">'
 
 
-def _pixels(found: Any) -> str:
-    """A figure as a picture of few colours, in letters."""
+def _png_base64(found: Any) -> str:
+    """Base64 text of a figure as PNG with a palette of 48 colours, 100 dots per inch."""
     from PIL import Image
 
     many, few = io.BytesIO(), io.BytesIO()
@@ -68,8 +67,8 @@ def _pixels(found: Any) -> str:
     return base64.b64encode(few.getvalue()).decode()
 
 
-def _inline(svg: str, words: str) -> str:
-    """An SVG without what only files need; its names are made its own, as several drawings share a document."""
+def _page_svg(svg: str, words: str) -> str:
+    """SVG for use inside HTML: no metadata or comments, ids made unique to the figure, sizes in CSS pixels."""
     svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.S)
     svg = re.sub(r"<!--.*?-->\s*", "", svg, flags=re.S)
     svg = re.sub(r'<g id="[\w.-]+">', "<g>", svg)
@@ -77,5 +76,5 @@ def _inline(svg: str, words: str) -> str:
     svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{own}", svg)
     svg = re.sub(r'\s(?:width|height)="[\d.]+pt"', "", svg, count=2)
     size = re.search(r'viewBox="0 0 ([\d.]+)', svg)
-    wide = f'style="width: {float(size[1]) * 4 / 3:.0f}px"' if size else ""
-    return svg.replace("<svg", f'<svg role="img" aria-label="{html.escape(words)}" {wide}', 1)
+    width = f'style="width: {float(size[1]) * 4 / 3:.0f}px"' if size else ""
+    return svg.replace("<svg", f'<svg role="img" aria-label="{html.escape(words)}" {width}', 1)

@@ -1,4 +1,4 @@
-"""How the eigenvalues move in the complex plane as the stiffness changes."""
+"""Root locus: eigenvalues in the complex plane as the stiffness or a controller gain varies."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from matplotlib.colors import LogNorm
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.figures.style import BLACK, VERMILION, axes_or_new, display_unit, labelled
+from steadyslip.figures.style import BLACK, VERMILION, add_legend_above, axes_or_new, axis_label, display_unit
 from steadyslip.linear import eigenvalues, stable_stiffness, stable_values
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
-_HALF_SPAN = 1e2  # two decades to each side
-_VIEW = 3.0  # half the width of the view in sizes of the eigenvalues that decide stability
-_FAST = 1e3  # an eigenvalue faster than the slowest by more would leave the others on one spot
+_RANGE_FACTOR = 1e2  # default range of stiffness: two decades to each side of its centre
+_VIEW_FACTOR = (
+    3.0  # half the width of the view over the largest |s| of the eigenvalues that decide stability (by trial)
+)
+_FAST_RATIO = 1e3  # decaying eigenvalues with |s| above this times the lowest |s| are left out of view (by trial)
 
 
 def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Axes:
@@ -57,8 +59,8 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     own = spring or gain
     k = _stiffnesses(rig, along, own, ends, stiffness)
     roots = eigenvalues(rig, {along: k})
-    mine = eigenvalues(rig)
-    mine = mine[np.isfinite(mine)]
+    own_roots = eigenvalues(rig)
+    own_roots = own_roots[np.isfinite(own_roots)]
     edges, crossings = _crossings(rig, along, ends, k)
 
     ax = axes_or_new(ax)
@@ -72,27 +74,27 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     )
     figure = ax.get_figure()
     if figure is not None:
-        figure.colorbar(points, ax=ax, label=labelled(along, unit_name))
+        figure.colorbar(points, ax=ax, label=axis_label(along, unit_name))
     for edge, at in zip(edges, crossings, strict=True):
-        style: dict[str, Any] = {
-            "marker": "D",
-            "color": "white",
-            "markeredgecolor": BLACK,
-            "markersize": 8,
-            "linestyle": "none",
-        }
         what = f"gain {along.rpartition('.')[2]}" if along == name else "stiffness"
         label = f"critical {what} {edge / factor:.4g} {unit_name}"
-        ax.plot(at.real, at.imag, label=label, zorder=3, **style)
-    _set_view(ax, roots, mine, crossings)
+        ax.plot(at.real, at.imag, "D", color="white", markeredgecolor=BLACK, markersize=8, zorder=3, label=label)
+    _set_view(ax, roots, own_roots, crossings)
     ax.plot(
-        mine.real, mine.imag, "o", color=VERMILION, markeredgecolor=BLACK, markersize=7, zorder=4, label=_own(ax, mine)
+        own_roots.real,
+        own_roots.imag,
+        "o",
+        color=VERMILION,
+        markeredgecolor=BLACK,
+        markersize=7,
+        zorder=4,
+        label=_own_label(ax, own_roots),
     )
     ax.set_xlabel("growth rate Re s (1/s)")
     ax.ticklabel_format(style="sci", scilimits=(-3, 4))
     ax.locator_params(axis="x", nbins=6)
     ax.set_ylabel("angular frequency Im s (rad/s)")
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.04), frameon=False, borderaxespad=0.2)
+    add_legend_above(ax, 1)
     return ax
 
 
@@ -106,47 +108,49 @@ def _stiffnesses(rig: Slider, along: str, own: float, ends: Any, given: Any) -> 
     centre = edges[np.argmin(np.abs(edges - own))] if edges.size else own
     if not centre:
         raise NotAvailable("the rig has no critical stiffness and its own is zero; pass stiffness, an array in Pa/m")
-    return np.geomspace(centre / _HALF_SPAN, centre * _HALF_SPAN, 801)
+    return np.geomspace(centre / _RANGE_FACTOR, centre * _RANGE_FACTOR, 801)
 
 
 def _crossings(rig: Slider, along: str, ends: Any, k: Any) -> tuple[list[float], list[Any]]:
-    """Ends of the stable intervals in the range, and the eigenvalues on the imaginary axis there."""
+    """Ends of the stable intervals within the range `k` (Pa/m), and the eigenvalues on the imaginary axis at each."""
     edges, crossings = [], []
     for edge in np.unique(ends[(ends >= k[0]) & (ends <= k[-1])]):
         found = eigenvalues(rig, {along: edge})
         found = found[np.isfinite(found)]
         nearest = found[np.argmin(np.abs(found.real))]
-        if abs(nearest.real) > 1e-6 * np.abs(found).max():  # ill-posed: the root crosses at infinity
+        if (
+            abs(nearest.real) > 1e-6 * np.abs(found).max()
+        ):  # no root near the axis: at the limit of well-posedness it crosses at infinity
             continue
         edges.append(float(edge))
         crossings.append(np.unique([nearest, nearest.conjugate()]))
     return edges, crossings
 
 
-def _set_view(ax: Axes, roots: Any, mine: Any, crossings: list[Any]) -> None:
-    """Limits around the origin and what decides stability: the crossings and the slowest eigenvalue.
+def _set_view(ax: Axes, roots: Any, own_roots: Any, crossings: list[Any]) -> None:
+    """Set axis limits that include the origin, the crossings of the imaginary axis and the slowest eigenvalue.
 
-    Without a crossing, around all eigenvalues of the rig that grow or are not far faster than its slowest.
+    Without a crossing, include all growing eigenvalues, and those with a size within `_FAST_RATIO` of the lowest.
     """
-    own = np.abs(mine)
+    own = np.abs(own_roots)
     if crossings:
-        size = _VIEW * max(own[0], *(abs(at[0]) for at in crossings))
+        size = _VIEW_FACTOR * max(own[0], *(abs(at[0]) for at in crossings))
     else:
         slowest = own[own > 0].min(initial=np.inf)
-        size = 1.3 * own[(own <= _FAST * slowest) | (mine.real > 0)].max() or 1.0
+        size = 1.3 * own[(own <= _FAST_RATIO * slowest) | (own_roots.real > 0)].max() or 1.0
     seen = roots.real[np.abs(roots) < size]
     ax.set_xlim(-size, min(size, max(1.2 * seen.max(initial=0.0), 0.25 * size)))
     ax.set_ylim(-size, size)
 
 
-def _own(ax: Axes, mine: Any) -> str:
-    """Legend text of the rig's own eigenvalues, naming those out of view."""
+def _own_label(ax: Axes, own_roots: Any) -> str:
+    """Legend text of the rig's own eigenvalues, with the values of those out of view."""
     (left, right), top = ax.get_xlim(), ax.get_ylim()[1]
-    outside = mine[(mine.real < left) | (mine.real > right) | (np.abs(mine.imag) > top)]
+    outside = own_roots[(own_roots.real < left) | (own_roots.real > right) | (np.abs(own_roots.imag) > top)]
     if not outside.size:
         return "this rig"
-    return "this rig; out of view: " + ", ".join(_number(s) for s in outside if s.imag >= 0) + " 1/s"
+    return "this rig; out of view: " + ", ".join(_format_complex(s) for s in outside if s.imag >= 0) + " 1/s"
 
 
-def _number(s: complex) -> str:
+def _format_complex(s: complex) -> str:
     return (f"{s.real:.3g}" + (f" ± {s.imag:.3g}i" if s.imag else "")).replace("-", "−")

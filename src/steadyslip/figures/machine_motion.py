@@ -1,4 +1,4 @@
-"""Simulated motion of machines: what every contact does in time, in the units of its user."""
+"""Figures of simulated motion of machines: contact histories and friction force against slip rate."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from steadyslip.figures.style import (
     PURPLE,
     SKY,
     VERMILION,
-    arrows,
+    add_arrowheads,
+    add_legend_above,
     axes_or_new,
+    axis_label,
     display_unit,
-    labelled,
 )
 from steadyslip.machine.machine import Machine
 from steadyslip.model.sliding import steady_contact_at
@@ -31,17 +32,17 @@ from steadyslip.protocol.protocol import LOAD_POINT
 if TYPE_CHECKING:
     from steadyslip.motion import History
 
-_CONTACTS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # told apart where lines cross
-_SPANS = 40  # slip events are shaded only if they are fewer than this
-_LEAST_BAND = 4e-3  # share of the time shown: shorter slip events are drawn so wide, to be seen at all
-_STEADY = 1e-3  # of the size of a velocity: changes below are drawn as none
-_WIDE = 3.0  # highest over lowest slip rate beyond which they are drawn by their logarithm
-_SLOWEST = 1e-3  # of the highest slip rate is where the line of steady states begins
-_FASTEST = 1e12  # times as fast as in steady sliding is out of the picture
+_CONTACTS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # line colours, in the order of the contacts
+MAX_SHADED_EVENTS = 40  # slip events are shaded if they are fewer: more would run into each other (by trial)
+MIN_BAND_SHARE = 4e-3  # least width of a shaded slip event, as share of the time axis: about two pixels
+_MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
+_LOG_RATIO = 3.0  # highest over lowest slip rate above which the axis is logarithmic (by trial)
+_MIN_STEADY_RATIO = 1e-3  # least slip rate of the line of steady states over the highest of the run
+_MAX_SPEED_RATIO = 1e12  # slip rates above this times the steady one (a blow-up) are not drawn
 
 
 def history(run: History, panels: np.ndarray) -> np.ndarray:
-    """Slip rate, friction and normal force of every contact, one panel each; slip events in the contact's colour."""
+    """Plot slip rate, friction and normal force of every contact in three panels, slip events shaded; return these."""
     names = list(run.rig.contacts)  # type: ignore[union-attr]
     colors = {name: _CONTACTS[i % len(_CONTACTS)] for i, name in enumerate(names)}
     factor, unit = display_unit("s", float(run.end) or 1.0)
@@ -56,15 +57,13 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
             panel.set_yscale("log")
         for name in names:
             panel.plot(time, values[name] / scale, color=colors[name], linewidth=1, label=name)
-        panel.set_ylabel(labelled(label, own_unit))
-        _plain(panel, largest / scale)
+        panel.set_ylabel(axis_label(label, own_unit))
+        _limit_zoom(panel, largest / scale)
         panel.grid(color=GREY, linewidth=0.3)
-    let_go(run, panels, factor)
-    _shade(run, panels, colors, factor)
-    panels[-1].set_xlabel(labelled("time", unit))
-    panels[0].legend(
-        loc="lower left", bbox_to_anchor=(0, 1.0), ncols=4, frameon=False, fontsize="small", borderaxespad=0.2
-    )
+    shade_let_go(run, panels, factor)
+    _shade_slip_events(run, panels, colors, factor)
+    panels[-1].set_xlabel(axis_label("time", unit))
+    add_legend_above(panels[0], 4, 1.0, fontsize="small")
     if run.status != "done":
         where = f" ({run.contact})" if run.contact else ""
         title = f"{run.status}{where} at {format_quantity(run.end, 's')}"
@@ -75,32 +74,32 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
 def phase_plane(
     run: History, rig: Machine, ax: Axes | None, label: str, color: str, contact: str | None
 ) -> Axes:  # fmt: skip
-    """Friction force against slip rate at a contact, with the line of steady states and a dot at the last.
+    """Plot friction force against slip rate at a contact, with the line of steady states and a dot at the last one.
 
-    Slip rates are drawn by their logarithm where they span more than a factor of three and never turn round.
+    The slip-rate axis is logarithmic if slip rates are positive and span more than a factor of three.
     """
-    name = contact or _moving_most(run, rig)
+    name = contact or _most_varying_contact(run, rig)
     ax, rate, force = axes_or_new(ax), run[f"{name}.slip_rate"], run[f"{name}.friction_force"]
     steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))
     own = abs(float(steady["slip_rate"][0]))
     scale, unit = display_unit("m/s", own)
     factor, force_unit = display_unit("N", float(np.nanmax(np.abs(force), initial=0.0)) or 1.0)
-    shown_rate = np.where(np.abs(rate) < own * _FASTEST, rate, np.nan) / scale  # a blow-up leaves the picture
+    shown_rate = np.where(np.abs(rate) < own * _MAX_SPEED_RATIO, rate, np.nan) / scale  # NaN: not drawn
     ax.plot(shown_rate, force / factor, color=color, label=label or None, linewidth=1)
     low, high = float(np.nanmin(shown_rate)), float(np.nanmax(shown_rate))
-    logarithmic = low > 0 and high > _WIDE * low
-    if ax.get_xlabel():  # beside another run, on its axes
-        arrows(ax, shown_rate, force / factor, color)
+    logarithmic = low > 0 and high > _LOG_RATIO * low
+    if ax.get_xlabel():  # Axes of another run: keep their scales and labels
+        add_arrowheads(ax, shown_rate, force / factor, color)
         return ax
     if logarithmic:
         ax.set_xscale("log")
-    if abs(high - low) < _STEADY * max(abs(high), abs(low)):
-        ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # change that is only rounding is drawn as none
+    if abs(high - low) < _MIN_SPAN * max(abs(high), abs(low)):
+        ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # otherwise rounding would fill the panel
     else:
-        arrows(ax, shown_rate, force / factor, color)
+        add_arrowheads(ax, shown_rate, force / factor, color)
     beside = shown_rate * scale / steady["slip_rate"][0]
     fastest = max(float(np.nanmax(beside)), 1.0)
-    slowest = min(max(float(np.nanmin(beside)), _SLOWEST * fastest), 1.0)
+    slowest = min(max(float(np.nanmin(beside)), _MIN_STEADY_RATIO * fastest), 1.0)
     speeds = rig.drive.velocity * np.geomspace(0.9 * slowest, 1.1 * fastest, 81)
     line = steady_contact_at(rig, name, speeds)
     pressed = any(piece.channel != LOAD_POINT for piece in Protocol.of(run.protocol).pieces)
@@ -110,37 +109,37 @@ def phase_plane(
         dot = steady_contact_at(rig, name, np.array([last]))
         ax.plot(dot["slip_rate"] / scale, dot["friction_force"] / factor, "o", color=BLACK, markersize=4,
                 label="_steady sliding")  # fmt: skip
-    ax.set_xlabel(labelled(f"slip rate at {name}", unit))
-    ax.set_ylabel(labelled(f"friction force at {name}", force_unit))
+    ax.set_xlabel(axis_label(f"slip rate at {name}", unit))
+    ax.set_ylabel(axis_label(f"friction force at {name}", force_unit))
     ax.grid(color=GREY, linewidth=0.3)
     ax.legend(fontsize="small")
     return ax
 
 
-def _moving_most(run: History, rig: Machine) -> str:
-    """The contact whose slip rate goes through most, beside that of steady sliding; the first of equals."""
+def _most_varying_contact(run: History, rig: Machine) -> str:
+    """Name of the contact whose arcsinh(slip rate / steady slip rate) spans most; the first of equals."""
 
-    def passed(name: str) -> float:
+    def span(name: str) -> float:
         steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))["slip_rate"][0]
         change = np.ptp(np.arcsinh(run[f"{name}.slip_rate"] / steady))
         return round(float(np.nan_to_num(change)), 6)
 
-    return str(max(rig.contacts, key=passed))
+    return str(max(rig.contacts, key=span))
 
 
-def _plain(panel: Axes, size: float) -> None:
-    """Ticks written out, and no change that is only rounding."""
+def _limit_zoom(panel: Axes, size: float) -> None:
+    """Keep a linear y axis at least `_MIN_SPAN` times `size` high, so that rounding is not enlarged; no tick offset."""
     if panel.get_yscale() != "linear":
         return
     panel.ticklabel_format(axis="y", useOffset=False)
     low, high = panel.get_ylim()
-    if high - low < _STEADY * size:
+    if high - low < _MIN_SPAN * size:
         middle = 0.5 * (low + high)
-        panel.set_ylim(middle - 0.5 * _STEADY * size, middle + 0.5 * _STEADY * size)
+        panel.set_ylim(middle - 0.5 * _MIN_SPAN * size, middle + 0.5 * _MIN_SPAN * size)
 
 
-def let_go(run: History, panels: np.ndarray, factor: float) -> None:
-    """Shade the times in which the drive pulls with a force of its own, where it moves in others."""
+def shade_let_go(run: History, panels: np.ndarray, factor: float) -> None:
+    """Shade the times at which the load point is let go and moves freely; `factor` is the unit of time in s."""
     if "creep" not in run.data or not len(run["t"]):
         return
     free = np.concatenate([[False], run["creep"] > 0, [False]])
@@ -152,16 +151,16 @@ def let_go(run: History, panels: np.ndarray, factor: float) -> None:
     panels[0].fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="drive let go")
 
 
-def _shade(run: History, panels: np.ndarray, colors: dict[str, Any], factor: float) -> None:
+def _shade_slip_events(run: History, panels: np.ndarray, colors: dict[str, Any], factor: float) -> None:
     slips = [one for one in run.slip_events if isinstance(one, ContactSlip)]
-    narrowest = _LEAST_BAND * run.end
+    narrowest = MIN_BAND_SHARE * run.end
     for panel in panels:
-        for one in slips if len(slips) < _SPANS else ():
+        for one in slips if len(slips) < MAX_SHADED_EVENTS else ():
             wider = max(0.5 * (narrowest - one.duration), 0.0)
             begin, end = (one.begin - wider) / factor, (one.end + wider) / factor
             panel.axvspan(begin, end, color=colors[one.contact], alpha=0.12, linewidth=0)
         if run.status != "done":
             panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
     if slips:
-        shaded = "shaded" if len(slips) < _SPANS else "too many to shade"
+        shaded = "shaded" if len(slips) < MAX_SHADED_EVENTS else "too many to shade"
         panels[0].plot([], [], " ", color=BLACK, label=f"{len(slips)} slip events ({shaded})")

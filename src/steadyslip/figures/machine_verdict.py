@@ -1,4 +1,4 @@
-"""The verdict on a machine as pictures: its eigenvalues, its leading mode body by body, and where it is stable."""
+"""Figures of the verdict on a machine: stable range of each parameter, leading mode, eigenvalues."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import MachineAnalysis
 
-_SPAN = 100.0  # factor to each side of a value over which its stable range is drawn
-_MOST = 24  # parameters at most
+_SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
+_MAX_PARAMETERS = 24  # rows of `stable_ranges`, so that the figure fits on a page (by trial)
 
 
 def machine_verdict(found: MachineAnalysis) -> np.ndarray:
-    """Stable ranges, mode and eigenvalues side by side.
+    """Plot stable ranges, leading mode and eigenvalues side by side.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes
-        Those of `stable_ranges`, `mode_shape` and `eigenvalue_plane`; the first alone without steady sliding.
+        Axes of `stable_ranges`, `mode_shape` and `eigenvalue_plane`; the first alone without steady sliding.
     """
     from matplotlib import pyplot as plt
 
-    rows = max(len(_shown(found)), 4)
+    rows = max(len(_drawn_margins(found)), 4)
     if found.mode is None:
         return np.array([stable_ranges(found, axes_or_new(None, 1.4 + 0.32 * rows))])
     figure = plt.figure(figsize=(9.6, 1.6 + 0.34 * rows), layout="constrained")
@@ -42,56 +42,66 @@ def machine_verdict(found: MachineAnalysis) -> np.ndarray:
 
 
 def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
-    """Where the machine is stable in each parameter, the others unchanged, as bars over the value in units of its own.
+    """Plot the stable range of each parameter, the others held, as a bar over the parameter divided by its own value.
 
-    Only positive parameters with an edge up to a factor of 100 away are drawn, the nearest first. Numbers are those of
-    the nearest edge.
+    Only positive parameters with an edge within a factor of 100 are drawn, nearest edge first; the text is the value at
+    that edge.
 
     Raises
     ------
     NotAvailable
         If no parameter has an edge.
     """
-    margins = _shown(found)
+    margins = _drawn_margins(found)
     if not margins:
         raise NotAvailable("no parameter of this machine has an edge that could be drawn")
     ax = axes_or_new(ax, 1.4 + 0.32 * len(margins))
     for row, margin in enumerate(margins):
-        known = max(margin.searched[0] / margin.value, 1 / _SPAN), min(margin.searched[1] / margin.value, _SPAN)
+        known = (
+            max(margin.searched[0] / margin.value, 1 / _SPAN_FACTOR),
+            min(margin.searched[1] / margin.value, _SPAN_FACTOR),
+        )
         ax.barh(row, known[1] - known[0], left=known[0], height=0.62, color="white", edgecolor=GREY, hatch="////",
                 linewidth=0.6, label="_unstable")  # fmt: skip
-        for low, high in _stable(margin):
+        for low, high in _stable_intervals(margin):
             a, b = max(low / margin.value, known[0]), min(high / margin.value, known[1])
             if a < b:
                 ax.barh(row, b - a, left=a, height=0.62, color=SKY, edgecolor=BLACK, linewidth=0.6, label="_stable")
         _edge_text(found, ax, row, margin)
     ax.axvline(1.0, color=VERMILION, linewidth=2)
     ax.set_xscale("log")
-    ax.set_xlim(1 / _SPAN, _SPAN)
+    ax.set_xlim(1 / _SPAN_FACTOR, _SPAN_FACTOR)
     ax.set_xticks([0.01, 0.1, 1, 10, 100], ["1/100", "1/10", "as it is", "× 10", "× 100"])
-    ax.set_yticks(range(len(margins)), [_label(margin.parameter) for margin in margins])
-    ax.set_ylim(len(margins) - 0.45, -0.55)
-    ax.tick_params(axis="y", length=0)
-    for side in ("top", "right", "left"):
-        ax.spines[side].set_visible(False)
-    left = len(left_out(found))
+    _label_rows(ax, [_label(margin.parameter) for margin in margins])
+    left = len(undrawn_edges(found))
     more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
     ax.set_xlabel(f"value over its own; blue: stable, hatched: unstable or none{more}")
     return ax
 
 
-def _shown(found: MachineAnalysis) -> list[Margin]:
-    return [m for m in found.margins if m.edge is not None and m.value > 0 and _in_view(m.edge.value / m.value)][:_MOST]
+def _drawn_margins(found: MachineAnalysis) -> list[Margin]:
+    return [m for m in found.margins if m.edge is not None and m.value > 0 and _in_view(m.edge.value / m.value)][
+        :_MAX_PARAMETERS
+    ]
 
 
-def left_out(found: MachineAnalysis) -> list[str]:
-    """Parameters with an edge that `stable_ranges` does not draw: a factor of 100 away or more, or not positive."""
-    drawn = {one.parameter for one in _shown(found)}
+def undrawn_edges(found: MachineAnalysis) -> list[str]:
+    """Names of parameters with an edge that `stable_ranges` does not draw: too far away, too many, or not positive."""
+    drawn = {one.parameter for one in _drawn_margins(found)}
     return [one.parameter for one in found.margins if one.edge is not None and one.parameter not in drawn]
 
 
 def _in_view(ratio: float) -> bool:
-    return 1 / _SPAN < ratio < _SPAN
+    return 1 / _SPAN_FACTOR < ratio < _SPAN_FACTOR
+
+
+def _label_rows(ax: Axes, labels: list[str]) -> None:
+    """Label the rows of a horizontal bar chart, first row at the top, without ticks and frame."""
+    ax.set_yticks(range(len(labels)), labels)
+    ax.set_ylim(len(labels) - 0.45, -0.55)
+    ax.tick_params(axis="y", length=0)
+    for side in ("top", "right", "left"):
+        ax.spines[side].set_visible(False)
 
 
 def _label(name: str) -> str:
@@ -99,8 +109,8 @@ def _label(name: str) -> str:
     return ".".join(parts[1:]) if parts[0] in ("bodies", "links", "contacts") else name
 
 
-def _stable(margin: Margin) -> list[tuple[float, float]]:
-    """Stable intervals between the edges of a parameter, of which there is one at least."""
+def _stable_intervals(margin: Margin) -> list[tuple[float, float]]:
+    """Stable intervals (low, high) of a parameter with at least one edge, SI units."""
     edges = sorted(margin.edges, key=lambda edge: edge.value)
     ends = [0.0, *(edge.value for edge in edges), math.inf]
     stable = [edges[0].stable == "below"]
@@ -114,7 +124,9 @@ def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> No
         return
     text = typeset(format_quantity(edge.value, margin.unit, area=found.rig.area_of(margin.parameter)))
     ratio = edge.value / margin.value
-    left = 1 / _SPAN**0.75 < ratio < 1 or ratio > _SPAN**0.75  # on the side that has room
+    left = (
+        1 / _SPAN_FACTOR**0.75 < ratio < 1 or ratio > _SPAN_FACTOR**0.75
+    )  # text on the side of the edge with more room
     ax.annotate(
         text, (ratio, row), xytext=(-3 if left else 3, 0), textcoords="offset points", ha="right" if left else "left",
         va="center", fontsize=7.5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85},
@@ -122,10 +134,10 @@ def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> No
 
 
 def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
-    """How far every body moves in the leading mode, and where the energy is.
+    """Plot the amplitude of every body in the leading mode, and the largest shares of its energy.
 
-    Bars: amplitudes as shares of the largest, against the rigid motion of the machine; those of bodies that move the
-    other way point to the left. Orange: shares of energy.
+    Blue bars: amplitudes over the largest one, each relative to the rigid motion of the machine; bars of bodies in
+    opposite phase point to the left. Orange bars: shares of energy.
 
     Raises
     ------
@@ -152,12 +164,8 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     labels = [name.replace(NORMAL, " (normal)") for name in names]
     labels += [f"energy in {name.partition('.')[2]}" for name in energy]
     ax.axvline(0.0, color=BLACK, linewidth=1)
-    ax.set_yticks(range(len(labels)), labels)
-    ax.set_ylim(len(labels) - 0.45, -0.55)
+    _label_rows(ax, labels)
     ax.set_xlim(-1.1, 1.1)
-    ax.tick_params(axis="y", length=0)
-    for side in ("top", "right", "left"):
-        ax.spines[side].set_visible(False)
     does = "grows" if mode.eigenvalue.real > 0 else "decays"
     kind = (
         f"period {format_quantity(2 * math.pi / abs(mode.eigenvalue.imag), 's')}"
@@ -170,7 +178,7 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
 
 
 def eigenvalue_plane(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
-    """Eigenvalues in the complex plane, which fast and slow ones share: sizes are logarithmic beyond the slowest.
+    """Plot eigenvalues in the complex plane, on axes that are logarithmic beyond the smallest part and linear within.
 
     Raises
     ------
@@ -208,7 +216,7 @@ def eigenvalue_plane(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
 
 
 def _few_ticks(axis: Any, low: float, high: float, least: float) -> None:
-    """Zero and two powers of ten to each side."""
+    """Set ticks at zero and at up to two powers of ten to each side, none below `least`; no minor ticks."""
     ticks = [0.0]
     for end in (low, high):
         top = math.floor(math.log10(abs(end)))

@@ -1,4 +1,4 @@
-"""A machine as a sketch on paper; `steadyslip.machine.drawing` says what is drawn."""
+"""Sketch of a machine in Matplotlib; `steadyslip.machine.drawing` decides what is drawn where."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from steadyslip.machine.drawing import DRIVEN, FORCED, INK, LONG, PALE, Drawing,
 from steadyslip.machine.machine import Machine
 
 COLORS = {INK: BLACK, PALE: "#777777", DRIVEN: BLUE, FORCED: VERMILION}
-BODY = "#DDE3EA"
-LARGE, SMALL = 9.0, 7.5
-_INCH = 0.78  # of the picture for one unit
+BODY_COLOUR = "#DDE3EA"
+LARGE, SMALL = 9.0, 7.5  # font sizes in points
+_INCHES_PER_UNIT = 0.78  # inches of the figure for one unit of the sketch: texts of 7.5 points fit (by trial)
 
 
 def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
-    """The sketch of a machine.
+    """Draw a sketch of a machine.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         Motion is to the right. Boxes slide, circles turn; zigzags are springs, pistons dashpots; hatched is the ground.
-        Solid blue is what the drive does, dashed blue what it measures, red are constant forces.
+        Solid blue: action of the drive; dashed blue: its sensors; red: constant forces.
     """
     pencil = AxesPencil(axes_or_new(ax))
     Drawing(machine, pencil).draw()
@@ -45,14 +45,14 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
         (left, right), (low, high) = own.get_xlim(), own.get_ylim()
         figure = own.get_figure(root=True)
         if figure is not None:
-            figure.set_size_inches(_INCH * (right - left), _INCH * (high - low))
+            figure.set_size_inches(_INCHES_PER_UNIT * (right - left), _INCHES_PER_UNIT * (high - low))
             figure.set_layout_engine(None)
             own.set_position((0, 0, 1, 1))
     return own
 
 
 class AxesPencil(Pencil):
-    """Draws on Axes whose limits grow with what is drawn."""
+    """Pencil that draws on Axes and widens their data limits."""
 
     def __init__(self, ax: Axes) -> None:
         self.ax = ax
@@ -85,11 +85,11 @@ class AxesPencil(Pencil):
         self.ax.update_datalim([start, end])
 
     def block(self, name: str, x: float, y: float, wide: float, high: float, text: str) -> None:
-        self.ax.add_patch(Rectangle((x, y), wide, high, facecolor=BODY, edgecolor=BLACK, linewidth=1.4))
+        self.ax.add_patch(Rectangle((x, y), wide, high, facecolor=BODY_COLOUR, edgecolor=BLACK, linewidth=1.4))
         self.words(x + wide / 2, y + high / 2, text, large=len(name) < LONG)
 
     def wheel(self, name: str, x: float, y: float, radius: float, text: str) -> None:
-        self.ax.add_patch(Circle((x, y), radius, facecolor=BODY, edgecolor=BLACK, linewidth=1.4))
+        self.ax.add_patch(Circle((x, y), radius, facecolor=BODY_COLOUR, edgecolor=BLACK, linewidth=1.4))
         self.words(x, y, text, large=len(name) < LONG)
 
     def rough(self, corners: list[Point]) -> None:

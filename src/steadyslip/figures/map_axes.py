@@ -1,4 +1,4 @@
-"""What pictures of maps share: axes in units for people, the result that is shown, the legend."""
+"""Helpers for figures of maps: axes in display units, choice of the result to draw, legends."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from steadyslip.figures.style import (
     SKY,
     VERMILION,
     YELLOW,
+    add_legend_above,
+    axis_label,
     display_unit,
-    labelled,
 )
 from steadyslip.maps.view.cut import FAILING, View
 from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
-MANY = 100.0  # ratio from which on an axis or colour scale is logarithmic
+LOG_RATIO = 100.0  # highest over lowest value from which on a scale is logarithmic: two decades
 OUT_OF_RANGE = "numbers out of the range of floating point"
 KIND_COLOURS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
 
 
-def short(name: str) -> str:
-    """The last part of a dotted name, in words; behind the name of the body, link or contact that it is of."""
+def short_name(name: str) -> str:
+    """Last part of a dotted name with spaces for underscores, after the name of its body, link or contact if any."""
     *before, last = name.split(".")
     if before[:1] and before[0] in ("bodies", "links", "contacts"):
         before = before[1:2]
@@ -42,14 +43,14 @@ def short(name: str) -> str:
     return " ".join((*before, last)).replace("_", " ")
 
 
-def in_words(found: MapResult, name: str) -> str:
-    """A result in words: of which contact it is, or along which parameter."""
-    words, along = short(name), found.along(name)
-    return words if along is None else f"{words} of {short(along)}"
+def result_label(found: MapResult, name: str) -> str:
+    """Name of a result for an axis; results computed along a parameter end in "of" and that parameter."""
+    words, along = short_name(name), found.along(name)
+    return words if along is None else f"{words} of {short_name(along)}"
 
 
-def shown_name(found: MapResult, view: View, show: str | None) -> str | None:
-    """The result that is drawn besides the regions."""
+def drawn_result(found: MapResult, view: View, show: str | None) -> str | None:
+    """Name of the result to draw besides the regions of stability; None if only those are drawn."""
     if show is not None:
         return None if show == "status" else show
     if "status" not in view.values:
@@ -57,8 +58,8 @@ def shown_name(found: MapResult, view: View, show: str | None) -> str | None:
     return next((name for name in ("safety_factor", "growth_rate") if name in view.values), None)
 
 
-def spaced_by_ratio(values: Array) -> bool:
-    """Whether three or more positive values, as of a grid, are spaced by equal ratios rather than equal steps."""
+def is_geometric(values: Array) -> bool:
+    """True if positive grid values (three or more) are closer to equal ratios than to equal steps."""
     values = np.sort(values)
     if values[0] == values[-1]:
         return False
@@ -67,7 +68,7 @@ def spaced_by_ratio(values: Array) -> bool:
 
 
 def missing_note(view: View, name: str) -> str:
-    """What became of samples that have no value of a result, for its label; empty where all have one."""
+    """Label text: share of samples without a value of a result, and their treatment; empty if all samples have one."""
     share = float(np.max(view.missing.get(name, np.zeros(1)), initial=0.0))
     if share == 0:
         return ""
@@ -76,23 +77,25 @@ def missing_note(view: View, name: str) -> str:
 
 
 class Scale:
-    """How a column of SI values is put on an axis."""
+    """Display unit, label and kind (linear or logarithmic) of an axis for SI values; calling it converts SI values."""
 
     def __init__(self, name: str, unit: str, values: Array, spaced: bool = True, area: float | None = None) -> None:
         finite = np.abs(values[np.isfinite(values) & (values != 0)])
         typical = float(np.median(finite)) if len(finite) else 1.0
         self.factor, self.unit = display_unit(unit, typical, area)
-        self.label = labelled(stress_name(short(name), area), self.unit)
+        self.label = axis_label(stress_name(short_name(name), area), self.unit)
         good = values[np.isfinite(values)]
         positive = bool(len(good)) and bool(good.min() > 0)
-        self.log = positive and (spaced_by_ratio(good) if spaced and len(good) > 2 else good.max() / good.min() >= MANY)
+        self.log = positive and (
+            is_geometric(good) if spaced and len(good) > 2 else good.max() / good.min() >= LOG_RATIO
+        )
 
     def __call__(self, values: Any) -> Any:
         return np.asarray(values) / self.factor
 
 
-def place_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
-    """Label and scale the axes for the parameters of a view."""
+def label_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
+    """Set labels and scales of the x axis, and of the y axis for two parameters; return their `Scale` objects."""
     scales = [
         Scale(n, found.unit(n), p, not view.scattered, found.area(n))
         for n, p in zip(view.names, view.places, strict=True)
@@ -105,16 +108,14 @@ def place_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
     return scales
 
 
-def legend(ax: Axes) -> None:
-    """A legend above the axes, if there is anything to name."""
+def add_legend(ax: Axes) -> None:
+    """Add a legend above the axes if anything drawn has a label."""
     if ax.get_legend_handles_labels()[0]:
-        # above the axes, where it hides no region, with room for a power of ten on the axis
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1.04), ncols=2, frameon=False, borderaxespad=0.2,
-                  fontsize="small")  # fmt: skip
+        add_legend_above(ax, fontsize="small")
 
 
-def entry(ax: Axes, handle: Any) -> None:
-    """An entry of the legend without anything drawn in the Axes."""
+def add_legend_entry(ax: Axes, handle: Any) -> None:
+    """Add an entry to the legend for a patch or line that is not visible in the Axes."""
     if isinstance(handle, Patch):
         ax.fill_between([], [], facecolor=handle.get_facecolor(), edgecolor=handle.get_edgecolor(),
                         hatch=handle.get_hatch(), label=handle.get_label())  # fmt: skip

@@ -1,4 +1,4 @@
-"""A map over one parameter as curves, and samples alone as points."""
+"""Figures of maps: results over one parameter as curves, random samples as points."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from steadyslip.figures.map_axes import (
     KIND_COLOURS,
     OUT_OF_RANGE,
     Scale,
-    entry,
-    in_words,
+    add_legend_entry,
+    drawn_result,
+    label_axes,
     missing_note,
-    place_axes,
-    shown_name,
+    result_label,
 )
-from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, labelled
+from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, axis_label
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import without_number
 from steadyslip.maps.view.cut import View, own_value
@@ -28,13 +28,13 @@ from steadyslip.maps.view.result import MapResult
 Array = np.ndarray
 
 
-def curve(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
-    """A result over one parameter, above the stretches that are stable."""
-    (scale,) = place_axes(ax, found, view)
+def draw_curve(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
+    """Plot a result over one parameter, with stable and unstable intervals shaded."""
+    (scale,) = label_axes(ax, found, view)
     x = scale(view.places[0])
     order = np.argsort(x)
     x = x[order]
-    name = shown_name(found, view, show) or "status"
+    name = drawn_result(found, view, show) or "status"
     if "status" in view.values and name != "status":
         _bands_of_status(ax, x, np.asarray(view.values["status"])[order])
     if found.words(name):
@@ -48,7 +48,7 @@ def curve(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
 
 
 def _bands_of_status(ax: Axes, x: Array, status: Array) -> None:
-    """Shading of stable and unstable stretches, ending midway between points."""
+    """Shade the intervals of `x` by status; intervals end midway between points."""
     ends = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
     styles: dict[int, dict[str, Any]] = {
         STABLE: {"facecolor": SKY, "alpha": 0.35, "label": "stable"},
@@ -68,10 +68,10 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     values = np.asarray(view.values[name])[order]
     unit = found.unit(name)
     finite = values[np.isfinite(values)]
-    if name in view.bands:  # a failure's zero is no size to scale by
+    if name in view.bands:  # zeros stand for failures: leave them out of the scale
         finite = view.bands[name][np.isfinite(view.bands[name]) & (view.bands[name] != 0)]
     scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area(name))
-    if values.ndim == 3:  # intervals and their ends
+    if values.ndim == 3:  # ends of stable intervals: (points, intervals, 2)
         top = finite.max() * 3 if len(finite) else 1.0
         for i in range(values.shape[1]):
             low, high = values[:, i, 0], np.where(np.isinf(values[:, i, 1]), top, values[:, i, 1])
@@ -80,7 +80,7 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
             ax.fill_between(x, scale(low), scale(high), color=CURVES[i % len(CURVES)], alpha=0.4,
                             label=f"interval {i + 1} of {name.replace('_', ' ')}")  # fmt: skip
     elif name in view.bands:
-        top = 1e3 * finite.max(initial=1.0)  # where samples have no upper limit the band leaves the picture
+        top = 1e3 * finite.max(initial=1.0)  # infinite samples: the band ends beyond the axis
         low, middle, high = (scale(np.minimum(band[order], top)) for band in view.bands[name])
         ax.fill_between(x, low, high, color=BLUE, alpha=0.25, linewidth=0, label="95 % of samples")
         ax.plot(x, middle, color=BLUE, label="median of samples" + missing_note(view, name))
@@ -89,9 +89,9 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     else:
         ax.plot(x, np.where(np.isfinite(values), scale(values), np.nan), color=BLUE)
         if gaps := without_number(found, view, name, hatched="status" in view.values):
-            entry(ax, Patch(facecolor="none", edgecolor="none", label=f"where there is no line: {gaps}"))
+            add_legend_entry(ax, Patch(facecolor="none", edgecolor="none", label=f"where there is no line: {gaps}"))
     ax.set_yscale("log" if scale.log else "linear")
-    ax.set_ylabel(labelled(in_words(found, name), scale.unit))
+    ax.set_ylabel(axis_label(result_label(found, name), scale.unit))
     if name == "safety_factor":
         ax.axhline(1.0, color=BLACK, linewidth=0.8)
     if name == "growth_rate":
@@ -117,10 +117,10 @@ def _curves_of_kinds(ax: Axes, found: MapResult, view: View, x: Array, order: Ar
     ax.set_ylabel(name.replace("_", " "))
 
 
-def scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
-    """Samples one by one: two parameters, or a parameter and the result."""
-    scales = place_axes(ax, found, view)
-    name = shown_name(found, view, show)
+def draw_scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
+    """Plot random samples as points over two parameters, or over one parameter and the result."""
+    scales = label_axes(ax, found, view)
+    name = drawn_result(found, view, show)
     across = [s(p) for s, p in zip(scales, view.places, strict=True)]
     if len(across) == 1:
         name = name or found.results[0]
@@ -130,7 +130,7 @@ def scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
         up = Scale(name, found.unit(name), values, spaced=False, area=found.area(name))
         across.append(up(np.where(np.isfinite(values), values, np.nan)))
         ax.set_yscale("log" if up.log else "linear")
-        ax.set_ylabel(labelled(in_words(found, name), up.unit))
+        ax.set_ylabel(axis_label(result_label(found, name), up.unit))
     status = view.values.get("status")
     kinds = (
         (UNSTABLE, "unstable", ORANGE, "v"),

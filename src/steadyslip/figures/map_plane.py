@@ -1,4 +1,4 @@
-"""A map over two parameters: regions, contours, colours, the edge of stability and the rig beside it."""
+"""Figures of maps over two parameters: regions or colours, contours, edge of stability, the base rig."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from steadyslip.core.format import format_quantity
 from steadyslip.figures.chart import absence_reasons
 from steadyslip.figures.map_axes import (
     KIND_COLOURS,
-    MANY,
+    LOG_RATIO,
     OUT_OF_RANGE,
     Scale,
-    entry,
-    in_words,
+    add_legend_entry,
+    drawn_result,
+    label_axes,
     missing_note,
-    place_axes,
-    short,
-    shown_name,
+    result_label,
+    short_name,
 )
-from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, display_unit, labelled
+from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axis_label, display_unit
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
-SAFETY = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # contours of the safety factor k/k_cr
 
 
-def plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
-    """Regions with contours, or colours; `scale` is that of the colours where pictures share it, else None."""
-    scales = place_axes(ax, found, view)
+def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
+    """Plot a result over two parameters: regions with contours, or colours; panels may share a colour `scale`."""
+    scales = label_axes(ax, found, view)
     x, y = (s(p) for s, p in zip(scales, view.places, strict=True))
-    name = shown_name(found, view, show)
+    name = drawn_result(found, view, show)
     regions = "status" in view.values and name in (None, "safety_factor", "growth_rate", "critical_stiffness", "edge")
     if regions and view.shares:
         _share_of_stable(ax, x, y, view)
@@ -55,7 +55,7 @@ def plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) 
     line = _edge(ax, x, y, view)
     ax.set_xlim(x.min(), x.max())
     ax.set_ylim(y.min(), y.max())
-    _mark_own(ax, found, view, scales, line, told=scale is None)
+    _mark_own(ax, found, view, scales, line, with_values=scale is None)
 
 
 def _regions(ax: Axes, found: MapResult, view: View, x: Array, y: Array) -> None:
@@ -66,23 +66,23 @@ def _regions(ax: Axes, found: MapResult, view: View, x: Array, y: Array) -> None
         if np.isfinite(inside).any():
             ax.pcolormesh(x, y, inside, cmap=ListedColormap([colour]), alpha=alpha, shading="nearest", rasterized=True,
                           linewidth=0)  # fmt: skip
-            entry(ax, Patch(facecolor=colour, alpha=alpha, label=label))
+            add_legend_entry(ax, Patch(facecolor=colour, alpha=alpha, label=label))
     absent = status == ABSENT
     if absent.any():
         if min(absent.shape) > 1:
             ax.contourf(x, y, absent.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
-        reasons = _reasons(found, view, absent)
-        entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="///", label=f"no steady sliding{reasons}"))
+        reasons = _absence_reasons(found, view, absent)
+        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="///", label=f"no steady sliding{reasons}"))
     if (unknown := status == UNKNOWN).any():
         if min(unknown.shape) > 1:
             ax.contourf(x, y, unknown.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xx"])
-        entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="xx", label=OUT_OF_RANGE))
+        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="xx", label=OUT_OF_RANGE))
     if (status < 0).any():
-        entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
+        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
 
 
-def _reasons(found: MapResult, view: View, absent: Array) -> str:
-    """Lock-up, lift-off or both, asked at some of the points without steady sliding."""
+def _absence_reasons(found: MapResult, view: View, absent: Array) -> str:
+    """Reasons for no steady sliding in brackets (lock-up, lift-off), from some of the points; empty if unknown."""
     try:
         rig = found.rig
     except NotAvailable:
@@ -105,20 +105,20 @@ def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: Map
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
         return
     if name == "safety_factor":
-        levels, factor = [s for s in SAFETY if good.min() < s < good.max()], 1.0
-        label = "k/k_cr" if found.along(name) is None else in_words(found, name)
+        levels, factor = [s for s in SAFETY_LEVELS if good.min() < s < good.max()], 1.0
+        label = "k/k_cr" if found.along(name) is None else result_label(found, name)
     else:
         factor, shown_unit = display_unit(found.unit(name), float(np.median(np.abs(good))) or 1.0, found.area(name))
-        levels, label = _levels(good / factor), labelled(in_words(found, name), shown_unit)
+        levels, label = _levels(good / factor), axis_label(result_label(found, name), shown_unit)
     if not levels:
         return
     lines = ax.contour(x, y, values / factor, levels=levels, colors=BLACK, linewidths=0.6, linestyles="--")
     ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}")
-    entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label + note))
+    add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label + note))
 
 
 def _levels(values: Array) -> list[float]:
-    """Powers of ten on both sides of zero, or even steps where the values span less than a decade."""
+    """Contour levels: powers of ten on both sides of zero, or even steps if the values span less than a decade."""
     found: list[float] = []
     for sign in (-1, 1):
         size = sign * values[sign * values > 0]
@@ -145,35 +145,35 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         kinds = np.where(values >= 0, values, np.nan).astype(float)
         ax.pcolormesh(x, y, kinds, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)
         for code in np.unique(values[values >= 0]):
-            entry(ax, Patch(facecolor=colours[int(code)], label=words[int(code)]))
+            add_legend_entry(ax, Patch(facecolor=colours[int(code)], label=words[int(code)]))
         if (values < 0).any():
-            entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
+            add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
         return
     factor, unit, norm = scale or colour_scale([values], found.unit(name), found.area(name))
     mesh = ax.pcolormesh(x, y, np.where(np.isfinite(values), values, np.nan) / factor, cmap="cividis", norm=norm,
                          shading="nearest", rasterized=True)  # fmt: skip
-    ax.figure.colorbar(mesh, ax=ax, label=labelled(in_words(found, name), unit))
+    ax.figure.colorbar(mesh, ax=ax, label=axis_label(result_label(found, name), unit))
     if note := missing_note(view, name):
-        entry(ax, Patch(facecolor="none", label=f"median of samples{note}"))
+        add_legend_entry(ax, Patch(facecolor="none", label=f"median of samples{note}"))
     if white := without_number(found, view, name):
-        entry(ax, Patch(facecolor="white", edgecolor=GREY, label=white))
+        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, label=white))
 
 
 def colour_scale(fields: Sequence[Array], unit: str, area: float | None) -> tuple[float, str, Any]:
-    """Size and name of the unit shown, and the norm that suits all fields."""
+    """Display unit (size in SI units, name) and Matplotlib norm for the values of all fields."""
     values = np.concatenate([f[np.isfinite(f)].reshape(-1) for f in fields])
     if not len(values):
         return 1.0, unit, Normalize(0, 1)
     factor, name = display_unit(unit, float(np.median(np.abs(values))) or 1.0, area)
     low, high = np.quantile(values, [0.001, 0.999])
     positive = values[values > 0]
-    if low >= 0 and len(positive) and high / np.quantile(positive, 0.02) >= MANY:
+    if low >= 0 and len(positive) and high / np.quantile(positive, 0.02) >= LOG_RATIO:
         return factor, name, LogNorm(float(np.quantile(positive, 0.02)) / factor, float(high) / factor, clip=False)
     return factor, name, Normalize(float(low) / factor, float(high) / factor)
 
 
 def _edge(ax: Axes, x: Array, y: Array, view: View) -> list[Array]:
-    """Draw the edge of stability; returns its pieces as vertices (n, 2) in the units of the axes."""
+    """Draw the edge of stability; return its pieces as vertices of shape (n, 2) in the units of the axes."""
     if len(x) < 2 or len(y) < 2:
         return []
     values = view.values
@@ -181,20 +181,20 @@ def _edge(ax: Axes, x: Array, y: Array, view: View) -> list[Array]:
         field, level = view.shares["status"][STABLE], 0.5
     elif "status" in values:
         sign = np.select([values["status"] == STABLE, values["status"] == UNSTABLE], [1.0, -1.0], np.nan)
-        field, level = sign * _distance(values, sign), 0.0
+        field, level = sign * _edge_distance(values, sign), 0.0
     else:
         return []
     good = field[np.isfinite(field)]
     if not len(good) or not good.min() < level < good.max():
         return []
     lines = ax.contour(x, y, np.where(np.isfinite(field), field, np.nan), levels=[level], colors=BLACK, linewidths=2)
-    entry(ax, Line2D([], [], color=BLACK, linewidth=2, label="edge of stability"))
+    add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=2, label="edge of stability"))
     polygons = [np.asarray(p) for path in lines.get_paths() for p in path.to_polygons(closed_only=False)]
     return [p for p in polygons if len(p)]
 
 
-def _distance(values: Mapping[str, Array], sign: Array) -> Array:
-    """Something that vanishes at the edge, so that it can be drawn finer than the grid; 1 where there is nothing."""
+def _edge_distance(values: Mapping[str, Array], sign: Array) -> Array:
+    """Non-negative values that vanish at the edge, so that contours are finer than the grid; ones if unavailable."""
     if "growth_rate" in values and np.isfinite(values["growth_rate"]).any():
         rate = np.abs(values["growth_rate"])
         return np.asarray(np.where(np.isfinite(rate), np.arcsinh(rate / (np.nanmedian(rate) or 1.0)), 1.0))
@@ -206,9 +206,9 @@ def _distance(values: Mapping[str, Array], sign: Array) -> Array:
 
 
 def _mark_own(
-    ax: Axes, found: MapResult, view: View, scales: Sequence[Scale], pieces: Sequence[Array], told: bool
+    ax: Axes, found: MapResult, view: View, scales: Sequence[Scale], pieces: Sequence[Array], with_values: bool
 ) -> None:
-    """The base rig, if it is in view, and the point of the edge nearest to it, with its numbers where there is room."""
+    """Mark the base rig, if in view, and the point of the edge nearest to it, with its values if `with_values`."""
     own = [own_value(found, name) for name in view.names]
     limits = [ax.get_xlim(), ax.get_ylim()]
     if any(value is None for value in own):
@@ -223,15 +223,15 @@ def _mark_own(
         return
     ax.plot(*zip(at, nearest, strict=True), color=VERMILION, linewidth=1.2, linestyle=":", zorder=4)
     words = ", ".join(
-        f"{short(name)} {format_quantity(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
+        f"{short_name(name)} {format_quantity(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
         for name, value, scale in zip(view.names, nearest, scales, strict=True)
     )
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
-            label=f"nearest edge\n({words})" if told else "nearest edge", zorder=5)  # fmt: skip
+            label=f"nearest edge\n({words})" if with_values else "nearest edge", zorder=5)  # fmt: skip
 
 
 def _nearest(pieces: Sequence[Array], at: Sequence[float], limits: Sequence[Any], logs: Sequence[bool]) -> Any:
-    """The point of the edge nearest to a point in the picture, in the units of the axes."""
+    """Point of the edge nearest to `at` in the drawn figure, in the units of the axes; None without an edge."""
 
     def drawn(points: Array) -> Array:
         columns = [

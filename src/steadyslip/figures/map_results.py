@@ -1,4 +1,4 @@
-"""What is made of maps: edges that were refined, and which parameters decide."""
+"""Figures of refined edges of maps and of Sobol indices."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem
-from steadyslip.figures.map_axes import KIND_COLOURS, legend, place_axes, short
-from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new
+from steadyslip.figures.map_axes import KIND_COLOURS, add_legend, label_axes, short_name
+from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new, new_panels
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import Sensitivity
 from steadyslip.maps.view.cut import View, own_value
 
 
 def refined(found: Refined, ax: Axes | None = None) -> Axes:
-    """Draw the points that were put along an edge of a map over two grids, and the edge that they found.
+    """Plot the points added along an edge of a map over two grids, and the edge found with them.
 
-    Where parameters have lists of values besides, those at the values nearest to the rig's own.
+    Further parameters, given as lists, are held at the value nearest to that of the rig.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     places = tuple(np.asarray(found.map.dataset[name].values) for name in names)
     view = View(tuple(names), places, {}, {}, {}, {}, False)
-    scales = place_axes(ax, found.map, view)
+    scales = label_axes(ax, found.map, view)
     held = {n: found.map.read(n) for n in found.map.dims if n not in names}
     near = {n: values[np.argmin(np.abs(values - (own_value(found.map, n) or 0.0)))] for n, values in held.items()}
     shown = np.all([found.points[n] == at for n, at in near.items()] or [True], axis=0)
@@ -53,7 +53,7 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
         groups = [(values == code, words[code], KIND_COLOURS[code % len(KIND_COLOURS)]) for code in np.unique(values)]
     else:
         if found.level is None:
-            raise InternalError("found.level is not None")
+            raise InternalError(f"the refined edge of {found.of}, which is a number, has no level")
         above = values > found.level
         groups = [(above, f"above {found.level:.4g}", BLUE), (~above, f"below {found.level:.4g}", ORANGE)]
     for chosen, label, colour in groups:
@@ -62,12 +62,12 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
     ax.plot(*edge, ".", color=BLACK, markersize=1.5, linestyle="none", label=f"edge of {found.of.replace('_', ' ')}")
     ax.set_xlim(*(scales[0](places[0][[0, -1]])))
     ax.set_ylim(*(scales[1](places[1][[0, -1]])))
-    legend(ax)
+    add_legend(ax)
     return ax
 
 
 def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
-    """Draw Sobol indices: for each parameter the share that it has alone, and with others.
+    """Plot Sobol indices: share of the variance due to each parameter alone, and with its interactions.
 
     Parameters
     ----------
@@ -81,10 +81,7 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
     """
     results = list(found.first)
     if ax is None:
-        from matplotlib import pyplot as plt
-
-        height = 0.42 * len(found.parameters) + 1.6
-        _, ax = plt.subplots(1, len(results), figsize=(4.6 * len(results), height), layout="constrained", squeeze=False)
+        ax = new_panels(1, len(results), (4.6 * len(results), 0.42 * len(found.parameters) + 1.6))
     axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
     for one, result in zip(axes, results, strict=True):
         order = found.ranked(result)[::-1]
@@ -97,7 +94,7 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
         for label, values, (low, high), colour, shift in parts:
             reach = np.abs(np.stack([values - low, high - values]))[:, rows]
             one.barh(place + shift, values[rows], 0.36, xerr=reach, color=colour, ecolor=BLACK, capsize=2, label=label)
-        one.set_yticks(place, [short(name) for name in order])
+        one.set_yticks(place, [short_name(name) for name in order])
         one.set_xlim(left=min(0.0, one.get_xlim()[0]))
         one.set_xlabel("share of the variance (1)")
         title = result.replace("_", " ")

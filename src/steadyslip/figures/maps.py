@@ -1,4 +1,4 @@
-"""Pictures of maps: curves over one parameter, regions and contours over two, several side by side over a third."""
+"""Figures of maps: curves over one parameter, regions and contours over two, panels over a third."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from matplotlib.axes import Axes
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
-from steadyslip.figures.map_axes import legend, short, shown_name
-from steadyslip.figures.map_curves import curve, scatter
-from steadyslip.figures.map_plane import colour_scale, plane
+from steadyslip.figures.map_axes import add_legend, drawn_result, short_name
+from steadyslip.figures.map_curves import draw_curve, draw_scatter
+from steadyslip.figures.map_plane import colour_scale, draw_plane
 from steadyslip.figures.style import axes_or_new
 from steadyslip.maps.view.cut import View, axes_of, take
 from steadyslip.maps.view.result import MapResult
 
-FACETS = 6  # panels at most
+MAX_FACETS = 6  # panels of one figure: two rows of three
 
 
 def map_figure(
@@ -34,9 +34,9 @@ def map_figure(
     """Draw a map.
 
     Over two parameters: regions that are stable, unstable and without steady sliding, with contours of the result
-    shown; or colours, where it is not about steady sliding. Over one: the result as a curve above those regions.
-    Samples are summed up: median and 95 % band, share that is stable; alone they are drawn as points. The base rig is
-    marked, and the point of the edge of stability that is nearest to it in the picture.
+    shown; or colours, where it is not about steady sliding. Over one: the result as a curve, with these regions shaded.
+    Samples are drawn as median and 95 % band, or as share that is stable; samples without grids as points. The base rig
+    is marked, and the point of the edge of stability that is nearest to it in the figure.
 
     Parameters
     ----------
@@ -72,15 +72,15 @@ def map_figure(
     if third in names:
         raise ParameterError([Problem("facet", f"{third} is on an axis already; choose another parameter")])
     if third is not None:
-        return _facets(found, names, show, third, at or {})
-    view = take(found, names, _needed(found, show), at)
+        return _draw_facets(found, names, show, third, at or {})
+    view = take(found, names, _needed_results(found, show), at)
     ax = axes_or_new(ax)
     _draw(ax, found, view, show)
-    legend(ax)
+    add_legend(ax)
     return ax
 
 
-def _needed(found: MapResult, show: str | None) -> list[str]:
+def _needed_results(found: MapResult, show: str | None) -> list[str]:
     wanted = ("status", "safety_factor", "growth_rate", show or found.results[0])
     return [name for name in dict.fromkeys(wanted) if name in found.results]
 
@@ -93,11 +93,11 @@ def _facet_name(found: MapResult, facet: str) -> str:
         raise ParameterError([Problem("facet", unknown_name("parameter", facet, grids))]) from error
 
 
-def _facets(found: MapResult, names: Sequence[str], show: str | None, third: str, at: Mapping[str, Any]) -> Any:
+def _draw_facets(found: MapResult, names: Sequence[str], show: str | None, third: str, at: Mapping[str, Any]) -> Any:
     from matplotlib import pyplot as plt
 
     values = np.asarray(found.dataset[third].values)
-    chosen = values[np.unique(np.linspace(0, len(values) - 1, min(FACETS, len(values))).round().astype(int))]
+    chosen = values[np.unique(np.linspace(0, len(values) - 1, min(MAX_FACETS, len(values))).round().astype(int))]
     columns = min(3, len(chosen))
     rows = -(-len(chosen) // columns)
     figure, axes = plt.subplots(
@@ -105,12 +105,12 @@ def _facets(found: MapResult, names: Sequence[str], show: str | None, third: str
         sharex=True, sharey=True,
     )  # fmt: skip
     flat = axes.reshape(-1)
-    views = [take(found, names, _needed(found, show), {**at, third: float(value)}) for value in chosen]
-    scale = _common_scale(found, views, shown_name(found, views[0], show))
+    views = [take(found, names, _needed_results(found, show), {**at, third: float(value)}) for value in chosen]
+    scale = _common_scale(found, views, drawn_result(found, views[0], show))
     for ax, view, value in zip(flat, views, chosen, strict=False):
         _draw(ax, found, view, show, scale)
         ax.set_title(
-            f"{short(third)} = {format_quantity(float(value), found.unit(third), area=found.area(third))}",
+            f"{short_name(third)} = {format_quantity(float(value), found.unit(third), area=found.area(third))}",
             fontsize="medium",
         )
     for ax in flat[len(chosen) :]:
@@ -125,17 +125,17 @@ def _facets(found: MapResult, names: Sequence[str], show: str | None, third: str
 
 
 def _common_scale(found: MapResult, views: Sequence[View], name: str | None) -> Any:
-    """One colour scale for pictures side by side."""
+    """Colour scale common to panels side by side; an empty tuple where there are no colours to scale."""
     if name is None or len(views[0].names) < 2 or found.words(name):
         return ()
     return colour_scale([view.values[name] for view in views], found.unit(name), found.area(name))
 
 
 def _draw(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any = None) -> None:
-    """`scale` is that of the colours, where pictures share it."""
+    """Plot points, curves or a plane, as the view needs; `scale` is a colour scale shared by panels."""
     if view.scattered:
-        scatter(ax, found, view, show)
+        draw_scatter(ax, found, view, show)
     elif len(view.names) == 1:
-        curve(ax, found, view, show)
+        draw_curve(ax, found, view, show)
     else:
-        plane(ax, found, view, show, scale)
+        draw_plane(ax, found, view, show, scale)

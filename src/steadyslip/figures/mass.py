@@ -1,4 +1,4 @@
-"""The numbers behind the paper's Fig. 7, by the general route (not the paper's closed form)."""
+"""Dimensionless masses and critical stiffnesses of Fig. 7 of Dupont & Bapna (1994), from the Model of the rig."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from steadyslip.linear import critical_stiffness
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
-_LARGEST = 1e6  # m* beyond any rig: a limit above is no limit
-_NEGLIGIBLE = 1e-12  # m* of a quasistatic rig
-_COMMON = 1e-6  # relative spread up to which curves cross in one point
+_MAX_MASS = 1e6  # highest m* searched: a limit above it counts as none
+_MIN_MASS = 1e-12  # lowest m* searched: stands for a quasistatic rig
+_CROSSING_TOLERANCE = 1e-6  # largest relative spread of the curves of all angles that counts as one crossing point
 
 
 def dimensionless_critical_stiffness(rig: Slider, angles: Any, m_star: Any) -> Any:
@@ -42,7 +42,7 @@ def mass_at(rig: Slider, angles: Any, m_star: Any) -> Any:
 
 
 def is_locked(rig: Slider, angles: Any) -> Any:
-    """Whether a spring at these angles (rad) leaves no steady sliding."""
+    """True where a spring at these angles (rad) leaves no steady sliding."""
     return np.isnan(_steady_stress(rig, angles))
 
 
@@ -78,14 +78,14 @@ def mass_of_equal_stiffness(rig: Slider, angles: Iterable[float]) -> float:
         ends = dimensionless_critical_stiffness(rig, open_angles[[0, -1]], np.asarray(m_star)[..., None])
         return ends[..., 0] - ends[..., 1]
 
-    grid = np.geomspace(_NEGLIGIBLE, _LARGEST, 721)
+    grid = np.geomspace(_MIN_MASS, _MAX_MASS, 721)
     value = spread(grid)
     with np.errstate(invalid="ignore"):
         at = np.flatnonzero(value[:-1] * value[1:] < 0)
     for i in at:
         crossing = float(brentq(lambda m: float(spread(m)), grid[i], grid[i + 1], xtol=1e-300, rtol=1e-15))
         kappa = dimensionless_critical_stiffness(rig, open_angles, crossing)
-        if np.ptp(kappa) <= _COMMON * np.abs(kappa).max():
+        if np.ptp(kappa) <= _CROSSING_TOLERANCE * np.abs(kappa).max():
             return crossing
     return math.nan
 
@@ -99,10 +99,10 @@ def mass_of_no_stiffness(rig: Slider, angle: float) -> float:
     def exists(m_star: Any) -> Any:
         return np.isfinite(dimensionless_critical_stiffness(rig, angle, m_star))
 
-    low, high = _NEGLIGIBLE, _LARGEST
+    low, high = _MIN_MASS, _MAX_MASS
     if not exists(low) or exists(high):
         return math.nan
-    for _ in range(16):  # each divides the bracket's logarithm by 32
+    for _ in range(16):  # each divides the logarithmic bracket by 32: 18 decades to far below rounding
         samples = np.geomspace(low, high, 33)
         first = int(np.argmin(exists(samples)))
         low, high = samples[first - 1], samples[first]

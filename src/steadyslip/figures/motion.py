@@ -1,30 +1,34 @@
-"""Simulated motion: histories in time, and the phase plane of the paper's Figs 5 and 6."""
+"""Figures of simulated motion: histories in time, and the phase plane of Figs 5 and 6 of Dupont & Bapna (1994)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from steadyslip.core.areas import stress_name
-from steadyslip.core.errors import NoSteadySliding, ParameterError, Problem
+from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.format import format_quantity
 from steadyslip.figures import machine_motion
+from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
     GREY,
     ORANGE,
     VERMILION,
-    arrows,
+    add_arrowheads,
+    add_legend_above,
     axes_or_new,
+    axis_label,
     display_unit,
-    labelled,
+    given_panels,
+    new_panels,
 )
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.machine.machine import Machine
@@ -37,20 +41,18 @@ from steadyslip.protocol.protocol import NORMAL_STRESS
 if TYPE_CHECKING:
     from steadyslip.motion import History
 
-_SPANS = 40  # slip events are shaded only if they are fewer than this
-_LEAST_SPAN = 2e-3  # of the size of the values: less is drawn as no change
-_LEAST_BAND = 4e-3  # share of the time shown: shorter slip events are drawn so wide, to be seen at all
-_DECADES = 12.0  # a blow-up is drawn to this many decades above the drive
+_MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
+_MAX_DECADES = 12.0  # decades above the drive velocity to which a blow-up is drawn
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
-    """Velocity, friction and normal stress in time, one panel each; of a machine, of every contact.
+    """Plot velocity, friction and normal stress over time in three panels; for machines, of every contact.
 
     Parameters
     ----------
     run : History
     ax : three matplotlib Axes, optional
-        New ones unless given.
+        New ones by default.
 
     Returns
     -------
@@ -61,7 +63,9 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     ParameterError
         If `ax` is not three Axes.
     """
-    panels = _three(ax)
+    panels = (
+        new_panels(3, 1, (6.4, 6.4), sharex=True)[:, 0] if ax is None else given_panels(ax, (3,), "a sequence of three")
+    )
     if isinstance(run.rig, Machine):
         return machine_motion.history(run, panels)
     area = run.rig.area
@@ -72,14 +76,14 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     panels[1].set_ylabel("friction τ/σ (1)")
     stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)), area)
     panels[2].plot(time, run["normal_stress"] / stress_factor, color=BLUE)
-    panels[2].set_ylabel(labelled(stress_name("normal stress", area), stress_unit))
-    panels[2].set_xlabel(labelled("time", unit))
-    _keep_span(panels[1], run["friction"])
-    _keep_span(panels[2], run["normal_stress"] / stress_factor)
-    machine_motion.let_go(run, panels, factor)
-    slips = run.slip_events if len(run.slip_events) < _SPANS else ()
-    _name_slip_events(panels[0], len(run.slip_events))
-    narrowest = _LEAST_BAND * run.end
+    panels[2].set_ylabel(axis_label(stress_name("normal stress", area), stress_unit))
+    panels[2].set_xlabel(axis_label("time", unit))
+    _limit_zoom(panels[1], run["friction"])
+    _limit_zoom(panels[2], run["normal_stress"] / stress_factor)
+    machine_motion.shade_let_go(run, panels, factor)
+    slips = run.slip_events if len(run.slip_events) < MAX_SHADED_EVENTS else ()
+    _add_slip_legend(panels[0], len(run.slip_events))
+    narrowest = MIN_BAND_SHARE * run.end
     for panel in panels:
         panel.grid(color=GREY, linewidth=0.3)
         for slip in slips:
@@ -96,70 +100,57 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     return panels
 
 
-def _keep_span(ax: Axes, *shown: np.ndarray) -> None:
-    """Do not blow up what hardly changes, such as round-off of a settled run; and write ticks out in full."""
+def _limit_zoom(ax: Axes, *shown: np.ndarray) -> None:
+    """Keep the y axis at least `_MIN_SPAN` times the largest value high (rounding is not enlarged); no tick offset."""
     values = np.concatenate([values[np.isfinite(values)] for values in shown])
     if ax.get_yscale() == "linear":
         ax.ticklabel_format(axis="y", useOffset=False)
     if not len(values):
         return
     low, high = float(values.min()), float(values.max())
-    least = _LEAST_SPAN * max(abs(low), abs(high))
+    least = _MIN_SPAN * max(abs(low), abs(high))
     if high - low < least:
         middle = 0.5 * (low + high)
         ax.set_ylim(middle - (0.5 * least or 1.0), middle + (0.5 * least or 1.0))
 
 
-def _name_slip_events(ax: Axes, count: int) -> None:
-    """What the shading means, in the legend."""
+def _add_slip_legend(ax: Axes, count: int) -> None:
+    """Add the legend of the first panel, with the meaning of the shading and the number of slip events."""
     meaning = f"at least {SLIP_EVENT:g} × the load point"
-    if count >= _SPANS:
+    if count >= MAX_SHADED_EVENTS:
         ax.plot([], [], " ", label=f"{count} slip events ({meaning}), too many to shade")
     elif count:
         ax.fill_between([], [], color=ORANGE, alpha=0.3, linewidth=0, label=f"slip event ({meaning})")
-    # above the panel, where it hides no slip event
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=3, frameon=False, fontsize="small", borderaxespad=0.2)
-
-
-def _three(ax: Sequence[Axes] | None) -> np.ndarray:
-    if ax is not None:
-        given = np.asarray(ax, dtype=object)
-        if given.shape != (3,):
-            raise ParameterError([Problem("ax", f"got Axes of shape {given.shape}; allowed: a sequence of three")])
-        return given
-    from matplotlib import pyplot as plt
-
-    axes: Any = plt.subplots(3, 1, sharex=True, figsize=(6.4, 6.4), layout="constrained")[1]
-    return np.asarray(axes, dtype=object)
+    add_legend_above(ax, 3, 1.0, fontsize="small")
 
 
 def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
-    """On a logarithmic axis where the block never rests or reverses."""
+    """Plot block and load-point velocity, on a logarithmic axis if the block never rests or reverses."""
     v, load = run["v"], run["load_velocity"]
     reference = "steady sliding" if Protocol.of(run.protocol).frees_load_point else "load point"
     drive = run.rig.drive.velocity
-    top = drive * 10.0**_DECADES
+    top = drive * 10.0**_MAX_DECADES
     factor, unit = display_unit("m/s", drive)
     load_shown = np.where(load > 0, load, np.nan) if np.all(v > 0) else load
     together = np.concatenate([v, load_shown[np.isfinite(load_shown)]])
     if np.all(v > 0) and _ticks_between(together.min() / factor, together.max() / factor) > 1:
         ax.set_yscale("log")
         load = load_shown
-        if v.max() > top:  # both ends: one alone would keep the other where it was without data
+        if v.max() > top:  # set both ends: set_ylim(top=...) alone would fix the bottom at its value without data
             ax.set_ylim(0.5 * min(v.min(), np.nanmin(load, initial=drive)) / factor, top / factor)
-        if v.max() < 100 * v.min():  # less than two decades: plain numbers read better than powers of ten
+        if v.max() < 100 * v.min():  # less than two decades: numbers instead of powers of ten
             ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_formatter(NullFormatter())
     ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label=reference)
     ax.plot(time, np.minimum(v, 10 * top) / factor, color=BLUE, label="block")
-    ax.set_ylabel(labelled("velocity", unit))
+    ax.set_ylabel(axis_label("velocity", unit))
     if ax.get_yscale() == "linear":
-        _keep_span(ax, v / factor, load / factor)
+        _limit_zoom(ax, v / factor, load / factor)
 
 
 def _ticks_between(low: float, high: float) -> int:
-    """How many of ..., 1, 2, 5, 10, ... lie in a range: the ticks of a logarithmic axis."""
+    """Number of ticks 1, 2, 5 times a power of ten within a range of positive numbers."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     return sum(low <= digit * 10.0**decade <= high for decade in decades for digit in (1, 2, 5))
 
@@ -167,13 +158,12 @@ def _ticks_between(low: float, high: float) -> int:
 def phase_plane(
     run: History, ax: Axes | None = None, label: str = "", color: str = BLUE, contact: str | None = None
 ) -> Axes:
-    """Spring stress against ln(v/v0), with the line of steady states; a dot at the last load-point velocity.
+    """Plot spring stress against ln(v/v0), with the line of steady states and a dot at the last load-point velocity.
 
-    Of a machine: friction force against slip rate at one of its contacts.
+    For machines: friction force against slip rate at one contact.
 
-    Motion runs along the curve as the arrows show; vertical distance from the line of steady states is out of
-    balance. Runs drawn on the same Axes share the line of the first. The line is that of the rig's own
-    normal stress, without what a protocol adds to it; v0 is the velocity of the rig's drive.
+    Arrows show the direction of motion. Runs drawn on the same Axes share the line of steady states of the first, which
+    is that at the normal stress of the rig, without what a protocol adds; v0 is the velocity of the rig's drive.
 
     Parameters
     ----------
@@ -184,7 +174,7 @@ def phase_plane(
         For a legend.
     color : str, optional
     contact : str, optional
-        Of a machine: which; that whose slip rate changes most unless given.
+        For machines: name of the contact; by default the one whose slip rate changes most.
 
     Returns
     -------
@@ -203,25 +193,25 @@ def phase_plane(
     moving = run["v"] > 0
     with np.errstate(all="ignore"):
         u = np.where(moving, np.log(np.where(moving, run["v"], 1.0) / drive), np.nan)
-    shows = np.abs(u) < _DECADES * np.log(10)
+    shows = np.abs(u) < _MAX_DECADES * np.log(10)
     factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), area)
     x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
     ax.plot(x, y, color=color, label=label or None, linewidth=1)
-    arrows(ax, x, y, color)
+    add_arrowheads(ax, x, y, color)
     if not ax.get_xlabel():
-        _steady_line(run, run.rig, ax, x, factor)
+        _draw_steady_states(run, run.rig, ax, x, factor)
         ax.set_xlabel("ln(v/v0) (1)")
-        ax.set_ylabel(labelled(stress_name("spring stress", area), unit))
+        ax.set_ylabel(axis_label(stress_name("spring stress", area), unit))
     return ax
 
 
-def _steady_pull(rig: Slider, velocity: float) -> float:
+def _steady_spring_stress(rig: Slider, velocity: float) -> float:
     state = steady_state(rig.with_values({"drive.velocity": velocity}))
     return state.spring_stress if isinstance(state, SteadySliding) else math.nan
 
 
-def _steady_line(run: History, rig: Slider, ax: Axes, x: np.ndarray, factor: float) -> None:
-    """Spring stress of steady sliding at other drive velocities, and the dot at the last one of the run."""
+def _draw_steady_states(run: History, rig: Slider, ax: Axes, x: np.ndarray, factor: float) -> None:
+    """Plot spring stress (Pa / factor) of steady sliding over drive velocity, with a dot at the last of the run."""
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     margin = 0.1 * (high - low) + 0.05
     steps = np.linspace(low - margin, high + margin, 41)
@@ -229,7 +219,7 @@ def _steady_line(run: History, rig: Slider, ax: Axes, x: np.ndarray, factor: flo
     for u in steps:
         try:
             velocity = rig.drive.velocity * float(np.exp(u))
-            stress.append(_steady_pull(rig, velocity))
+            stress.append(_steady_spring_stress(rig, velocity))
         except NoSteadySliding:
             stress.append(np.nan)
     pressed = any(piece.channel == NORMAL_STRESS for piece in Protocol.of(run.protocol).pieces)
@@ -238,7 +228,7 @@ def _steady_line(run: History, rig: Slider, ax: Axes, x: np.ndarray, factor: flo
     last = float(run["load_velocity"][-1])
     if not pressed and last > 0:
         with suppress(NoSteadySliding):
-            level = _steady_pull(rig, last) / factor
+            level = _steady_spring_stress(rig, last) / factor
             u = np.log(last / rig.drive.velocity)
             ax.plot([u], [level], "o", color=BLACK, markersize=4, label="_steady sliding")
     elif pressed:

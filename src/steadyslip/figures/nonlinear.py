@@ -1,4 +1,4 @@
-"""Beyond the edge: branches of cycles, edges in two parameters, basins."""
+"""Figures of cycle branches, Hopf curves, basins of attraction and kick thresholds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
-from steadyslip.figures.map_axes import short, spaced_by_ratio
+from steadyslip.figures.map_axes import is_geometric, short_name
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -23,26 +23,26 @@ from steadyslip.figures.style import (
     VERMILION,
     YELLOW,
     axes_or_new,
+    axis_label,
     display_unit,
-    labelled,
 )
 from steadyslip.machine.machine import Machine
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
 
-_MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN),
-          "branch point": ("v", SKY)}  # fmt: skip
+_MARKERS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN),
+            "branch point": ("v", SKY)}  # fmt: skip
 _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY, "not decided": BLACK}
-_AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY,
-          "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
-_UNDECIDED = ("xx", "++", "oo")
-NARROW = 1e-3  # share of a value within which cycles are drawn over their distance from it
-WRAPPED = 36  # characters of a line in a legend
+_OUTCOME_COLOURS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN,
+                    "no solution": GREY, "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
+_UNDECIDED_HATCHES = ("xx", "++", "oo")
+NARROW_RANGE = 1e-3  # relative range of a branch below which its axis is the distance from the onset (by trial)
+LEGEND_WIDTH = 36  # characters of a line of a legend in two columns
 
 
 def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
-    """Bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
+    """Plot a bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
 
     Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin.
 
@@ -56,23 +56,23 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
     """
     ax = axes_or_new(ax)
-    area, origin, along = branch.rig.area_of(branch.along), 0.0, short(branch.along)
+    area, origin, along = branch.rig.area_of(branch.along), 0.0, short_name(branch.along)
     factor, unit = display_unit(branch.unit, branch.onset.value, area)
     reach = max((abs(one.value - branch.onset.value) for one in branch.cycles), default=0.0)
-    if 0 < reach < NARROW * abs(branch.onset.value):  # an axis of values would have them all alike
+    if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # all ticks of an axis of values would read alike
         origin = branch.onset.value
         factor, unit = display_unit(branch.unit, reach, area)
         along = f"{along} less {format_quantity(origin, branch.unit, 6, area)}"
     drive = branch.cycles[0].speed if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
     onset_speed, driven = drive, branch.along == "drive.velocity"
-    if driven:  # at every point its own
+    if driven:  # the velocity of steady sliding differs from point to point
         at = branch.cycles[0].value if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
         onset_speed = drive * branch.onset.value / at
         speed, speed_unit = display_unit("m/s", onset_speed)
-    _velocities(branch, ax, (origin, factor), speed, 1.8, True)
+    _draw_velocities(branch, ax, (origin, factor), speed, 1.8, True)
     if branch.doubled is not None:
-        _velocities(branch.doubled, ax, (origin, factor), speed, 0.9, False)
+        _draw_velocities(branch.doubled, ax, (origin, factor), speed, 0.9, False)
     line: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "linestyle": ":", "label": "steady sliding"}
     if driven:
         values = np.unique([branch.onset.value, *(one.value for one in branch.cycles)])
@@ -81,15 +81,10 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         ax.axhline(drive / speed, **line)
     kind = branch.onset.kind
     mark: dict[str, Any] = {"color": _COLOURS[kind], "marker": "o", "linestyle": "none"}
-    ax.plot(
-        [(branch.onset.value - origin) / factor],
-        [onset_speed / speed],
-        label=branch.onset.title,
-        **mark,
-    )
+    ax.plot([(branch.onset.value - origin) / factor], [onset_speed / speed], label=branch.onset.title, **mark)
     seen: set[str] = set()
     for point in (*branch.special, *(branch.doubled.special if branch.doubled else ())):
-        symbol, colour = _MARKS[point.kind]
+        symbol, colour = _MARKERS[point.kind]
         name = "" if point.kind in seen else point.kind
         seen.add(point.kind)
         x = (point.cycle.value - origin) / factor
@@ -102,19 +97,20 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     elif len(branch) and np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
         ax.set_xscale("log")
     where = f" at {branch.cycles[0].contact}" if len(branch) and branch.cycles[0].contact else ""
-    ax.set_xlabel(labelled(along, unit))
-    ax.set_ylabel(labelled(f"highest and lowest velocity{where}", speed_unit))
+    ax.set_xlabel(axis_label(along, unit))
+    ax.set_ylabel(axis_label(f"highest and lowest velocity{where}", speed_unit))
     ax.grid(color=GREY, linewidth=0.3)
     ax.legend(fontsize="small")
     return ax
 
 
-def _velocities(
+def _draw_velocities(
     branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float, width: float, named: bool
 ) -> None:
-    """Stretches of equal stability, one line each, up to the special cycles at which they end.
+    """Plot peak and lowest velocity along a branch, a line for each piece of equal stability.
 
-    Where the block stops or turns round there is no lowest velocity to draw.
+    Velocities of 0 or below, of a block that stops or turns round, are left out: the axis is logarithmic. `axis` is the
+    origin and unit of the parameter (SI), `speed` the unit of velocity (m/s).
     """
     used: set[bool] = set()
     for stretch in branch.stretches:
@@ -130,7 +126,7 @@ def _velocities(
 
 
 def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
-    """The oscillatory edge in the plane of two parameters, coloured by the kind of onset.
+    """Plot the oscillatory edge in the plane of two parameters, coloured by the kind of onset.
 
     Parameters
     ----------
@@ -146,7 +142,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
     for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
         factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.area_of(name))
         factors.append(factor)
-        names.append(labelled(short(name), shown_unit))
+        names.append(axis_label(short_name(name), shown_unit))
     x, y = curve.first / factors[0], curve.second / factors[1]
     for kind, colour in _COLOURS.items():
         here = curve.kind == kind
@@ -156,7 +152,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
             inside = here & (curve.is_edge == edge)
             if inside.any():
                 wide = inside.copy()
-                wide[1:] |= inside[:-1]  # up to the next point, so that no gap shows
+                wide[1:] |= inside[:-1]  # include the next point, so that there is no gap between pieces
                 label = kind if edge else f"{kind}, behind another edge"
                 ax.plot(np.where(wide, x, np.nan), np.where(wide, y, np.nan), style, color=colour, label=label)
     for i, point in enumerate(curve.special):
@@ -173,10 +169,10 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
 
 
 def basin(found: Basin, ax: Axes | None = None) -> Axes:
-    """What comes of every starting point: slip ahead of the load point against velocity.
+    """Plot the outcome of motion from every starting point: velocity over slip ahead of the load point.
 
-    White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles. Yellow is undecided;
-    the legend says why. Where every point returns, the picture says so.
+    White: motion returns to steady sliding (the dot). Yellow: undecided, with the reason in the legend. Dashed lines:
+    unstable cycles.
 
     Parameters
     ----------
@@ -190,9 +186,9 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     length, length_unit = display_unit(found.units[0], float(np.max(np.abs(found.x))) / 3)
     speed, speed_unit = display_unit(found.units[1], abs(found.steady[1]) or float(np.max(np.abs(found.v))))
-    names = list(_AREAS)
+    names = list(_OUTCOME_COLOURS)
     codes = np.vectorize(names.index)(found.outcome)
-    colours = ListedColormap([*_AREAS.values()])
+    colours = ListedColormap([*_OUTCOME_COLOURS.values()])
     norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, colours.N)
     ax.pcolormesh(found.x / length, found.v / speed, codes, cmap=colours, norm=norm, shading="nearest", rasterized=True)
     for i, run in enumerate(run for run in found.cycles if found.names[1] in run.units):
@@ -200,12 +196,12 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
         ax.plot(run[found.names[0]] / length, run[found.names[1]] / speed, "--", color=VERMILION, label=label)
     ax.plot([0], [found.steady[1] / speed], "o", color=BLACK, markersize=4, label="steady sliding")
     for index in np.unique(codes):
-        patch: dict[str, Any] = {"facecolor": _AREAS[names[index]], "edgecolor": GREY}
+        patch: dict[str, Any] = {"facecolor": _OUTCOME_COLOURS[names[index]], "edgecolor": GREY}
         doubts = np.unique(found.doubt[found.outcome == names[index]])
         for why in doubts:
-            label = _undecided(why) if why else names[index]
+            label = _undecided_label(why) if why else names[index]
             if where := ", ".join(sorted({*found.contact[found.outcome == names[index]].ravel()} - {""})):
-                label = fill(f"{label} at {where}", WRAPPED)
+                label = fill(f"{label} at {where}", LEGEND_WIDTH)
             ax.fill_between([], [], label=label, **patch)
     if found.v.min() > 0 and found.units[1].endswith("/s"):
         ax.set_yscale("log")
@@ -213,25 +209,25 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     ax.set_ylim(found.v.min() / speed, found.v.max() / speed)
     if np.all(found.outcome == "returns"):
         words = "every starting point in this picture returns to steady sliding"
-        ax.text(0.5, 0.04, fill(words, WRAPPED), transform=ax.transAxes, ha="center", va="bottom")
+        ax.text(0.5, 0.04, fill(words, LEGEND_WIDTH), transform=ax.transAxes, ha="center", va="bottom")
     place, height = "slip ahead of the load point", "velocity"
     if isinstance(found.rig, Machine):
         body, (kind, name) = found.names[0].rpartition(".")[0], found.names[1].rsplit(".", 1)
         place, height = f"{body} ahead of where it slides steadily", f"velocity of {body}"
         if name != "v":
             height = f"memory {name} of {kind}"
-    ax.set_xlabel(labelled(place, length_unit))
-    ax.set_ylabel(labelled(height, speed_unit))
+    ax.set_xlabel(axis_label(place, length_unit))
+    ax.set_ylabel(axis_label(height, speed_unit))
     columns = 1 if np.any(found.doubt != "") else 2
-    ax.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)  # the plane is full
+    ax.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)  # below: no room inside
     return ax
 
 
 def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
-    """Thresholds over two parameters, as `steadyslip.threshold_map` gives them for DataArrays.
+    """Plot thresholds over two parameters, from `steadyslip.threshold_map` with DataArrays.
 
-    Hatched: steady sliding is unstable. Dotted: there is none. Crossed: the threshold is undecided; the legend says
-    why. White: no kick in the range is large enough.
+    Hatched: steady sliding is unstable. Dotted: no steady sliding. Crossed: the threshold is undecided, with the reason
+    in the legend. White: no kick in the range is large enough.
 
     Parameters
     ----------
@@ -246,7 +242,7 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ParameterError
-        If `found` is something else.
+        If `found` is not such a DataArray.
     """
     dims = getattr(found, "dims", ())
     if len(dims) != 2 or not all(dim in found.coords for dim in dims):
@@ -258,7 +254,7 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     for dim in dims[::-1]:
         values = np.asarray(found[dim].values, dtype=float)
         factor, unit = display_unit(found[dim].attrs.get("units", "1"), float(np.median(np.abs(values))))
-        axes.append((values / factor, labelled(str(dim).rpartition(".")[2].replace("_", " "), unit)))
+        axes.append((values / factor, axis_label(str(dim).rpartition(".")[2].replace("_", " "), unit)))
     size = np.where(np.isfinite(found.values) & (found.values > 0), found.values, np.nan)
     (x, x_label), (y, y_label) = axes
     label = found.attrs.get("long_name", str(found.name or "threshold").replace("_", " "))
@@ -270,27 +266,27 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     if np.any(found.values == 0):
         ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="//", label="steady sliding is unstable")
-    for label, where, hatch in _without_size(found):
+    for label, where, hatch in _missing_regions(found):
         ax.contourf(x, y, where, levels=[0.5, 1.5], colors="none", hatches=[hatch])
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch=hatch, label=label)
     if not np.all(found.values > 0):
         ax.legend(fontsize="small")
     for values, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
-        if len(values) > 2 and values.min() > 0 and spaced_by_ratio(values):
+        if len(values) > 2 and values.min() > 0 and is_geometric(values):
             set_scale("log")
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
     return ax
 
 
-def _without_size(found: Any) -> list[tuple[str, Any, str]]:
-    """Words, places and hatches of what has no threshold, for each reason that there is."""
+def _missing_regions(found: Any) -> list[tuple[str, Any, str]]:
+    """Legend text, mask and hatch for each reason for which thresholds are missing."""
     missing = np.isnan(found.values)
     limit = np.asarray(found["limit"].values) if "limit" in found.coords else np.full(missing.shape, "not known")
-    doubts = cycle(_UNDECIDED)
+    doubts = cycle(_UNDECIDED_HATCHES)
     hatches = {word: next(doubts) if word.startswith("undecided") else ".." for word in np.unique(limit[missing])}
-    return [(fill(str(word), WRAPPED), missing & (limit == word), hatch) for word, hatch in hatches.items()]
+    return [(fill(str(word), LEGEND_WIDTH), missing & (limit == word), hatch) for word, hatch in hatches.items()]
 
 
-def _undecided(why: str) -> str:
-    return fill(f"undecided: {why}", WRAPPED)
+def _undecided_label(why: str) -> str:
+    return fill(f"undecided: {why}", LEGEND_WIDTH)

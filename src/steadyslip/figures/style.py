@@ -1,4 +1,4 @@
-"""What the figures share: colours, units of axes, new Axes, files that are the same on every run."""
+"""Colours, display units, new Axes and reproducible files for all figures."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import unit
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 
-# Okabe & Ito (2008): told apart with every common kind of colour vision
+# Okabe & Ito (2008): palette for all common kinds of colour vision
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#000000",
     "#E69F00",
@@ -31,7 +32,7 @@ GREY = "#BBBBBB"
 
 
 def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
-    """The Axes given, or those of a new pyplot figure, so many inches high."""
+    """The given Axes, or Axes of a new pyplot figure of the given height (inches)."""
     if ax is not None:
         return ax
     from matplotlib import pyplot as plt
@@ -39,14 +40,30 @@ def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
     return plt.subplots(figsize=(6.4, height), layout="constrained")[1]
 
 
+def new_panels(rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
+    """Axes of a new pyplot figure, shape (rows, columns); size in inches, further options of `pyplot.subplots`."""
+    from matplotlib import pyplot as plt
+
+    axes: Any = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)[1]
+    return np.asarray(axes, dtype=object)
+
+
+def given_panels(ax: Any, shape: tuple[int, ...], allowed: str) -> np.ndarray:
+    """Axes given by the user as an array; ParameterError, with `allowed`, if they do not have the given shape."""
+    given = np.asarray(ax, dtype=object)
+    if given.shape != shape:
+        raise ParameterError([Problem("ax", f"got Axes of shape {given.shape}; allowed: {allowed}")])
+    return given
+
+
 def unmanaged_axes(width: float = 6.4, height: float = 4.8) -> Axes:
-    """Axes of a figure that pyplot does not know and need not close; size in inches."""
+    """Axes of a new figure that is not registered with pyplot, so that nobody has to close it; size in inches."""
     axes: Axes = Figure(figsize=(width, height), layout="constrained").subplots()
     return axes
 
 
-def write(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -> list[Path]:
-    """Save the figure of `ax` as ``stem.png``, ...; equal figures give equal SVG bytes."""
+def save_figure(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -> list[Path]:
+    """Save the figure of `ax` as ``stem.png``, ...; return the paths. Equal figures give equal SVG bytes."""
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     figure = ax.get_figure(root=True)
     if figure is None:
@@ -58,9 +75,9 @@ def write(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -> list
 
 
 def display_unit(si_unit: str, typical: float, area: float | None = None) -> tuple[float, str]:
-    """Size in SI units, and name, of the unit in which people read a value of this size.
+    """Display unit for values of a typical size: its size in SI units, and its name.
 
-    With an `area`, quantities per unit area are drawn for the whole of it: divided by the size they are in N, ...
+    With an `area` (m²), quantities per unit area are shown as totals: a stress (Pa) divided by the size is a force (N).
 
     >>> display_unit("Pa/m", 9e9), display_unit("rad", 0.1)[1]
     ((1000000000.0, 'GPa/m'), 'deg')
@@ -70,23 +87,28 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     return factor, typeset(name)
 
 
-def arrows(ax: Axes, x: Any, y: Any, color: str) -> None:
-    """A few arrow heads along the curve, at equal distances in the figure."""
+def add_legend_above(ax: Axes, columns: int = 2, height: float = 1.04, **options: Any) -> None:
+    """Add a legend above the axes, where it covers no data; `height` leaves room for the power of ten of the y axis."""
+    ax.legend(loc="lower left", bbox_to_anchor=(0, height), ncols=columns, frameon=False, borderaxespad=0.2, **options)
+
+
+def add_arrowheads(ax: Axes, x: Any, y: Any, color: str) -> None:
+    """Draw three arrowheads along a curve, at equal distances in the figure."""
     finite = np.isfinite(x)
     x, y = x[finite], y[finite]
     if len(x) < 3:
         return
     across = np.log(x) if ax.get_xscale() == "log" else x
     width, height = np.ptp(across) or 1.0, np.ptp(y) or 1.0
-    way = np.concatenate([[0], np.cumsum(np.hypot(np.diff(across) / width, np.diff(y) / height))])
+    length = np.concatenate([[0], np.cumsum(np.hypot(np.diff(across) / width, np.diff(y) / height))])
     for share in (0.12, 0.37, 0.62):
-        i = int(np.searchsorted(way, share * way[-1]))
+        i = int(np.searchsorted(length, share * length[-1]))
         i = min(max(i, 1), len(x) - 1)
         ax.annotate(
             "", (x[i], y[i]), (x[i - 1], y[i - 1]), arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1}
         )
 
 
-def labelled(name: str, unit_name: str) -> str:
+def axis_label(name: str, unit_name: str) -> str:
     """Axis label: name and unit, 1 for plain numbers."""
     return f"{name} ({unit_name or '1'})"

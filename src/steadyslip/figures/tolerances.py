@@ -1,4 +1,4 @@
-"""What tolerances do to a verdict, parameter by parameter."""
+"""Bar chart of safety factor or growth rate within the tolerances of each parameter."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable 
 
 
 def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
-    """Draw how far the stiffness over the critical one moves, or what is told in its place: growth rates of a machine.
+    """Plot the range of stiffness over critical stiffness, or of the growth rate, within tolerances.
 
-    Each parameter alone, and all together.
+    One bar for each parameter varied alone, one for all together. Growth rates are drawn if `found.along` is empty.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     spans = {one.parameter: one.safety if edges else one.growth for one in found.alone}
     shown = [one for one in found.alone if np.all(np.isfinite(spans[one.parameter]))][::-1]
     ax = axes_or_new(ax, 1.6 + 0.55 * len(shown))
-    for place, one in enumerate(shown, start=1):
+    for row, one in enumerate(shown, start=1):
         low, high = spans[one.parameter]
-        label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: place - 1]] else None
-        ax.barh(place, high - low, 0.55, left=low, color=COLOURS[one.stable], label=label)
+        label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: row - 1]] else None
+        ax.barh(row, high - low, 0.55, left=low, color=COLOURS[one.stable], label=label)
     values = found.safety if edges else found.growth
     known = values[np.isfinite(values)]
     if len(known):
@@ -46,7 +46,7 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
     )
     ax.margins(x=0.06)
-    ax.use_sticky_edges = False  # or the widest bar would touch the frame
+    ax.use_sticky_edges = False  # otherwise the widest bar touches the frame
     ax.axvline(1.0 if edges else 0.0, color=BLACK, linewidth=1)
     own = safety_factor(found.rig, along=found.along) if edges else growth_rate(found.rig)
     ax.axvline(float(own), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")

@@ -20,7 +20,7 @@ from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.explorer.sketch import sketch
-from steadyslip.figures.inline import drawn
+from steadyslip.figures.inline import figure_html
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -140,7 +140,7 @@ def _record(record: FrozenRecord) -> Iterator[str]:
     if isinstance(record, Slider):
         yield figure(sketch(record))
     if isinstance(record, Machine):
-        yield figure(drawn(lambda: draw(record), "sketch of the machine"), _SKETCHED)
+        yield figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCHED)
     rows = []
     for path, one in (record.parameters() if isinstance(record, Machine) else parameters(record)).items():
         if one.value is not None:
@@ -172,7 +172,7 @@ def _picture(result: Any) -> str:
     if not hasattr(result, "plot"):
         return ""
     try:
-        return drawn(lambda: draw(result), type(result).__name__, 5.5)
+        return figure_html(lambda: draw(result), type(result).__name__, 5.5)
     except NotAvailable:
         return ""
 

@@ -8,7 +8,7 @@ from steadyslip import figures
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction
 from steadyslip.experiments.fitting.words import warnings
-from steadyslip.figures.inline import drawn
+from steadyslip.figures.inline import figure_html
 from steadyslip.reports import rig as of_rig
 from steadyslip.reports.brief import inside
 from steadyslip.reports.document import Parts
@@ -35,10 +35,10 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
         body += [heading("Laws compared"), lines(comparison)]
     for i, record in enumerate(result.plan.records):
         name = Path(record.source).name
-        fitted = drawn(lambda i=i: figures.fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
-        steps = drawn(lambda i=i: figures.steps(result, record=i), "steps of the record", 7.0)  # type: ignore[misc]
+        fitted = figure_html(lambda i=i: figures.fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
+        steps = figure_html(lambda i=i: figures.steps(result, record=i), "steps of the record", 7.0)  # type: ignore[misc]
         body += [figure(fitted, f"{name}: record and fit."), figure(steps, "Its steps.")]
-    corner = drawn(lambda: figures.corner(result), "uncertainty", max(6.5, 1.3 * len(rows)))
+    corner = figure_html(lambda: figures.corner(result), "uncertainty", max(6.5, 1.3 * len(rows)))
     body += [figure(corner, "What the records leave open."), heading("Details"), lines(result)]
     for record in result.plan.records:
         body += [heading(f"Record {Path(record.source).name}", 3), lines(record)]
@@ -66,7 +66,7 @@ def _drawn(result: Draws) -> list[str]:
         body.append(paragraph("It was stopped before all draws were done.", "warning"))
     return [
         *body,
-        figure(drawn(result.plot, "draws", max(6.5, 1.3 * len(rows))), "The draws, parameter against parameter."),
+        figure(figure_html(result.plot, "draws", max(6.5, 1.3 * len(rows))), "The draws, parameter against parameter."),
     ]
 
 
@@ -89,7 +89,7 @@ def _prediction(result: Prediction) -> Parts:
 @parts_of.register
 def _comparison(result: LawComparison) -> Parts:
     best = next(iter(result.fits.values()))
-    drawing = drawn(result.plot, "laws compared", 6.5)
+    drawing = figure_html(result.plot, "laws compared", 6.5)
     rows = [
         (
             label,
@@ -120,7 +120,7 @@ def _population(result: Population) -> Parts:
             own.append((name, label, alone, result.experiment(label, name).shown()))
     body = [
         heading("What was found"), table(rows, ("parameter", "mean", "mean, 95 %", "another experiment, 95 %")),
-        figure(drawn(result.plot, "population"), "Every experiment alone and with the others."),
+        figure(figure_html(result.plot, "population"), "Every experiment alone and with the others."),
         heading("The experiments"), table(own, ("parameter", "experiment", "alone", "with the others"), left=False),
         heading("In words"), lines(result),
         *(heading(f"Fit {label}") + inside(fit) for label, fit in result.fits.items()),

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from steadyslip import figures
 from steadyslip.core.format import format_quantity
-from steadyslip.figures.inline import drawn
-from steadyslip.figures.machine_verdict import left_out
+from steadyslip.figures.inline import figure_html
+from steadyslip.figures.machine_verdict import undrawn_edges
 from steadyslip.reports import rig as of_rig
 from steadyslip.reports.brief import inside
 from steadyslip.reports.document import Parts
@@ -37,12 +37,12 @@ def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Part
 
 def _picture(analysis: MachineAnalysis) -> str:
     words = "Where it is stable in each parameter, how it moves in its leading mode, and its eigenvalues."
-    if far := left_out(analysis):
+    if far := undrawn_edges(analysis):
         words += (
             f" Not drawn, but in the list below, is the edge of {', '.join(far)}: a factor of 100 away or more, or not "
             "of a positive value."
         )
-    return figure(drawn(lambda: figures.machine_verdict(analysis), words, 8.0), words)
+    return figure(figure_html(lambda: figures.machine_verdict(analysis), words, 8.0), words)
 
 
 def _verdict(analysis: MachineAnalysis) -> Iterator[str]:

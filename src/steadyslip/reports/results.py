@@ -17,8 +17,8 @@ from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
-from steadyslip.figures.inline import drawn
-from steadyslip.figures.maps import FACETS
+from steadyslip.figures.inline import figure_html
+from steadyslip.figures.maps import MAX_FACETS
 from steadyslip.files.specifications.layout import own_fields
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -92,7 +92,7 @@ def _thresholds(result: Thresholds) -> Parts:
         heading("What was found"), table(rows),
         paragraph("Sizes have no unit: logarithms of ratios of velocities, natural lengths of displacement, shares of "
                   "the normal stress, and for blows velocities of the drive.", "small"),
-        *(figure(drawn(one.plot, "basin", 6.0), "What comes of every starting point.") for one in basins),
+        *(figure(figure_html(one.plot, "basin", 6.0), "What comes of every starting point.") for one in basins),
     ]  # fmt: skip
     question = "How large a kick does the steady sliding of this rig survive, and what happens beyond?"
     return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
@@ -106,7 +106,7 @@ def _basin(result: Basin) -> Parts:
     body = [
         *about_rig(result.rig),
         heading("What was found"), table(rows, ("comes to", "share of the points")),
-        figure(drawn(result.plot, "basin", 6.5), "What comes of every starting point."),
+        figure(figure_html(result.plot, "basin", 6.5), "What comes of every starting point."),
         *(paragraph(f"{n} undecided: {why}.", "small") for why, n in zip(reasons, numbers, strict=True)),
     ]  # fmt: skip
     question = "From which starting points does this rig return to steady sliding?"
@@ -134,7 +134,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
         if result.missing[name]:
             missing = f"It does not exist at {100 * result.missing[name]:.3g} % of the points, which are left out."
             body.append(paragraph(missing, "warning"))
-    body.append(figure(drawn(result.plot, "shares of variance", 6.5), "Shares of the variance (Sobol indices)."))
+    body.append(figure(figure_html(result.plot, "shares of variance", 6.5), "Shares of the variance (Sobol indices)."))
     if result.interrupted:
         body.append(paragraph("It was stopped before all points were done.", "warning"))
     (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
@@ -184,12 +184,12 @@ def _analysis(result: Analysis) -> Parts:
 def _history(result: History) -> Parts:
     rig, text = result.rig, of_rig.as_file(result.rig, result.protocol)
     said = PLANE_OF_CONTACT if isinstance(rig, Machine) else PLANE
-    plane = figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), said)
+    plane = figure(figure_html(lambda: figures.phase_plane(result), "phase plane", 5.5), said)
     body = [
         *about_rig(rig),
         heading("What was done to it"), *done_to(rig, result.protocol),
         heading("What it did"), *_words(result.summary()),
-        figure(drawn(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load(rig)}."),
+        figure(figure_html(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load(rig)}."),
         plane,
         *_slips(result),
     ]  # fmt: skip
@@ -269,7 +269,7 @@ def _branch(result: CycleBranch) -> Parts:
     body = [
         *about_rig(result.rig),
         heading("The cycles"), *_words(rest),
-        figure(drawn(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
+        figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
         table(special, ("special", along, "period")),
         table(listed, (along, "period", "peak velocity", drop, ""), left=False),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
@@ -318,12 +318,12 @@ def _verdicts(result: MapResult) -> str:
 def _pictures(result: MapResult) -> Iterator[str]:
     """Over the first two parameters: for each of a few values of a third, else at the values of the rig."""
     others = [name for name in result.dims if name != "sample"][2:]
-    if len(others) == 1 and len(result.read(others[0])) <= FACETS:
+    if len(others) == 1 and len(result.read(others[0])) <= MAX_FACETS:
         words = f"One picture for each value of {others[0]}."
-        yield figure(drawn(lambda: result.plot(facet=others[0]), words), words)
+        yield figure(figure_html(lambda: result.plot(facet=others[0]), words), words)
         return
     held = f"At the rig's own {', '.join(others)}, or next to it." if others else ""
-    yield figure(drawn(lambda: result.plot(), "map", 6.5), held)
+    yield figure(figure_html(lambda: result.plot(), "map", 6.5), held)
 
 
 def sentence(text: str) -> str:

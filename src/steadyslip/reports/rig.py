@@ -11,7 +11,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
-from steadyslip.figures.inline import drawn
+from steadyslip.figures.inline import figure_html
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
@@ -98,10 +98,10 @@ def _charts(analysis: Analysis) -> Iterator[str]:
     near = [one.parameter for one in analysis.margins if one.edge is not None and one.parameter != stiffness]
     for name in near[:2]:
         words = f"Where sliding is stable over {name} and {stiffness}; the dot is this rig."
-        chart = drawn(lambda name=name: figures.stability_chart(rig, name, stiffness, points=101), words, 6.0)  # type: ignore[misc]
+        chart = figure_html(lambda name=name: figures.stability_chart(rig, name, stiffness, points=101), words, 6.0)  # type: ignore[misc]
         yield figure(chart, words)
     if analysis.stable is not None:
-        locus = drawn(lambda: figures.root_locus(rig), "root locus", 6.0)
+        locus = figure_html(lambda: figures.root_locus(rig), "root locus", 6.0)
         yield figure(
             locus, f"Eigenvalues of small disturbances as {stiffness} varies; to the right of the axis they grow."
         )
@@ -129,7 +129,9 @@ def _confidence(prediction: Prediction | None) -> Iterator[str]:
         return
     yield heading("How sure is that?")
     yield rows_of(str(prediction))
-    yield figure(drawn(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig.")
+    yield figure(
+        figure_html(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig."
+    )
 
 
 def within(found: Tolerated | None) -> Iterator[str]:
@@ -142,4 +144,4 @@ def within(found: Tolerated | None) -> Iterator[str]:
     if found.along:
         left = "left of 1 the stiffness is less than critical" if found.along == STIFFNESS else "1 is the edge"
     words = f"Each parameter alone within its tolerance, and all of them; {left}."
-    yield figure(drawn(lambda: found.plot(), "tolerances", 7.0), words)
+    yield figure(figure_html(lambda: found.plot(), "tolerances", 7.0), words)

@@ -59,7 +59,7 @@ def reproduce(folder: str | PathLike[str], *, progress: bool | None = None) -> l
         folder.mkdir(parents=True, exist_ok=True)
         with progress_bar(len(FIGURES) + 1, progress, "figures and table") as advanced:
             for figure in FIGURES:
-                written += style.write(figure.draw(style.unmanaged_axes()), folder / figure.name)
+                written += style.save_figure(figure.draw(style.unmanaged_axes()), folder / figure.name)
                 if advanced is not None:
                     advanced(1)
             table = paper_table()

@@ -1,4 +1,4 @@
-"""What follows from fits: profiles, laws compared, experiments ranked, and the verdict on another rig."""
+"""Figures of answers from fits: likelihood profiles, comparison of laws, ranking of experiments, predictions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments.answers.predict import probability_text
-from steadyslip.figures.experiments.panels import brief, grid
+from steadyslip.figures.experiments.panels import axis_name, panel_grid
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -22,8 +22,8 @@ from steadyslip.figures.style import (
     SKY,
     VERMILION,
     axes_or_new,
+    axis_label,
     display_unit,
-    labelled,
 )
 from steadyslip.nonlinear.kicks.kicks import KICKS
 
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from steadyslip.experiments import LawComparison, Prediction, Profile
     from steadyslip.experiments.answers.precision import Ranking
 
-FAR = 10.0  # widths of what nearly all draws give by which a rig's own value is off the axis of their distribution
+MAX_AXIS_DISTANCE = 10.0  # widths of the 95 % range of draws within which the rig's own value is drawn (by trial)
 
 
 def profile(result: Profile, ax: Axes | None = None) -> Axes:
-    """How fast the misfit rises away from the best value, and the intervals of 68 and 95 % that this gives.
+    """Plot the rise of the misfit away from the best value of a parameter, and the 68 and 95 % intervals it gives.
 
-    Grey: what the fit's error alone stands for, a parabola in the coordinate; where the two part, the parameter's
-    likelihood is not Gaussian.
+    Grey: parabola of a Gaussian likelihood with the error of the fit. Where the two differ, the likelihood is not
+    Gaussian.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
             ax.axvline(end, color=VERMILION, linewidth=1, linestyle=style)
         ax.plot([], [], color=VERMILION, linestyle=style, label=f"{100 * level:.0f} %")
     ax.set_ylim(0.0, min(top, 12.0))
-    ax.set_xlabel(labelled(brief(result.name), unit))
+    ax.set_xlabel(axis_label(axis_name(result.name), unit))
     ax.set_ylabel("rise of the misfit, −2 ln of the profile likelihood (1)")
     cut = "" if np.all(np.isfinite(result.interval(0.95))) else "; the profile ends before 95 %"
     ax.set_title(f"likelihood: {'Gaussian' if result.gaussian else 'not Gaussian'}{cut}", fontsize="medium")
@@ -73,7 +73,7 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
 
 
 def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
-    """Laws by how much worse than the best they explain the records, by both criteria.
+    """Plot AIC and BIC of each law above the best of all.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
         values = np.array([result.criteria[label][k] for label in labels])
         ax.barh(place + 0.2 - 0.4 * k, values - values.min(), 0.38, color=colour, label=name)
     for y, label in zip(place, labels, strict=True):
-        text = f"{len(result.fits[label].space)} parameters, weight {_weight(result.weights[label])}"
+        text = f"{len(result.fits[label].space)} parameters, weight {_format_weight(result.weights[label])}"
         ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
     ax.set_yticks(place, labels)
     ax.set_xlabel("criterion above that of the best (1)")
@@ -99,13 +99,13 @@ def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _weight(share: float) -> str:
-    """A share that is never rounded to nothing or to certainty."""
+def _format_weight(share: float) -> str:
+    """Percent text of a weight (0 to 1), never rounded to 0 or 100 %."""
     return "< 0.1 %" if share < 0.001 else "> 99.9 %" if share > 0.999 else format_percent(round(share, 3))
 
 
 def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
-    """Experiments by the error that they would leave in one parameter.
+    """Plot, for each experiment, the expected error of one parameter.
 
     Parameters
     ----------
@@ -134,12 +134,12 @@ def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
         ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
     ax.set_yticks(place, labels)
     ax.set_ylim(-0.6, len(labels) - 0.4)
-    ax.set_xlabel(labelled(f"error of {brief(result.parameter)}", unit))
+    ax.set_xlabel(axis_label(f"error of {axis_name(result.parameter)}", unit))
     return ax
 
 
 def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
-    """Distribution of the critical stiffness that the records allow, and the rig's own stiffness.
+    """Plot a histogram of the predicted critical stiffness, and the stiffness of the rig.
 
     Parameters
     ----------
@@ -156,11 +156,11 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     if not len(critical):
         raise NotAvailable("no draw has a critical stiffness; the verdict does not depend on the stiffness")
     factor, unit = display_unit("Pa/m", max(float(np.median(critical)), own), result.rig.area)
-    ax.hist(critical / factor, bins=_bins(len(critical)), color=SKY, label="critical stiffness")
+    ax.hist(critical / factor, bins=_bin_count(len(critical)), color=SKY, label="critical stiffness")
     low, high = np.quantile(critical, [0.025, 0.975])
-    if low - FAR * (high - low) <= own <= high + FAR * (high - low):
+    if low - MAX_AXIS_DISTANCE * (high - low) <= own <= high + MAX_AXIS_DISTANCE * (high - low):
         ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
-    else:  # a scale that reaches it would leave nothing to see of the distribution
+    else:  # an axis that reaches it would squeeze the histogram to a line
         side = "beyond" if own > high else "below"
         ax.plot(
             [],
@@ -172,7 +172,7 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     ax.axvline(middle / factor, color=BLACK, linewidth=1, linestyle="--", label="median")
     if missing := np.mean(~np.isfinite(result.critical_stiffness)):
         ax.plot([], [], " ", label=f"{format_percent(missing)} of the draws have none")
-    ax.set_xlabel(labelled("stiffness", unit))
+    ax.set_xlabel(axis_label("stiffness", unit))
     ax.set_ylabel("draws (1)")
     probability = probability_text(result.probability_stable, len(result.stable))
     ax.set_title(f"stable with probability {probability}", fontsize="medium",
@@ -181,22 +181,22 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _bins(count: int) -> int:
-    """Of a histogram of so many draws."""
+def _bin_count(count: int) -> int:
+    """Number of bins of a histogram of so many draws: Rice's rule, 5 to 60."""
     return int(np.clip(round(2 * count ** (1 / 3)), 5, 60))
 
 
 def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
-    """Distribution of the kicks that the rig survives, one panel for every kind of kick.
+    """Plot histograms of the largest kick that the rig survives, one panel for each kind of kick.
 
-    The title says in how many of the draws no kick fails, steady sliding is unstable, or the threshold is undecided;
-    with those that are drawn they are all.
+    The title has the shares of draws that are in the histogram, where no kick fails, where steady sliding is unstable,
+    and where the threshold is undecided.
 
     Parameters
     ----------
     result : Prediction
     ax : array of matplotlib Axes, optional
-        One for every kind of kick.
+        One for each kind of kick.
 
     Returns
     -------
@@ -205,11 +205,11 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
     if not result.thresholds:
         raise NotAvailable("no thresholds were asked for; write predict(..., kick='velocity')")
     count = len(result.thresholds)
-    panels = grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.0 + 4.2 * count, 3.6))[0]
+    panels = panel_grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.0 + 4.2 * count, 3.6))[0]
     for panel, (kick, sizes) in zip(panels, result.thresholds.items(), strict=True):
         fails = np.isfinite(sizes) & (sizes > 0)
         if np.any(fails):
-            panel.hist(sizes[fails], bins=_bins(int(np.sum(fails))), color=SKY, label="draws")
+            panel.hist(sizes[fails], bins=_bin_count(int(np.sum(fails))), color=SKY, label="draws")
             panel.axvline(
                 float(np.median(sizes[fails])), color=BLACK, linewidth=1, linestyle="--", label="median of these"
             )
@@ -224,6 +224,6 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
         if len(words) == 1:
             words = [f"{words[0].rpartition(' 100')[0]}: all {len(sizes)} draws"]
         panel.set_title("\n".join(textwrap.wrap(", ".join(words), 48)), fontsize="small")
-        panel.set_xlabel(labelled(f"{kick} kick that is survived, {KICKS[kick].size}", "1"))
+        panel.set_xlabel(axis_label(f"{kick} kick that is survived, {KICKS[kick].size}", "1"))
         panel.set_ylabel("draws (1)")
     return np.asarray(panels)

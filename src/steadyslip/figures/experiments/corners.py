@@ -1,4 +1,4 @@
-"""Estimates against each other, with the regions that hold 68 and 95 % of the probability."""
+"""Corner plot: estimates against each other, with the regions of 68 and 95 % probability."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from scipy.stats import chi2, norm
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.answers.uncertainty import Draws
-from steadyslip.figures.experiments.panels import brief, grid
-from steadyslip.figures.style import BLACK, BLUE, SKY, VERMILION, display_unit, labelled
+from steadyslip.figures.experiments.panels import axis_name, panel_grid
+from steadyslip.figures.style import BLACK, BLUE, SKY, VERMILION, axis_label, display_unit
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
 
 LEVELS = (0.68, 0.95)
 STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
-PILED = 0.02  # of draws: so many at one end lie where the search ended
-BINS = 48  # of a histogram of draws
-MOST_DRAWN = 4000  # draws that are drawn as dots
+PILE_UP_SHARE = 0.02  # share of draws exactly at one end above which that end is a bound of the search (by trial)
+BINS = 48  # along each axis of the density of draws, finer than its smoothing (by trial)
+MAX_DOTS = 4000  # draws plotted as dots; more only darken the panel (by trial)
 
 
 def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
-    """Parameters against each other: regions of 68 and 95 %, exact for a fit's covariance, of draws as they fell.
+    """Plot determined parameters against each other, with regions of 68 and 95 % probability.
+
+    For a fit they are those of its normal distribution, for draws those of their smoothed density.
 
     Parameters
     ----------
@@ -43,7 +45,7 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     if not names:
         raise NotAvailable("no parameter is determined; there is nothing to draw")
     size = max(3.0, 1.5 * len(names) + 0.8)
-    panels = grid(ax, len(names), len(names), (size, size))
+    panels = panel_grid(ax, len(names), len(names), (size, size))
     scales = [_Scale(source[name]) for name in names]
     for i, row in enumerate(names):
         for k, column in enumerate(names):
@@ -52,9 +54,9 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
                 panel.set_visible(False)
                 continue
             if isinstance(result, Draws):
-                _drawn(panel, scales[k](result[column]), scales[i](result[row]), i == k)
+                _draw_sample(panel, scales[k](result[column]), scales[i](result[row]), i == k)
             else:
-                _outlined(panel, result, (column, row), (scales[k], scales[i]))
+                _draw_normal_regions(panel, result, (column, row), (scales[k], scales[i]))
             if i == len(names) - 1:
                 panel.set_xlabel(scales[k].label, fontsize="small")
             if k == 0 and i:
@@ -66,35 +68,37 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
             panel.axvline(scales[k].best, color=VERMILION, linewidth=0.8)
             if i != k:
                 panel.axhline(scales[i].best, color=VERMILION, linewidth=0.8)
-    if len(names) > 1:  # in the room that the panels above the diagonal leave
+    if len(names) > 1:  # in the empty upper triangle
         color = BLACK if isinstance(result, Draws) else BLUE
         lines = [Line2D([], [], color=color, linestyle=style, linewidth=1) for style in STYLES]
         words = [f"holds {100 * level:.0f} %" for level in LEVELS]
         lines.append(Line2D([], [], color=VERMILION, linewidth=0.8))
         place = {"loc": "upper left", "bbox_to_anchor": (1.15, 1.0), "borderaxespad": 0.0}
         legend = panels[0, 0].legend(lines, [*words, "best fit"], fontsize="small", frameon=False, **place)
-        legend.set_in_layout(False)  # it would push the second column aside
+        legend.set_in_layout(False)  # otherwise the layout moves the second column
     return panels
 
 
 class _Scale:
-    """Values of a parameter as its axis shows them; times of a clock are shown from the best one on."""
+    """Display unit and label of a parameter; times are relative to the best value. Calling it converts SI values."""
 
     def __init__(self, one: Estimate) -> None:
         clock = one.unit == "s"
         self.origin = one.value if clock else 0.0
         self.size, unit = display_unit(one.unit, one.error if clock else abs(one.value) or one.error, one.area)
         self.best = (one.value - self.origin) / self.size
-        self.label = labelled(f"{brief(one.name)}\n\u2212 {one.value:.7g} s" if clock else brief(one.name), unit)
+        self.label = axis_label(
+            f"{axis_name(one.name)}\n\u2212 {one.value:.7g} s" if clock else axis_name(one.name), unit
+        )
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         return (values - self.origin) / self.size
 
 
-def _outlined(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scale, _Scale]) -> None:
-    """The normal distribution of two coordinates, or of one, brought to the parameters themselves.
+def _draw_normal_regions(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scale, _Scale]) -> None:
+    """Plot the normal distribution of one or two search coordinates of a fit, transformed to the parameters.
 
-    It ends where the search did, such as at the samples between which a step lies.
+    It is cut at the bounds of the search, such as the samples between which a step lies.
     """
     one, other = (fit.index(name) for name in names)
     places = [fit.coordinates[i] for i in (one, other)]
@@ -119,17 +123,17 @@ def _outlined(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scal
         panel.plot(*curve, color=BLUE, linewidth=1, linestyle=style, label=f"{100 * level:.0f} %")
 
 
-def _drawn(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None:
-    """Draws as dots, and lines of equal density around 68 and 95 % of them."""
+def _draw_sample(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None:
+    """Plot draws as dots, with contours of density around 68 and 95 % of them; a histogram if `alone`."""
     if alone:
         panel.hist(x, bins=round(np.clip(2 * len(x) ** (1 / 3), 5, 40)), color=SKY)  # Rice's rule
         panel.set_yticks([])
         return
-    few = slice(0, MOST_DRAWN)
+    few = slice(0, MAX_DOTS)
     panel.plot(x[few], y[few], ".", color=SKY, markersize=1, alpha=0.4, rasterized=True)
     spread = np.cov(x, y)
     if np.linalg.det(spread) > 0:
-        root = np.linalg.cholesky(spread)  # in its coordinates draws are as wide in all directions, and smoothed so
+        root = np.linalg.cholesky(spread)  # whitened coordinates u, v: unit covariance, so one width smooths both
         u, v = np.linalg.solve(root, np.array([x, y]))
         counts, columns, rows = np.histogram2d(u, v, bins=BINS)
         widths = [len(u) ** (-1 / 6) / (edges[1] - edges[0]) for edges in (columns, rows)]  # Scott's rule, in bins
@@ -139,15 +143,18 @@ def _drawn(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None:
         middles = np.meshgrid(*(e[0] + (e[1] - e[0]) * places for e in (columns, rows)), indexing="ij")
         panel.contour(
             *np.einsum("ij,jkl->ikl", root, np.array(middles)), density,
-            levels=[region(density, level) for level in LEVELS[::-1]], colors=BLACK, linewidths=1,
+            levels=[density_level(density, level) for level in LEVELS[::-1]], colors=BLACK, linewidths=1,
             linestyles=STYLES[::-1],
         )  # fmt: skip
-    for values, limit in ((x, panel.set_xlim), (y, panel.set_ylim)):  # no line where no draw can be
+    for values, limit in ((x, panel.set_xlim), (y, panel.set_ylim)):  # end the axis at a bound of the search
         low, high = float(np.min(values)), float(np.max(values))
-        limit(low if np.mean(values == low) > PILED else None, high if np.mean(values == high) > PILED else None)
+        limit(
+            low if np.mean(values == low) > PILE_UP_SHARE else None,
+            high if np.mean(values == high) > PILE_UP_SHARE else None,
+        )
 
 
-def region(density: np.ndarray, share: float) -> float:
-    """The density above which a share of the whole lies."""
+def density_level(density: np.ndarray, share: float) -> float:
+    """Density above which the given share (0 to 1) of the total lies."""
     falling = np.sort(density, axis=None)[::-1]
     return float(falling[np.searchsorted(np.cumsum(falling), share * np.sum(falling))])

@@ -1,4 +1,4 @@
-"""Fits to records: model beside data, residuals and how they remember each other, and every step on its own."""
+"""Figures of fits to records: model beside data, residuals, their autocorrelation, and every step enlarged."""
 
 from __future__ import annotations
 
@@ -10,21 +10,29 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.numerics.noise import autocorrelation
-from steadyslip.figures.experiments.panels import LEGEND, clock, dots, file_name, grid, stacked, time_label
-from steadyslip.figures.experiments.records import rates, stresses
-from steadyslip.figures.style import BLACK, BLUE, GREY, SKY, VERMILION, display_unit, labelled
+from steadyslip.figures.experiments.panels import (
+    LEGEND_DOT_SIZE,
+    dot_size,
+    panel_grid,
+    stacked_panels,
+    time_axis,
+    time_label,
+    title_name,
+)
+from steadyslip.figures.experiments.records import draw_normal_stress, draw_rates
+from steadyslip.figures.style import BLACK, BLUE, GREY, SKY, VERMILION, axis_label, display_unit
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Fit, Record
 
-MOST_LAGS = 60
-MOST_STEPS = 12
-WANDERS = 0.01  # of the normal stress: a smooth change of less is not drawn
-AROUND = (0.15, 0.6)  # of the time to the neighbouring steps that a zoom shows before and after one
+MAX_LAGS = 60  # lags (samples) of the autocorrelation
+MAX_STEPS = 12  # panels of `steps`: four rows of three
+MIN_STRESS_CHANGE = 0.01  # relative smooth change of normal stress below which it has no panel (by trial)
+ZOOM_SHARES = (0.15, 0.6)  # shares of the time to the previous and next step that are shown (by trial)
 
 
 def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:
-    """What drives the model, record and model, residuals, and their autocorrelation.
+    """Plot load-point rate, record and model, residuals, and their autocorrelation.
 
     The normal stress has a panel of its own, the second, where it changes.
 
@@ -34,7 +42,7 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
     ax : four matplotlib Axes, optional
         Five with one for the normal stress.
     record : int, optional
-        Which of several records to draw.
+        Index of the record to draw.
 
     Returns
     -------
@@ -42,23 +50,23 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
     """
     data = result.plan.records[record]
     pressed = result.plan.pressed and _is_pressed(data)
-    given = stacked(ax, (1.1, *[0.9] * pressed, 2.2, 1.1, 1.1), shared=3 + pressed)
+    given = stacked_panels(ax, (1.1, *[0.9] * pressed, 2.2, 1.1, 1.1), shared=3 + pressed)
     panels = given if not pressed else given[[0, 2, 3, 4]]
-    factor, unit, _ = clock(data)
-    time = (data.time - clock(data)[2]) / factor
-    panels[0].set_title(file_name(data), fontsize="medium", parse_math=False)
-    rates(data, panels[0], time)
+    factor, unit, origin = time_axis(data)
+    time = (data.time - origin) / factor
+    panels[0].set_title(title_name(data), fontsize="medium", parse_math=False)
+    draw_rates(data, panels[0], time)
     if pressed:
-        stresses(data, given[1], time)
-    _beside(panels[1], time, data.friction, result.part(result.model, record))
+        draw_normal_stress(data, given[1], time)
+    _draw_record_and_model(panels[1], time, data.friction, result.part(result.model, record))
     residuals = result.part(result.residuals, record)
-    panels[2].plot(time, 1e3 * residuals, ".", color=SKY, markersize=dots(len(time)), rasterized=True)
-    panels[2].plot(time, 1e3 * _running(residuals), color=VERMILION, linewidth=1, label="running mean")
+    panels[2].plot(time, 1e3 * residuals, ".", color=SKY, markersize=dot_size(len(time)), rasterized=True)
+    panels[2].plot(time, 1e3 * _running_mean(residuals), color=VERMILION, linewidth=1, label="running mean")
     panels[2].axhline(0, color=BLACK, linewidth=0.8)
     panels[2].set_ylabel("residual (10⁻³)")
     panels[2].legend(loc="best", fontsize="small")
     panels[2].set_xlabel(time_label(data, unit))
-    _memory(panels[3], result, residuals, record)
+    _draw_autocorrelation(panels[3], result, residuals, record)
     for panel in given:
         panel.grid(color=GREY, linewidth=0.3)
         panel.yaxis.label.set_size("small")
@@ -66,26 +74,26 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
 
 
 def _is_pressed(data: Record) -> bool:
-    """Whether the normal stress of a record changes, by more than it wanders."""
+    """True if the commanded normal stress of a record has steps, or a smooth change above `MIN_STRESS_CHANGE`."""
     course = data.loading.stress
     if course is None:
         return False
     return bool(course.changes) or (
-        course.curve is not None and float(np.ptp(course.at(data.time))) > WANDERS * course.first
+        course.curve is not None and float(np.ptp(course.at(data.time))) > MIN_STRESS_CHANGE * course.first
     )
 
 
-def _beside(ax: Axes, time: np.ndarray, data: np.ndarray, model: np.ndarray, named: bool = True) -> None:
-    ax.plot(time, data, ".", color=SKY, markersize=dots(len(time)), label="record", rasterized=True)
+def _draw_record_and_model(ax: Axes, time: np.ndarray, data: np.ndarray, model: np.ndarray, named: bool = True) -> None:
+    ax.plot(time, data, ".", color=SKY, markersize=dot_size(len(time)), label="record", rasterized=True)
     ax.plot(time, model, color=BLACK, linewidth=1, label="model")
     if named:
         ax.set_ylabel("friction τ/σ (1)")
-        ax.legend(loc="best", fontsize="small", markerscale=LEGEND / dots(len(time)))
+        ax.legend(loc="best", fontsize="small", markerscale=LEGEND_DOT_SIZE / dot_size(len(time)))
 
 
-def _memory(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
-    """Autocorrelation of the residuals, that of the noise that errors reckon with, and what chance alone gives."""
-    lags = np.arange(min(MOST_LAGS, len(residuals) // 4) + 1)
+def _draw_autocorrelation(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
+    """Plot the autocorrelation of residuals, that of the noise model of the errors, and 95 % limits of white noise."""
+    lags = np.arange(min(MAX_LAGS, len(residuals) // 4) + 1)
     ax.bar(lags, autocorrelation(residuals, lags[-1]), width=0.6, color=SKY, label="residuals")
     noise = result.noise[record]
     known = noise.covariance[: len(lags)] / noise.covariance[0] if noise.covariance[0] > 0 else np.ones(1)
@@ -98,7 +106,7 @@ def _memory(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
 
 
 def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
-    """Record and model around every step, three in a row; of the first twelve, where there are more.
+    """Plot record and model around each of the first twelve steps, three in a row.
 
     Parameters
     ----------
@@ -117,22 +125,24 @@ def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
         If there are no steps.
     """
     data = result.plan.records[record]
-    shown = data.steps[:MOST_STEPS]
+    shown = data.steps[:MAX_STEPS]
     if not shown:
         raise NotAvailable(f"{data.source}: no steps were found in this record")
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
-    panels = grid(ax, rows, columns, (1.0 + 2.9 * columns, 0.6 + 2.3 * rows))
+    panels = panel_grid(ax, rows, columns, (1.0 + 2.9 * columns, 0.6 + 2.3 * rows))
     model = result.part(result.model, record)
     for k, panel in enumerate(panels.flat):
         if k >= len(shown):
             panel.set_visible(False)
             continue
-        inside = _around(data, k)
+        inside = _samples_near(data, k)
         factor, unit = display_unit("s", float(np.ptp(data.time[inside])))
-        _beside(panel, (data.time[inside] - shown[k].time) / factor, data.friction[inside], model[inside], named=k == 0)
+        _draw_record_and_model(
+            panel, (data.time[inside] - shown[k].time) / factor, data.friction[inside], model[inside], named=k == 0
+        )
         panel.axvline(0.0, color=BLUE, linewidth=0.8, linestyle="--")
-        panel.set_xlabel(labelled("time after step", unit))
+        panel.set_xlabel(axis_label("time after step", unit))
         panel.set_title(str(shown[k]).partition(": ")[2].replace("um", "µm"), fontsize="small")
         panel.grid(color=GREY, linewidth=0.3)
         panel.ticklabel_format(axis="y", useOffset=False)
@@ -144,16 +154,18 @@ def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
     return panels
 
 
-def _around(data: Record, k: int) -> np.ndarray:
-    """Samples near a step: more after it than before, none beyond its neighbours."""
+def _samples_near(data: Record, k: int) -> np.ndarray:
+    """Mask (n,) of the samples near step `k`: more after it than before, none beyond the neighbouring steps."""
     ends = [float(data.time[0]), *(step.time for step in data.steps), float(data.time[-1])]
     before, at, after = ends[k : k + 3]
     reach = max(after - at, 1e-300)
-    return np.asarray((data.time >= at - AROUND[0] * min(at - before, reach)) & (data.time <= at + AROUND[1] * reach))
+    return np.asarray(
+        (data.time >= at - ZOOM_SHARES[0] * min(at - before, reach)) & (data.time <= at + ZOOM_SHARES[1] * reach)
+    )
 
 
-def _running(values: np.ndarray) -> np.ndarray:
-    """Mean over a fiftieth of the record, shorter at its ends."""
+def _running_mean(values: np.ndarray) -> np.ndarray:
+    """Running mean over a fiftieth of the record, over fewer samples at its ends."""
     half = max(len(values) // 100, 1)
     total = np.concatenate([[0.0], np.cumsum(values)])
     low = np.maximum(np.arange(len(values)) - half, 0)

@@ -1,4 +1,4 @@
-"""What figures of experiments share: panels, axes of time, names."""
+"""Helpers for figures of experiments: panels, time axis, names of parameters and records."""
 
 from __future__ import annotations
 
@@ -6,87 +6,74 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.figures.style import display_unit, labelled
+from steadyslip.figures.style import axis_label, display_unit, given_panels, new_panels
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Record
     from steadyslip.experiments.loading.loading import Course
 
-LONGEST_NAME = 60  # characters of a file's name in a title
-LEGEND = 6.0  # size of dots in a legend
+MAX_NAME_LENGTH = 60  # characters of a file name in a title: what fits above a panel
+LEGEND_DOT_SIZE = 6.0  # size of dots in a legend, points: dots of data can be too small to see there
 
 
-def stacked(ax: Any, heights: tuple[float, ...], shared: int | None = None) -> np.ndarray:
-    """Axes above each other, those given or new ones; the first `shared` have the time in common."""
+def stacked_panels(ax: Any, heights: tuple[float, ...], shared: int | None = None) -> np.ndarray:
+    """Axes above each other (given or new) with relative heights; the first `shared`, or all, share the x axis."""
     count = len(heights)
     if ax is not None:
         return given_panels(ax, (count,), f"a sequence of {count}")
-    from matplotlib import pyplot as plt
-
-    _, axes = plt.subplots(
-        count, 1, figsize=(6.8, 1.4 + 1.1 * sum(heights)), layout="constrained", height_ratios=heights
-    )
-    for panel in axes[1 : count if shared is None else shared]:
+    axes: np.ndarray = new_panels(count, 1, (6.8, 1.4 + 1.1 * sum(heights)), height_ratios=heights)[:, 0]
+    shared = shared or count
+    for panel in axes[1:shared]:
         panel.sharex(axes[0])
-    for panel in axes[: (count if shared is None else shared) - 1]:
+    for panel in axes[: shared - 1]:
         panel.tick_params(labelbottom=False)
-    return np.asarray(axes, dtype=object)
+    return axes
 
 
-def grid(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> np.ndarray:
-    """Rows and columns of Axes, those given or new ones."""
+def panel_grid(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> np.ndarray:
+    """Axes of shape (rows, columns): those given, or new ones of a figure of the given size (inches)."""
     if ax is not None:
         return given_panels(ax, (rows, columns), f"{rows} by {columns}")
-    from matplotlib import pyplot as plt
-
-    _, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False)
-    return np.asarray(axes, dtype=object)
+    return new_panels(rows, columns, size)
 
 
-def given_panels(ax: Any, shape: tuple[int, ...], allowed: str) -> np.ndarray:
-    """The Axes that a caller gave, of the right number."""
-    given = np.asarray(ax, dtype=object)
-    if given.shape != shape:
-        raise ParameterError([Problem("ax", f"got Axes of shape {given.shape}; allowed: {allowed}")])
-    return given
-
-
-def clock(data: Record) -> tuple[float, str, float]:
-    """Unit of time for an axis, its name, and where its zero is: the first step, or the first sample."""
+def time_axis(data: Record) -> tuple[float, str, float]:
+    """Size (s) and name of the unit of a time axis, and the time (s) of its zero: first step, or else first sample."""
     origin = data.steps[0].time if data.steps else float(data.time[0])
     factor, unit = display_unit("s", float(np.ptp(data.time)))
     return factor, unit, origin
 
 
 def time_label(data: Record, unit: str) -> str:
-    """Name of the axis that `clock` makes."""
+    """Label of the time axis of a record, with the given unit."""
     if not data.steps:
-        return labelled("time", unit)
-    return labelled("time after step" if len(data.steps) == 1 else "time after first step", unit)
+        return axis_label("time", unit)
+    return axis_label("time after step" if len(data.steps) == 1 else "time after first step", unit)
 
 
-def file_name(data: Record) -> str:
-    """The last part of where a record comes from, without its middle where it is too long for a title."""
+def title_name(data: Record) -> str:
+    """File name of a record for a title; the middle of a long name is left out."""
     name = data.source.replace("\\", "/").rpartition("/")[2]
-    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME // 2]}…{name[-LONGEST_NAME // 2 + 1 :]}"
+    return (
+        name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH // 2]}…{name[-MAX_NAME_LENGTH // 2 + 1 :]}"
+    )
 
 
-def dots(count: int) -> float:
-    """Size of the dots of so many samples: smaller the more there are."""
+def dot_size(count: int) -> float:
+    """Marker size in points for so many samples: smaller for more, between 2 and 6."""
     return float(np.clip(2.0 * np.sqrt(1000 / max(count, 1)), 2.0, 6.0))
 
 
-def followed(course: Course, data: Record, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What was commanded, and the places on an axis of times, its corners between samples included."""
+def commanded_curve(course: Course, data: Record, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Axis positions and commanded values of a course at the samples and at its corners between them."""
     ends = [t for c in course.changes for t in (c.time, c.time + max(c.duration, 1e-9 * float(np.ptp(data.time))))]
     inside = [t for t in ends if data.time[0] < t < data.time[-1]]
     moments = np.sort(np.concatenate([data.time, inside]))
     return np.interp(moments, data.time, time), course.at(moments)
 
 
-def brief(name: str) -> str:
-    """A parameter's name as short as it is clear on an axis."""
+def axis_name(name: str) -> str:
+    """Short name of a fitted parameter for an axis: last part, with its memory variable; steps and jumps in full."""
     first, _, last = name.rpartition(".")
     if ".states" in first:
         return f"{last} {first.rpartition('.')[2]}"

@@ -1,4 +1,4 @@
-"""Several experiments and the population that they are members of."""
+"""Figure of a population of experiments: estimates of each, mean, and spread."""
 
 from __future__ import annotations
 
@@ -6,32 +6,34 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.figures.experiments.panels import brief, grid
-from steadyslip.figures.style import BLUE, GREY, SKY, VERMILION, display_unit, labelled
+from steadyslip.figures.experiments.panels import axis_name, panel_grid
+from steadyslip.figures.style import BLUE, GREY, SKY, VERMILION, axis_label, display_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from steadyslip.experiments import Estimate, Population
 
-APART = 0.15  # of a row: what one experiment says alone, and with the others
+ROW_OFFSET = 0.15  # vertical offset, in rows, between the estimate of an experiment alone and the pooled one
 
 
 def population(result: Population, ax: Any = None) -> np.ndarray:
-    """Every parameter of every experiment, alone and with the others, over the mean and what another one would have.
+    """Plot each parameter of each experiment, fitted alone and pooled, with the ranges of mean and new members.
 
     Parameters
     ----------
     result : Population
     ax : array of matplotlib Axes, optional
-        One for every parameter, in a row.
+        One for each parameter, in a row.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes
     """
     count, rows = len(result.names), len(result.fits)
-    panels = grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.2 + 2.2 * count, 2.2 + 0.3 * rows))[0]
+    panels = panel_grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.2 + 2.2 * count, 2.2 + 0.3 * rows))[
+        0
+    ]
     place = np.arange(rows)[::-1]
     for panel, name in zip(panels, result.names, strict=True):
         mean, other = result.mean(name), result.another(name)
@@ -43,17 +45,19 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
         panel.axvline(mean.value / size, color=BLUE, linewidth=1)
         for y, (label, own) in zip(place, result.fits.items(), strict=True):
             if name in own.names and own[name].determined:
-                _bar(panel, y + APART, own[name], size, VERMILION, "o", "alone, 95 %" if y == place[0] else "")
-            _bar(
+                _draw_interval(
+                    panel, y + ROW_OFFSET, own[name], size, VERMILION, "o", "alone, 95 %" if y == place[0] else ""
+                )
+            _draw_interval(
                 panel,
-                y - APART,
+                y - ROW_OFFSET,
                 result.experiment(label, name),
                 size,
                 BLUE,
                 "s",
                 "with the others, 95 %" if y == place[0] else "",
             )
-        panel.set_xlabel(labelled(brief(name), unit))
+        panel.set_xlabel(axis_label(axis_name(name), unit))
         panel.set_yticks(place, list(result.fits) if panel is panels[0] else [""] * rows)
         panel.set_ylim(-0.6, rows - 0.4)
         panel.locator_params(axis="x", nbins=4)
@@ -65,7 +69,7 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
     return np.asarray(panels)
 
 
-def _bar(panel: Axes, y: float, one: Estimate, size: float, colour: str, marker: str, label: str) -> None:
-    """A value and its 95 % interval."""
+def _draw_interval(panel: Axes, y: float, one: Estimate, size: float, colour: str, marker: str, label: str) -> None:
+    """Plot a value and its 95 % interval as a dot on a line."""
     panel.plot([one.low / size, one.high / size], [y, y], color=colour, linewidth=1.2)
     panel.plot([one.value / size], [y], marker, color=colour, markersize=4, label=label or None)

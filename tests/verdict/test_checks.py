@@ -16,7 +16,7 @@ from steadyslip.linear.boundary import margins
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.model.point import operating_point
 from steadyslip.verdict import checks, numbers
-from steadyslip.verdict.checks import critical_check, edge_checks, spectrum_checks, steady_check
+from steadyslip.verdict.checks import critical_check, edge_checks, net_forces, spectrum_checks, steady_check
 from steadyslip.verdict.words import headline
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -45,6 +45,25 @@ def test_steady_sliding_is_balanced_by_every_law_and_by_no_other(law):
     missed = steady_check(other, point)
     assert not missed.passed
     assert missed.error == pytest.approx(1e-6, rel=0.2)
+
+
+@pytest.mark.parametrize("name", ["two-guides", "brake-pad", "two-surfaces", "telescope"])
+def test_forces_on_every_body_of_a_machine_add_up(name):
+    """Of links and contacts as they are told; a link or a contact that is told wrong leaves something."""
+    machine = ss.read_rig(EXAMPLES / "machines" / f"{name}.toml")
+    steady, point = ss.steady_state(machine), operating_point(machine)
+    right = net_forces(machine, steady)
+    assert right
+    assert max(right.values()) < 1e-14
+    assert steady_check(machine, point, steady).passed
+    link, force = max(steady.links.items(), key=lambda one: abs(one[1]))
+    wrong = [replace(steady, links=steady.links | {link: force * (1 + 1e-6)})]
+    for contact, own in steady.contacts.items():
+        told = replace(own, friction_force=own.friction_force * (1 + 1e-6))
+        wrong.append(replace(steady, contacts=steady.contacts | {contact: told}))
+    for one in wrong:
+        assert 1e-8 < max(net_forces(machine, one).values()) < 1e-5
+        assert not steady_check(machine, point, one).passed
 
 
 def test_memory_that_does_not_rest_is_found():

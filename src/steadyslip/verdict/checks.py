@@ -29,6 +29,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import in_range
+from steadyslip.model.sliding import SteadyMachine
 
 Array = NDArray[np.float64]
 
@@ -44,9 +45,11 @@ _STEP = 1e-3  # of the logarithms of velocity, stress and memory, whose effect o
 _ZERO = 1e-9  # of the largest root: what a root of zero, which has no share of its own, may be by rounding
 
 
-def verdict_checks(rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
-    """What the verdict itself rests on: steady sliding, the eigenvalues and how many grow."""
-    return (steady_check(rig, point), *spectrum_checks(point, stable, on_edge))
+def verdict_checks(
+    rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool, steady: SteadyMachine | None = None
+) -> tuple[Check, ...]:
+    """What the verdict itself rests on: steady sliding (of a machine as it is told), eigenvalues and how many grow."""
+    return (steady_check(rig, point, steady), *spectrum_checks(point, stable, on_edge))
 
 
 def undecided(checks: Sequence[Check]) -> str:
@@ -58,8 +61,8 @@ def undecided(checks: Sequence[Check]) -> str:
 # -- steady sliding
 
 
-def steady_check(rig: Rig, point: OperatingPoint) -> Check:
-    """Whether the laws, given the numbers of steady sliding, leave forces and memory as they are."""
+def steady_check(rig: Rig, point: OperatingPoint, steady: SteadyMachine | None = None) -> Check:
+    """Whether the laws, given the numbers of steady sliding, leave forces and memory as they are, and bodies too."""
     frictions = (
         [rig.contacts[contact.name].friction for contact in point.model.contacts]
         if isinstance(rig, Machine)
@@ -71,7 +74,32 @@ def steady_check(rig: Rig, point: OperatingPoint) -> Check:
         velocity, friction, normal, *memory = (numbers.pop(0) for _ in range(3 + len(contact.memory)))
         missed.append(abs(normal - float(sigma)) / float(sigma))
         missed += _missed_by_law(law, velocity, float(sigma), tuple(memory), friction)
-    return check("steady sliding", "forces and memory by the laws", max(missed), BALANCED)
+    missed += [] if steady is None else net_forces(rig, steady).values()
+    how = "forces and memory by the laws" + ("" if steady is None else ", forces on bodies added up")
+    return check("steady sliding", how, max(missed), BALANCED)
+
+
+def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
+    """Sum of the forces of links and contacts on every coordinate, as a share of the largest of them.
+
+    Left out are coordinates on which a controller acts: its force is not told, it is what is left.
+    """
+    mechanism = rig.mechanism()
+    links = [one for one in mechanism.elements if one.name]
+    found = {}
+    for one in mechanism.coordinates:
+        if any(one.name in other.acts for other in mechanism.elements if not other.name):
+            continue
+        terms = [float(one.force)]
+        terms += [
+            steady.links[link.name.removeprefix("links.")] * float(link.acts[one.name])
+            for link in links if one.name in link.acts
+        ]  # fmt: skip
+        for port in mechanism.contacts:
+            terms.append(-steady.contacts[port.name].friction_force * float(port.slip.get(one.name, 0)))
+            terms.append(steady.contacts[port.name].normal_force * float(port.separation.get(one.name, 0)))
+        found[one.name] = abs(math.fsum(terms)) / (max(map(abs, terms)) or 1.0)
+    return found
 
 
 @question

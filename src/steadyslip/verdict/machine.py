@@ -102,7 +102,7 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
             return MachineAnalysis(rig=machine, stable=None, reason=why, margins=margins(machine), version=__version__)
         numbers = linear_numbers(point)  # refuses what cannot be counted, before the edges are looked for
         edged = bool(on_edge(point)) or decided_by_rounding(point)
-        checks = verdict_checks(machine, point, numbers["stable"], edged)
+        checks = verdict_checks(machine, point, numbers["stable"], edged, steady)
         if doubt := undecided(checks):
             return MachineAnalysis(
                 rig=machine, stable=None, reason=doubt, margins=(), checks=checks, version=__version__

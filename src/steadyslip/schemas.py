@@ -1,4 +1,4 @@
-"""The JSON schema of every file that is read, from the tables that each layer declares."""
+"""JSON schema of rig, protocol, map and fit files, from the tables that each layer declares."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from steadyslip.maps.plan.map_file import TABLE as MAP_TABLE
 
 
 def json_schema() -> dict[str, Any]:
-    """The schema (draft 2020-12) of a file: rig, protocol, map, fit; its JSON is what ``steadyslip schema`` prints.
+    """JSON schema (draft 2020-12) of rig, protocol, map and fit files, as ``steadyslip schema`` prints it.
 
-    A file with a table ``[fit]`` or ``[record]`` may leave out what is fitted or what records say; one with nothing but
-    a protocol needs no rig.
+    A file with a table ``[fit]`` or ``[record]`` may leave out parameters that are fitted or follow from records; a
+    file with a protocol alone needs no rig.
     """
     whole = rig_schema((MAP_TABLE,))
     every = partial(rig_schema((MAP_TABLE, *FIT_TABLES)))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import steadyslip as ss
 from dimensionless import unit_rig
 from steadyslip.reproduce import FIGURES, paper_rig
-from steadyslip.reproduce.drawings import trajectory
+from steadyslip.reproduce.drawings import simulate_orbit
 from steadyslip.units import deg
 
 matplotlib.use("Agg")
@@ -99,7 +99,7 @@ def test_figures_1_and_2_have_the_direct_and_the_evolving_part():
 def test_figure_5_is_a_weak_spiral_at_the_edge():
     """At k = k_cr the paper's orbit closes to linear order only; it shrinks, very slowly (theory 6)."""
     edge = float(ss.critical_stiffness(paper_rig()))
-    run = trajectory(-45 * deg, edge, cycles=6.0)
+    run = simulate_orbit(-45 * deg, edge, cycles=6.0)
     u = np.log(run["v"] / 1e-6)
     tops = u[1:-1][(u[1:-1] > u[:-2]) & (u[1:-1] > u[2:])]
     assert np.all(np.diff(tops) < 0)

@@ -7,8 +7,8 @@ import pytest
 import steadyslip as ss
 from read_pages import Balanced, words
 from rigs_of_theory import rate_state, rig
-from steadyslip.reports.brief import rows_of
-from steadyslip.reports.elements import math, table, typed
+from steadyslip.reports.brief import text_html
+from steadyslip.reports.elements import html_text, math, table
 
 # -- set as in print
 
@@ -21,11 +21,11 @@ from steadyslip.reports.elements import math, table, typed
      ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
 )  # fmt: skip
 def test_words_are_set_as_in_print(text, printed):
-    assert typed(text) == printed
+    assert html_text(text) == printed
 
 
 def test_lines_of_names_and_words_become_tables():
-    found = rows_of("Head\n  velocity      1 um/s to 2 um/s\n                going on\nlast  a  b\nThe end")
+    found = text_html("Head\n  velocity      1 um/s to 2 um/s\n                going on\nlast  a  b\nThe end")
     assert words(found).strip() == "Head velocity 1 µm/s to 2 µm/s going on last a b The end"
     assert found.count("<tr>") == 2
     assert found.count("<p>") == 2
@@ -35,8 +35,8 @@ def test_a_sentence_over_two_lines_is_one_paragraph():
     text = (
         "A head\nthe stiffness is so many times the critical stiffness, above which sliding is\nstable, it seems.\nmore"
     )
-    assert rows_of(text).count("<p>") == 3
-    assert "above which sliding is stable, it seems." in rows_of(text)
+    assert text_html(text).count("<p>") == 3
+    assert "above which sliding is stable, it seems." in text_html(text)
 
 
 def test_formulas_need_no_script_and_no_entity():

@@ -7,7 +7,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from read_pages import words
-from steadyslip.reports.elements import typed
+from steadyslip.reports.elements import html_text
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_answers_of_records_have_documents(lab_results, name, request):
         assert part in text, part
     if name == "fit":
         assert (
-            words(typed(f"friction.a {lab_results[name]['a'].shown()}, friction.b")) in text
+            words(html_text(f"friction.a {lab_results[name]['a'].shown()}, friction.b")) in text
         )  # what it found, at once
     shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
     assert not re.search(r"\d um\b", shown)

@@ -23,9 +23,9 @@ from steadyslip.figures.inline import figure_html
 from steadyslip.files.standalone import write_page
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.commands import Thresholds
-from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, unit_of
-from steadyslip.reports.results import LISTED, _told_apart, done_to
-from steadyslip.reports.rig import inputs
+from steadyslip.reports.brief import _HIDDEN, DIMENSIONLESS, RESULT_UNIT, UNITS, brief, result_html, unit_of
+from steadyslip.reports.results import MAX_ROWS, _distinct_rows, protocol_table
+from steadyslip.reports.rig import input_table
 
 MACHINES = Path(__file__).parents[2] / "examples" / "machines"
 OWN_RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
@@ -45,7 +45,7 @@ def test_every_public_result_has_html_and_every_number_of_it_a_unit(kind):
     assert hasattr(kind, "_repr_html_")
     for one in dataclasses.fields(kind):
         if re.search("float|ndarray|complex|Array", str(one.type)) and not one.name.startswith("_"):
-            known = UNITS.keys() | OWN | PLAIN | _NOT_SHOWN
+            known = UNITS.keys() | RESULT_UNIT | DIMENSIONLESS | _HIDDEN
             assert one.name in known, f"{kind.__name__}.{one.name}: say in reports/brief.py which unit it has"
 
 
@@ -102,7 +102,7 @@ def test_rigs_with_an_area_are_told_in_newtons():
 # -- documents
 
 
-@pytest.mark.parametrize("made", [inputs, brief])
+@pytest.mark.parametrize("made", [input_table, brief])
 def test_inputs_are_in_the_units_of_the_rigs_file(made):
     """With an area forces, masses and stiffnesses of all of it, in reports and in notebooks."""
     words = re.sub("<[^>]+>", " ", made(ss.read_rig("examples/slow-axis.toml")))
@@ -211,22 +211,22 @@ def test_documents_of_maps_begin_with_what_was_found(tmp_path):
 
 def test_what_was_done_to_a_rig_is_told_in_units_that_people_read():
     plan = ss.Protocol.of([ss.VelocityStep(at=10.0, to=2e-6), ss.Hold(at=20.0, duration=7200.0)])
-    text = "".join(done_to(rig(), plan))
+    text = "".join(protocol_table(rig(), plan))
     assert "at 10 s, to 2 µm/s" in text
     assert "duration 2 h" in text
     turning = ss.read_rig(MACHINES / "telescope.toml")
-    assert "to 0.05 rad/s" in "".join(done_to(turning, ss.Protocol.of([ss.VelocityStep(at=1.0, to=0.05)])))
+    assert "to 0.05 rad/s" in "".join(protocol_table(turning, ss.Protocol.of([ss.VelocityStep(at=1.0, to=0.05)])))
 
 
 def test_lists_of_cycles_leave_out_what_reads_the_same():
     rows = [("25 GPa/m", "17 s", "1 um/s", f"{i} Pa", "") for i in range(9)] + [
         (f"{i} GPa/m", "", "", "", "") for i in range(60)
     ]
-    found = _told_apart(rows)
-    assert len(found) <= LISTED
+    found = _distinct_rows(rows)
+    assert len(found) <= MAX_ROWS
     assert found[-1] == rows[-1]
     assert sum(row[0] == "25 GPa/m" and row[1] == "17 s" for row in found) <= 1
-    assert _told_apart(rows[:1]) == rows[:1]
+    assert _distinct_rows(rows[:1]) == rows[:1]
 
 
 def test_the_same_figure_is_the_same_text():
@@ -267,7 +267,7 @@ def test_what_is_no_result_has_no_document():
 @pytest.mark.parametrize("name", ["steady", "margin", "onset", "response", "event", "ensemble"])
 def test_results_without_a_document_of_their_own_show_what_notebooks_show(results, name):
     document = ss.report(results[name], explorer=False).html
-    assert inside(results[name]) in document
+    assert result_html(results[name]) in document
     assert words(document)
     assert " um" not in words(document)
 

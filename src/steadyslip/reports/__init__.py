@@ -1,6 +1,6 @@
-"""Rigs and results as documents that anybody can open and print: HTML in one file, figures inside.
+"""Printable documents about rigs and results: HTML in one file, with the figures inside.
 
-`brief` is the part of a page that notebooks show of any result. Knows everything but the command line.
+`brief` makes the HTML that notebooks show of any result. Only the command line stands above this folder.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from typing import Any
 
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
-from steadyslip.reports import lab  # noqa: F401 -- registers what documents say of fits
+from steadyslip.reports import lab  # noqa: F401 -- registers documents of fits
 from steadyslip.reports.brief import brief
-from steadyslip.reports.document import Report, put_together
+from steadyslip.reports.document import Report, document_html
 from steadyslip.reports.results import parts_of
 
 __all__ = ["Report", "brief", "report"]
@@ -28,22 +28,22 @@ def report(
     source: str | PathLike[str] | None = None,
     **options: Any,
 ) -> Report:
-    """A printable document about a rig or a result.
+    """Printable HTML document about a rig or a result.
 
     Parameters
     ----------
     result : object
-        A rig, or what any function of this package found.
+        A rig, or the result of any function of this package.
     title : str, optional
-        Stands above the headline.
+        Line above the headline.
     explorer : bool, optional
-        Whether the explorer of the rig is at its end.
+        If True, the explorer of the rig is at the end.
     source : path, optional
-        The file it was made of, whose hash is given.
+        File that the result was computed from; the document has its hash.
     **options
-        Of a rig: ``branch``, which steady sliding where there are several; ``fit``, a Fit whose friction to take, and
-        ``tolerances``, as for `steadyslip.tolerate`, so that it says how sure the verdict is. Of a fit:
-        ``comparison``, a LawComparison, and ``draws``, its Draws.
+        For a rig: ``branch``, index of the steady state where there are several; ``fit``, a Fit whose friction is used,
+        and ``tolerances``, as for `steadyslip.tolerate`, for the uncertainty of the verdict. For a fit: ``comparison``,
+        a LawComparison, and ``draws``, its Draws.
 
     Returns
     -------
@@ -53,12 +53,12 @@ def report(
     Raises
     ------
     ParameterError
-        If it is no result.
+        If `result` is neither a rig nor a result.
     NotAvailable
         If the numbers of the rig leave the range of floating point.
     """
     return Report(
-        put_together(parts_of(result, **options), title, explorer, None if source is None else Path(source)), title
+        document_html(parts_of(result, **options), title, explorer, None if source is None else Path(source)), title
     )
 
 

@@ -1,7 +1,7 @@
-"""Any result, rig or model as a part of a page: what notebooks show. This is the one place that does it for all.
+"""HTML of any result, rig or model, as notebooks show it.
 
-What an attribute is called says what it is, the same in all results: its unit is found by its name in `UNITS`.
-Attributes in `OWN` are in the unit that the result itself names, those in `PLAIN` have none.
+An attribute has one meaning in all results, so its unit follows from its name: `UNITS` has SI units by
+name, attributes in `RESULT_UNIT` have the unit of the result (``result.unit``), those in `DIMENSIONLESS` have none.
 """
 
 from __future__ import annotations
@@ -25,7 +25,17 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.reports.elements import STYLE, Markup, figure, heading, letter, math as formula, paragraph, table, typed
+from steadyslip.reports.elements import (
+    STYLE,
+    Markup,
+    figure,
+    heading,
+    html_text,
+    inline_math,
+    math as formula,
+    paragraph,
+    table,
+)
 
 _BY_UNIT = {
     "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times periods t departure",
@@ -42,8 +52,8 @@ _BY_UNIT = {
     "N": "normal_force friction_force force_drop pull",
 }
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
-OWN = frozenset("value error low high amount absolute values".split())  # noqa: SIM905 -- a list of words
-PLAIN = frozenset(
+RESULT_UNIT = frozenset("value error low high amount absolute values".split())  # noqa: SIM905 -- a list of words
+DIMENSIONLESS = frozenset(
     """relative size bracket searched damping_ratio amplitude trivial multipliers ratio share ssq rtol steps rejected
     routh characteristic_polynomial characteristic_terms growth_slope f1 mu B0 B2 B3 friction precision rise scale noise
     safety level points outcome fold status_code kind stable exists survived is_edge doubt details criteria predicted
@@ -54,15 +64,18 @@ PLAIN = frozenset(
     mean_friction distortion status linear_to lost_at crossings e_folds unstable_roots""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
-_NOT_SHOWN = frozenset(
+_HIDDEN = frozenset(
     "rig version plan data protocol area unit units html start fit fits draws search noise plot map".split()  # noqa: SIM905
 )
-_SKETCHED = "Motion is to the right. Solid blue: what the drive does; dashed: what it measures; red: constant forces."
-_ROWS, _ARRAY = 12, 4
+_SKETCH_CAPTION = (
+    "Motion is to the right. Solid blue: what the drive does; dashed: what it measures; red: constant forces."
+)
+_MAX_ROWS = 12  # rows of a table of results, so that a notebook cell stays short (by trial)
+_MAX_VALUES = 4  # numbers of an array that are written out; longer ones are shown as shape and range (by trial)
 
 
 def brief(result: Any) -> str:
-    """A result as HTML: what it is, its numbers with their units, a picture where there is one.
+    """HTML of a result: kind, numbers with units, and a figure if it has one.
 
     Parameters
     ----------
@@ -72,20 +85,20 @@ def brief(result: Any) -> str:
     Returns
     -------
     str
-        An element that refers to nothing outside itself.
+        A ``div`` element with its own style, without links to other files.
     """
-    return f'<div class="steadyslip-told"><style>{STYLE}</style>{inside(result)}</div>'
+    return f'<div class="steadyslip-told"><style>{STYLE}</style>{result_html(result)}</div>'
 
 
-def inside(result: Any) -> str:
-    """The same without its style, for a document that has it."""
+def result_html(result: Any) -> str:
+    """HTML of a result without the style sheet, for a document that has it."""
     if isinstance(result, Model):
-        return "".join(_model(result))
-    return "".join(_record(result) if isinstance(result, FrozenRecord) else _result(result))
+        return "".join(_model_html(result))
+    return "".join(_record_html(result) if isinstance(result, FrozenRecord) else _result_html(result))
 
 
-def rows_of(text: str) -> str:
-    """Words of an answer as HTML: lines of a name and what it is as a table, the others as paragraphs."""
+def text_html(text: str) -> str:
+    """HTML of printed text: lines with two or more columns (two spaces apart) as tables, the others as paragraphs."""
     parts: list[str] = []
     words: list[str] = []
     rows: list[list[str]] = []
@@ -95,52 +108,52 @@ def rows_of(text: str) -> str:
             rows[-1][-1] += f" {line.strip()}"
         elif found:
             rows.append([found[1], *re.split(r" {2,}", found[2])])
-        elif line.strip() and words and _goes_on(words[-1]) and not rows:
+        elif line.strip() and words and _is_wrapped(words[-1]) and not rows:
             words[-1] += f" {line.strip()}"
             parts[-1] = paragraph(words[-1])
         elif line.strip():
-            parts += [_even(rows), paragraph(line.strip())]
+            parts += [_padded_table(rows), paragraph(line.strip())]
             words.append(line.strip())
             rows = []
-    return "".join([*parts, _even(rows)])
+    return "".join([*parts, _padded_table(rows)])
 
 
-def _goes_on(line: str) -> bool:
-    """Whether a sentence was cut where a terminal's line ends."""
+def _is_wrapped(line: str) -> bool:
+    """True if a line looks cut at the width of a terminal, so that the next one continues its sentence."""
     return len(line) > 60 and line[-1] not in ".:;)"
 
 
-def _even(rows: list[list[str]]) -> str:
+def _padded_table(rows: list[list[str]]) -> str:
     widest = max(map(len, rows), default=0)
     return table([[*row, *[""] * (widest - len(row))] for row in rows])
 
 
-# -- what is shown of each kind
+# -- one function for each kind
 
 
-def _model(model: Model) -> Iterator[str]:
+def _model_html(model: Model) -> Iterator[str]:
     kind = "with inertia" if model.inertial else "quasistatic"
     yield heading(f"Model, {kind}", 3)
     for equation in model.equations():
         yield f'<div class="formula" tabindex="0">{formula(equation)}</div>'
     yield table(
-        [(letter(model.written(one.symbol)), one.unit, one.doc) for one in model.variables],
+        [(inline_math(model.written(one.symbol)), one.unit, one.doc) for one in model.variables],
         ("variable", "unit", "meaning"),
     )
     rows = [
-        (name, letter(model.written(symbol)), model.roles[name].unit, model.roles[name].doc)
+        (name, inline_math(model.written(symbol)), model.roles[name].unit, model.roles[name].doc)
         for name, symbol in model.parameters.items()
     ]
     yield table(rows, ("parameter", "letter", "unit", "meaning"))
 
 
-def _record(record: FrozenRecord) -> Iterator[str]:
+def _record_html(record: FrozenRecord) -> Iterator[str]:
     name = getattr(record, "name", "")
     yield heading(f"{type(record).__name__}{f' ({name})' if isinstance(name, str) and name else ''}", 3)
     if isinstance(record, Slider):
         yield figure(sketch(record))
     if isinstance(record, Machine):
-        yield figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCHED)
+        yield figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCH_CAPTION)
     rows = []
     for path, one in (record.parameters() if isinstance(record, Machine) else parameters(record)).items():
         if one.value is not None:
@@ -149,26 +162,26 @@ def _record(record: FrozenRecord) -> Iterator[str]:
             words = (
                 format_quantity(float(values), one.role.unit, 6, area)
                 if values.ndim == 0
-                else _array(values, one.role.unit, area)
+                else _format_array(values, one.role.unit, area)
             )
             rows.append((path, words, stress_name(one.role.doc, area)))
     yield table(rows, ("parameter", "value", "meaning"))
 
 
-def _result(result: Any) -> Iterator[str]:
+def _result_html(result: Any) -> Iterator[str]:
     words = str(result)
-    told = not words.startswith((f"{type(result).__name__}(", "<"))
+    has_text = not words.startswith((f"{type(result).__name__}(", "<"))
     yield heading(type(result).__name__, 3)
-    if told:
-        yield rows_of(words)
+    if has_text:
+        yield text_html(words)
     else:
-        yield table(_attributes(result))
-    for name, many in _series(result):
+        yield table(_attribute_rows(result))
+    for name, many in _inner_tables(result):
         yield heading(name.replace("_", " ").capitalize(), 3) + many
-    yield figure(_picture(result))
+    yield figure(_plot(result))
 
 
-def _picture(result: Any) -> str:
+def _plot(result: Any) -> str:
     if not hasattr(result, "plot"):
         return ""
     try:
@@ -177,32 +190,32 @@ def _picture(result: Any) -> str:
         return ""
 
 
-def _public(result: Any) -> Iterator[tuple[str, Any]]:
-    """Names and values of attributes, in order of declaration."""
+def _shown_attributes(result: Any) -> Iterator[tuple[str, Any]]:
+    """Names and values of the attributes to show, in order of declaration."""
     names = [one.name for one in fields(result)] if is_dataclass(result) else getattr(result, "_fields", vars(result))
     for name in names:
-        if not name.startswith("_") and name not in _NOT_SHOWN:
+        if not name.startswith("_") and name not in _HIDDEN:
             yield name, getattr(result, name)
 
 
-def _attributes(result: Any) -> Iterator[tuple[str, Any]]:
+def _attribute_rows(result: Any) -> Iterator[tuple[str, Any]]:
     area = getattr(result, "area", None) or getattr(getattr(result, "rig", None), "area", None)
-    for name, value in _public(result):
+    for name, value in _shown_attributes(result):
         cell = _cell(value, unit_of(result, name), area)
         if cell:
             yield name.replace("_", " "), cell
 
 
 def unit_of(result: Any, name: str) -> str:
-    """The SI unit of an attribute."""
+    """SI unit of an attribute of a result, found by the name of the attribute."""
     own = getattr(result, "unit", None)
-    if isinstance(own, str) and name in OWN | _BY_TYPE.get(type(result).__name__, set()):
+    if isinstance(own, str) and name in RESULT_UNIT | _BY_TYPE.get(type(result).__name__, set()):
         return own
     return UNITS.get(name, "1")
 
 
 def _cell(value: Any, unit: str, area: float | None) -> Any:
-    """A value for people; empty where it is none, or several results."""
+    """Text or HTML of a value with its unit; empty for None, NaN and sequences of results."""
     if value is None or isinstance(value, bool | np.bool_ | str):
         return "" if value is None else str(value) if isinstance(value, str) else "yes" if value else "no"
     if isinstance(value, int | np.integer) and unit == "1":
@@ -213,63 +226,65 @@ def _cell(value: Any, unit: str, area: float | None) -> Any:
         sign = "+" if value.imag >= 0 else "-"
         return f"{value.real:.4g} {sign} {abs(value.imag):.4g} i {'' if unit == '1' else unit}"
     if isinstance(value, np.ndarray):
-        return _array(value, unit, area)
+        return _format_array(value, unit, area)
     if isinstance(value, Mapping):
         plain = {k: v for k, v in value.items() if isinstance(v, int | float)}
-        return Markup("<br>".join(f"{typed(k)}: {typed(format_quantity(float(v), '1'))}" for k, v in plain.items()))
+        return Markup(
+            "<br>".join(f"{html_text(k)}: {html_text(format_quantity(float(v), '1'))}" for k, v in plain.items())
+        )
     if isinstance(value, tuple | list) and value and not is_dataclass(value[0]):
-        cells = [str(_cell(one, unit, area)) for one in value[:_ROWS]]
-        return Markup("<br>".join(one if isinstance(one, Markup) else typed(one) for one in cells))
+        cells = [str(_cell(one, unit, area)) for one in value[:_MAX_ROWS]]
+        return Markup("<br>".join(one if isinstance(one, Markup) else html_text(one) for one in cells))
     return ""
 
 
-def _array(values: np.ndarray, unit: str, area: float | None) -> str:
-    """A few values, or how many there are and their range."""
+def _format_array(values: np.ndarray, unit: str, area: float | None) -> str:
+    """Text of an array: up to four values, or else shape and range."""
     if values.size == 0:
         return "none"
     if values.dtype.kind not in "fiu":
         names, counts = np.unique(values.astype(str), return_counts=True)
-        return ", ".join(f"{n} {name}" for name, n in zip(names[:_ROWS], counts, strict=False))
+        return ", ".join(f"{n} {name}" for name, n in zip(names[:_MAX_ROWS], counts, strict=False))
     finite = values[np.isfinite(values)]
     if not finite.size:
         return f"{values.size} values, none a number"
-    if values.size <= _ARRAY:
+    if values.size <= _MAX_VALUES:
         return ", ".join(format_quantity(float(one), unit, area=area) for one in values.ravel())
     shape = " × ".join(map(str, values.shape))
     return f"{shape} values, {format_range(float(finite.min()), float(finite.max()), unit, area)}"
 
 
-def _series(result: Any) -> Iterator[tuple[str, str]]:
-    """Results within a result, as tables with a row each; series with their units."""
+def _inner_tables(result: Any) -> Iterator[tuple[str, str]]:
+    """Names and HTML tables of the results and time series within a result."""
     area = getattr(getattr(result, "rig", None), "area", None)
-    for name, value in _public(result):
+    for name, value in _shown_attributes(result):
         if isinstance(value, tuple) and value and is_dataclass(value[0]) and hasattr(type(value[0]), "_repr_html_"):
-            yield name, _listed(value, area)
+            yield name, _results_table(value, area)
     units = getattr(result, "units", None)
     for name in ("data", "final"):
         series = getattr(result, name, None)
         if isinstance(series, Mapping) and isinstance(units, Mapping):
             rows = [
-                (key.replace("_", " "), _array(np.asarray(values), units.get(key, "1"), area))
+                (key.replace("_", " "), _format_array(np.asarray(values), units.get(key, "1"), area))
                 for key, values in series.items()
             ]
             yield name, table(rows)
 
 
-def _listed(results: Iterable[Any], area: float | None) -> str:
+def _results_table(results: Iterable[Any], area: float | None) -> str:
     many = list(results)
-    every = dict.fromkeys(name for one in many for name, _ in _public(one))
-    names = [name for name in every if any(_short(one, name, area) for one in many)]
-    rows = [[_short(one, name, area) for name in names] for one in many[:_ROWS]]
-    if not names or len({type(one) for one in many}) > 1:  # of several kinds, or with nothing but their kind
+    every = dict.fromkeys(name for one in many for name, _ in _shown_attributes(one))
+    names = [name for name in every if any(_short_cell(one, name, area) for one in many)]
+    rows = [[_short_cell(one, name, area) for name in names] for one in many[:_MAX_ROWS]]
+    if not names or len({type(one) for one in many}) > 1:  # mixed kinds, or nothing else to show
         names = ["kind", *names]
         rows = [[getattr(one, "name", type(one).__name__), *row] for one, row in zip(many, rows, strict=False)]
-    more = paragraph(f"and {len(many) - _ROWS} more", "small") if len(many) > _ROWS else ""
+    more = paragraph(f"and {len(many) - _MAX_ROWS} more", "small") if len(many) > _MAX_ROWS else ""
     return table(rows, [name.replace("_", " ") for name in names], left=False) + more
 
 
-def _short(result: Any, name: str, area: float | None) -> Any:
-    """A cell of a list: numbers and words only."""
+def _short_cell(result: Any, name: str, area: float | None) -> Any:
+    """Cell of a table of results: numbers, text and bool; empty for anything else."""
     value = getattr(result, name, None)
     own = getattr(result, "area", None) or area
     return _cell(value, unit_of(result, name), own) if isinstance(value, bool | int | float | str) else ""

@@ -1,4 +1,4 @@
-"""A document about a rig or a result: its parts in order, where it came from, and the explorer at its end."""
+"""HTML document about a rig or a result: contents, provenance, and the explorer at its end."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from pathlib import Path
 
 from steadyslip.core.errors import NotAvailable, ParameterError, RigFileError
 from steadyslip.explorer.assembly import document, fragment, style
+from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.read import protocol_of, rig_from_text, text_of
 from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
-from steadyslip.reports.elements import STYLE, heading, listing, paragraph, table, typed
+from steadyslip.reports.elements import STYLE, heading, html_text, listing, paragraph, table
 
-_PAGE = """
+_DOCUMENT_STYLE = """
 body { background: #fff; }
 .report { max-width: 54em; margin: 0 auto; padding: 22px 16px; }
 .report .kind { color: #566173; margin: 0; }
@@ -39,80 +40,90 @@ body { background: #fff; }
 
 
 class Report(Standalone):
-    """A printable document in one file."""
+    """Printable HTML document in one file."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a document says.
+    """Contents of a document.
 
     Attributes
     ----------
     headline, lead, question : str
-        Words: the answer, why, and what was asked.
+        Plain text: the answer, its reason, and the question.
     body : sequence of str
-        HTML.
-    rig : Slider, Machine or None
-        Of the explorer.
-    text : str
-        The rig as a file; empty where there is none.
+        HTML elements.
+    rig : Slider or Machine, optional
+        Rig to list as a file, and to explore at the end.
+    protocol : Protocol, optional
+        Protocol to list in the file of the rig.
     branch : int
-        Which steady sliding.
+        Index of the steady state that the explorer shows.
     """
 
     headline: str
     lead: str
     question: str
     body: Sequence[str]
-    rig: Slider | Machine | None
-    text: str
+    rig: Slider | Machine | None = None
+    protocol: Protocol | None = None
     branch: int = 0
 
+    @property
+    def rig_file(self) -> str:
+        """Text of the rig file, or the Python expression of a rig that no file can hold; empty without a rig."""
+        if self.rig is None:
+            return ""
+        try:
+            return rig_to_text(self.rig, self.protocol)
+        except ParameterError:  # a law that no file can name
+            return repr(self.rig) if self.protocol is None else f"{self.rig!r}\n[protocol]\n{self.protocol!r}"
 
-def put_together(parts: Parts, title: str, explorer: bool, source: Path | None) -> str:
-    """The text of the file."""
+
+def document_html(parts: Parts, title: str, explorer: bool, source: Path | None) -> str:
+    """HTML text of a document; `source` is the file that the result was computed from."""
     live, still = "", ""
     if explorer and parts.rig is not None:
         try:
-            live = fragment(parts.rig, title, parts.branch, _text_of(source))
+            live = fragment(parts.rig, title, parts.branch, _source_text(source))
         except NotAvailable as refused:
             still = paragraph(f"There is no explorer at the end: {refused}.", "small")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
         '<article class="report steadyslip-told" role="region" aria-label="report">'
-        f'<p class="kind">{typed(title)}</p><h1>{typed(parts.headline)}</h1>'
+        f'<p class="kind">{html_text(title)}</p><h1>{html_text(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
-        f"{''.join(parts.body)}{_provenance(_listed(parts, source), source)}{still}"
+        f"{''.join(parts.body)}{_provenance(_rig_listing(parts, source), source)}{still}"
         f'<div class="on-screen">{shown}</div></article>\n'
     )
-    return document(f"{title} – steadyslip", _PAGE + STYLE + (style() if live else ""), article + live)
+    return document(f"{title} – steadyslip", _DOCUMENT_STYLE + STYLE + (style() if live else ""), article + live)
 
 
-def _text_of(source: Path | None) -> str:
-    """The rig file that a document was made of; empty where that is another file, such as a table of results."""
+def _source_text(source: Path | None) -> str:
+    """Text of the rig file at `source`; empty if it is another kind of file, such as a table of results."""
     try:
         return "" if source is None or source.suffix != ".toml" else text_of(source)
     except RigFileError:
         return ""
 
 
-def _listed(parts: Parts, source: Path | None) -> str:
-    """The file that gives this rig again: the user's own where it is the whole of it, with its comments and units."""
-    own = _text_of(source)
+def _rig_listing(parts: Parts, source: Path | None) -> str:
+    """Text of a file of the rig: that of the user, with comments and units, if it has the same rig and protocol."""
+    own, text = _source_text(source), parts.rig_file
     try:
-        same = own and parts.text and _meant(own) == _meant(parts.text)
-    except ParameterError:  # as of a rig with a law that no file can name
+        same = own and text and _rig_and_protocol(own) == _rig_and_protocol(text)
+    except ParameterError:  # a law that no file can name
         same = False
-    return own if same else parts.text
+    return own if same else text
 
 
-def _meant(text: str) -> tuple[Slider | Machine, Protocol | None]:
-    """What a file says, however it is written."""
+def _rig_and_protocol(text: str) -> tuple[Slider | Machine, Protocol | None]:
+    """Rig and protocol of the text of a rig file."""
     return rig_from_text(text), protocol_of(text, "rig", ())
 
 
 def _provenance(text: str, source: Path | None) -> str:
-    """What made this document, of what."""
+    """HTML section: versions, date, hash of the source, and the text of the rig file with its hash."""
     import numpy as np
     import scipy
     import sympy as sp

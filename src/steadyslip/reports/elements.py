@@ -1,4 +1,4 @@
-"""What pages consist of: text that is safe and well set, tables, formulas, pictures."""
+"""HTML elements: escaped text with proper typography, tables, formulas, figures."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 
 from steadyslip.core.expressions import asinh_exp
 
-_SPOKEN = (
+_REPLACEMENTS = (
     (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
     (r"^x (?=\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
 )  # fmt: skip
-_POWER, _RAISED = (
+_EXPONENT, _SUPERSCRIPTS = (
     re.compile(r"(?<![\w./=-])(−?\d(?:\.\d+)?)e([+-]\d+)(?![\w./-])"),
     str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
 )
@@ -44,62 +44,61 @@ STYLE = """
 .steadyslip-told math { font-size: 17px; }
 @supports not (-moz-appearance: none) { .steadyslip-told msub > :last-child { transform: translateY(.18em); } }
 .steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 6px 0; padding: 4px 0 10px; }
-"""
-"""Of everything inside an element of class ``steadyslip-told``."""
+"""  # style sheet for elements inside one of class "steadyslip-told"
 
 
-def spoken(text: Any) -> str:
-    """Words as they are set in print: µm, ², →, a true minus, powers of ten."""
+def typographic(text: Any) -> str:
+    """Text with print typography: µm, ², →, minus sign, × 10⁻³."""
     words = str(text)
-    for pattern, better in _SPOKEN:
+    for pattern, better in _REPLACEMENTS:
         words = re.sub(pattern, better, words)
-    return _POWER.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_RAISED)}", words)
+    return _EXPONENT.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_SUPERSCRIPTS)}", words)
 
 
-def typed(text: Any) -> str:
-    """The same, safe in HTML."""
-    return html.escape(spoken(text), quote=True)
+def html_text(text: Any) -> str:
+    """Text with print typography, escaped for HTML."""
+    return html.escape(typographic(text), quote=True)
 
 
 def paragraph(text: str, kind: str = "") -> str:
-    """A paragraph of words."""
-    return f"<p{f' class={kind!r}' if kind else ''}>{typed(text)}</p>"
+    """HTML paragraph of plain text, with an optional CSS class."""
+    return f"<p{f' class={kind!r}' if kind else ''}>{html_text(text)}</p>"
 
 
 def heading(text: str, level: int = 2) -> str:
-    """A heading."""
-    return f"<h{level}>{typed(text)}</h{level}>"
+    """HTML heading of plain text."""
+    return f"<h{level}>{html_text(text)}</h{level}>"
 
 
 def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = True) -> str:
-    """A table; what is `Markup` stays as it is, the rest is set as words. With `left` the first cell heads its row."""
-    top = f"<thead><tr>{''.join(f'<th scope=col>{typed(cell)}</th>' for cell in head)}</tr></thead>" if head else ""
+    """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of a row is its header."""
+    top = f"<thead><tr>{''.join(f'<th scope=col>{html_text(cell)}</th>' for cell in head)}</tr></thead>" if head else ""
     lines = []
     for row in rows:
-        first, *rest = [cell if isinstance(cell, Markup) else typed(cell) for cell in row]
-        side = f"<th scope=row>{_broken(first)}</th>" if left else f"<td>{first}</td>"
-        cells = (f"<td{_whole(cell)}>{cell}</td>" for cell in rest)
+        first, *rest = [cell if isinstance(cell, Markup) else html_text(cell) for cell in row]
+        side = f"<th scope=row>{_breakable(first)}</th>" if left else f"<td>{first}</td>"
+        cells = (f"<td{_nowrap_class(cell)}>{cell}</td>" for cell in rest)
         lines.append(f"<tr>{side}{''.join(cells)}</tr>")
     return f'<div class="wide" tabindex="0"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>' if lines else ""
 
 
-def _broken(name: str) -> str:
-    """A dotted name that may go on in the next line behind a dot or a low line."""
+def _breakable(name: str) -> str:
+    """Dotted name with line-break opportunities after dots and underscores; other text unchanged."""
     return re.sub(r"(?<=[.])(?=\w)|(?<=_)(?=\w)", "<wbr>", name) if re.fullmatch(r"[A-Za-z]\w*(\.\w+)+", name) else name
 
 
-def _whole(cell: str) -> str:
-    """Short cells, as values with their units are, stay on one line."""
+def _nowrap_class(cell: str) -> str:
+    """HTML class attribute that keeps a short cell, such as a value with unit, on one line; else empty."""
     return " class=n" if len(cell) <= 16 and " " in cell else ""
 
 
 class Markup(str):
-    """Text that is HTML already."""
+    """Text that is HTML already and must not be escaped."""
 
 
 def math(expression: Any, display: bool = True) -> Markup:
-    """An expression of SymPy as MathML, which needs no font and no script."""
-    if isinstance(expression, sp.Basic):  # computed so that nothing overflows, and read as what it is
+    """MathML of a SymPy expression, which browsers show without fonts or scripts."""
+    if isinstance(expression, sp.Basic):  # asinh_exp(x, y) avoids overflow in computing; print it as asinh(x exp(y))
         expression = expression.replace(asinh_exp, lambda x, y: sp.asinh(x * sp.exp(y)))
     text = MathMLPresentationPrinter().doprint(expression)
     for entity, character in _ENTITIES.items():
@@ -108,22 +107,22 @@ def math(expression: Any, display: bool = True) -> Markup:
     return Markup(f'<math xmlns="http://www.w3.org/1998/Math/MathML"{style}>{text}</math>')
 
 
-def letter(symbol: sp.Symbol) -> Markup:
-    """A symbol within a line."""
+def inline_math(symbol: sp.Symbol) -> Markup:
+    """MathML of a symbol within a line of text."""
     return math(symbol, display=False)
 
 
 def figure(drawing: str, caption: str = "") -> str:
-    """A drawing with a caption; nothing where there is none."""
-    below = f"<figcaption>{typed(caption)}</figcaption>" if caption else ""
+    """HTML figure of a drawing with a caption; empty if the drawing is empty."""
+    below = f"<figcaption>{html_text(caption)}</figcaption>" if caption else ""
     return f"<figure>{drawing}{below}</figure>" if drawing else ""
 
 
 def listing(text: str) -> str:
-    """Text whose letters stay as they are, such as a file's."""
+    """Preformatted HTML of a text, such as a file, without changes of typography."""
     return f"<pre>{html.escape(text)}</pre>"
 
 
-def lines(result: Any) -> str:
-    """Words of a result, whose lines stay as they are."""
-    return listing(spoken(result))
+def result_listing(result: Any) -> str:
+    """Preformatted HTML of the printed text of a result, with print typography."""
+    return listing(typographic(result))

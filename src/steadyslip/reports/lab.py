@@ -1,4 +1,4 @@
-"""What documents say of fits and what follows from them: draws, predictions, comparisons of laws, populations."""
+"""Documents about fits, draws, predictions, comparisons of laws and populations."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction
 from steadyslip.experiments.fitting.words import warnings
 from steadyslip.figures.inline import figure_html
-from steadyslip.reports import rig as of_rig
-from steadyslip.reports.brief import inside
+from steadyslip.reports import rig as rig_report
+from steadyslip.reports.brief import result_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import figure, heading, lines, paragraph, table
+from steadyslip.reports.elements import figure, heading, paragraph, result_listing, table
 from steadyslip.reports.results import parts_of
 from steadyslip.verdict import analyze
 
 
-def sources(fit: Fit) -> str:
-    """Names of the records of a fit."""
+def record_names(fit: Fit) -> str:
+    """File names of the records of a fit, comma-separated."""
     return ", ".join(Path(record.source).name for record in fit.plan.records)
 
 
@@ -30,27 +30,27 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
         *(paragraph(text, "warning") for text in warnings(result)),
     ]  # fmt: skip
     if draws is not None:
-        body += [heading("How sure is that?"), *_drawn(draws)]
+        body += [heading("How sure is that?"), *_draws_section(draws)]
     if comparison is not None:
-        body += [heading("Laws compared"), lines(comparison)]
+        body += [heading("Laws compared"), result_listing(comparison)]
     for i, record in enumerate(result.plan.records):
         name = Path(record.source).name
         fitted = figure_html(lambda i=i: figures.fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
         steps = figure_html(lambda i=i: figures.steps(result, record=i), "steps of the record", 7.0)  # type: ignore[misc]
         body += [figure(fitted, f"{name}: record and fit."), figure(steps, "Its steps.")]
     corner = figure_html(lambda: figures.corner(result), "uncertainty", max(6.5, 1.3 * len(rows)))
-    body += [figure(corner, "What the records leave open."), heading("Details"), lines(result)]
+    body += [figure(corner, "What the records leave open."), heading("Details"), result_listing(result)]
     for record in result.plan.records:
-        body += [heading(f"Record {Path(record.source).name}", 3), lines(record)]
-    question = f"Which friction do these records show, and how sure is that: {sources(result)}?"
+        body += [heading(f"Record {Path(record.source).name}", 3), result_listing(record)]
+    question = f"Which friction do these records show, and how sure is that: {record_names(result)}?"
     rig = result.rig()
     lead = ", ".join(f"{one.name} {one.shown()}" for one in result.estimates if one.determined)
     lead = f"{lead}." if lead else "No parameter is determined."
-    return Parts(f"Fit to {sources(result)}", lead, question, body, rig, of_rig.as_file(rig))
+    return Parts(f"Fit to {record_names(result)}", lead, question, body, rig)
 
 
-def _drawn(result: Draws) -> list[str]:
-    """Values, errors and intervals of draws beside those of the fit, and how they came about."""
+def _draws_section(result: Draws) -> list[str]:
+    """HTML of draws: values, errors and intervals beside those of the fit, sampler, figure."""
     rows = []
     for one in result.fit.estimates:
         low, high = (format_quantity(end, one.unit, area=one.area) for end in result.interval(one.name))
@@ -72,18 +72,18 @@ def _drawn(result: Draws) -> list[str]:
 
 @parts_of.register
 def _draws(result: Draws) -> Parts:
-    rig, names = result.fit.rig(), sources(result.fit)
+    rig, names = result.fit.rig(), record_names(result.fit)
     body = [
-        heading("What was found"), *_drawn(result),
-        heading("The fit"), *(paragraph(text, "warning") for text in warnings(result.fit)), lines(result.fit),
+        heading("What was found"), *_draws_section(result),
+        heading("The fit"), *(paragraph(text, "warning") for text in warnings(result.fit)), result_listing(result.fit),
     ]  # fmt: skip
     question = f"Which values of friction do the records allow: {names}?"
-    return Parts(f"{len(result)} draws, {result.kind}, from {names}", "", question, body, rig, of_rig.as_file(rig))
+    return Parts(f"{len(result)} draws, {result.kind}, from {names}", "", question, body, rig)
 
 
 @parts_of.register
 def _prediction(result: Prediction) -> Parts:
-    return of_rig.about(analyze(result.rig), result)
+    return rig_report.verdict_parts(analyze(result.rig), result)
 
 
 @parts_of.register
@@ -103,10 +103,10 @@ def _comparison(result: LawComparison) -> Parts:
     columns = ("law", "parameters", "sum of squares", "AIC", "BIC", "weight")
     body = [
         heading("What was found"), table(rows, columns), figure(drawing, "How well each law explains the records."),
-        heading("In words"), lines(result),
+        heading("In words"), result_listing(result),
     ]  # fmt: skip
-    question = f"Which law of friction explains the records best: {sources(best)}?"
-    return Parts(f"{len(result.fits)} laws compared on {sources(best)}", "", question, body, None, "")
+    question = f"Which law of friction explains the records best: {record_names(best)}?"
+    return Parts(f"{len(result.fits)} laws compared on {record_names(best)}", "", question, body)
 
 
 @parts_of.register
@@ -122,9 +122,9 @@ def _population(result: Population) -> Parts:
         heading("What was found"), table(rows, ("parameter", "mean", "mean, 95 %", "another experiment, 95 %")),
         figure(figure_html(result.plot, "population"), "Every experiment alone and with the others."),
         heading("The experiments"), table(own, ("parameter", "experiment", "alone", "with the others"), left=False),
-        heading("In words"), lines(result),
-        *(heading(f"Fit {label}") + inside(fit) for label, fit in result.fits.items()),
+        heading("In words"), result_listing(result),
+        *(heading(f"Fit {label}") + result_html(fit) for label, fit in result.fits.items()),
     ]  # fmt: skip
     question = "What do several experiments say together, how much do they differ, and what would another one show?"
     head = f"Population of {len(result.fits)} experiments"
-    return Parts(head, f"{len(result.names)} parameters each.", question, body, None, "")
+    return Parts(head, f"{len(result.names)} parameters each.", question, body)

@@ -1,4 +1,4 @@
-"""What a document says of a machine: question, inputs, verdict, how it moves, edges, caveats."""
+"""Document about the verdict on a machine: question, inputs, verdict, modes, edges, caveats."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from steadyslip import figures
 from steadyslip.core.format import format_quantity
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.machine_verdict import undrawn_edges
-from steadyslip.reports import rig as of_rig
-from steadyslip.reports.brief import inside
+from steadyslip.reports import rig as rig_report
+from steadyslip.reports.brief import result_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import MachineAnalysis, Tolerated
@@ -17,25 +17,26 @@ from steadyslip.verdict.machine import machine_facts
 from steadyslip.verdict.words import headline
 
 
-def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Parts:
-    """The document of a verdict on a machine."""
+def verdict_parts(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Parts:
+    """Contents of the document of a verdict on a machine, with tolerances if given."""
     machine = analysis.rig
     drive = machine.parameters()["drive.velocity"]
     speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
     body = [
-        heading("The machine"), inside(machine),
-        heading("The verdict"), *_verdict(analysis),
-        heading("How far is the edge?"), _picture(analysis), *of_rig.edges(analysis), *of_rig.checked(analysis),
-        *of_rig.within(tolerated),
+        heading("The machine"), result_html(machine),
+        heading("The verdict"), *_verdict_section(analysis),
+        heading("How far is the edge?"), _verdict_figure(analysis),
+        *rig_report.edge_table(analysis), *rig_report.checks_line(analysis),
+        *rig_report.tolerance_section(tolerated),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
-        paragraph(of_rig.SMALL),
+        paragraph(rig_report.VALIDITY),
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
-    return Parts(headline(analysis, capitals=False), lead, question, body, machine, of_rig.as_file(machine))
+    return Parts(headline(analysis, capitals=False), lead, question, body, machine)
 
 
-def _picture(analysis: MachineAnalysis) -> str:
+def _verdict_figure(analysis: MachineAnalysis) -> str:
     words = "Where it is stable in each parameter, how it moves in its leading mode, and its eigenvalues."
     if far := undrawn_edges(analysis):
         words += (
@@ -45,11 +46,13 @@ def _picture(analysis: MachineAnalysis) -> str:
     return figure(figure_html(lambda: figures.machine_verdict(analysis), words, 8.0), words)
 
 
-def _verdict(analysis: MachineAnalysis) -> Iterator[str]:
-    """Steady sliding of every contact, what disturbances do, and the eigenvalues."""
+def _verdict_section(analysis: MachineAnalysis) -> Iterator[str]:
+    """HTML of the verdict: facts, steady sliding of every contact, eigenvalues."""
     if analysis.steady is None:
         return
-    yield table(row for row in machine_facts(analysis) if row[0] != "steady sliding")  # which has a table of its own
+    yield table(
+        row for row in machine_facts(analysis) if row[0] != "steady sliding"
+    )  # steady sliding has a table of its own below
     contacts = [
         (name, format_quantity(one.slip_rate, "m/s"), format_quantity(one.normal_force, "N"),
          format_quantity(one.friction_force, "N"), f"{one.friction:.4g}")
@@ -58,10 +61,10 @@ def _verdict(analysis: MachineAnalysis) -> Iterator[str]:
     yield heading("Steady sliding", 3)
     yield table(contacts, ("contact", "slides at", "normal force", "friction force", "friction"))
     yield heading("Eigenvalues", 3)
-    yield table(map(_eigenvalue, (s for s in analysis.eigenvalues if s.imag >= 0)), ("rate", "period", "size"))
+    yield table(map(_eigenvalue_row, (s for s in analysis.eigenvalues if s.imag >= 0)), ("rate", "period", "size"))
 
 
-def _eigenvalue(s: complex) -> tuple[str, str, str]:
+def _eigenvalue_row(s: complex) -> tuple[str, str, str]:
     from math import log, pi
 
     period = format_quantity(2 * pi / s.imag, "s") if s.imag else "none"

@@ -1,4 +1,4 @@
-"""What documents say of runs, cycles, thresholds, maps and sensitivities."""
+"""Documents about rigs, runs, cycles, thresholds, maps and sensitivities."""
 
 from __future__ import annotations
 
@@ -28,25 +28,27 @@ from steadyslip.motion.events import ContactSlip
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.protocol import Protocol
-from steadyslip.reports import machine as of_machine, rig as of_rig
-from steadyslip.reports.brief import inside, rows_of
+from steadyslip.reports import machine as machine_report, rig as rig_report
+from steadyslip.reports.brief import result_html, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
 
-LISTED = 24
-PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
-PLANE_OF_CONTACT = "Friction force over slip rate; black: steady sliding at any velocity, the dot at that of the drive."
+MAX_ROWS = 24  # rows of a table of slip events or cycles, so that a document stays short (by trial)
+PHASE_PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
+CONTACT_PHASE_PLANE = (
+    "Friction force over slip rate; black: steady sliding at any velocity, the dot at that of the drive."
+)
 
 
 @singledispatch
 def parts_of(result: Any, **options: Any) -> Parts:
-    """What the document of a result says; of one that has no document of its own, what notebooks show of it.
+    """Contents of the document of a result; for kinds without a document of their own, the HTML that notebooks show.
 
     Raises
     ------
     ParameterError
-        If it is no result.
+        If `result` is neither a rig nor a result, or an option does not apply to it.
     """
     if not isinstance(result, Displayed) or options:
         got = ", ".join([type(result).__name__, *options])
@@ -57,17 +59,15 @@ def parts_of(result: Any, **options: Any) -> Parts:
     kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr
         first = kind
-    body = [*about_rig(rig), heading("What was found"), inside(result)]
-    return Parts(
-        sentence(first).rstrip("."), "", f"What does the {kind} say?", body, rig, of_rig.as_file(rig) if rig else ""
-    )
+    body = [*rig_section(rig), heading("What was found"), result_html(result)]
+    return Parts(sentence(first).rstrip("."), "", f"What does the {kind} say?", body, rig)
 
 
-def about_rig(rig: Slider | Machine | None) -> list[str]:
-    """Sketch and inputs; nothing where there is no rig."""
+def rig_section(rig: Slider | Machine | None) -> list[str]:
+    """HTML of the sketch and inputs of a rig; empty for None."""
     if isinstance(rig, Machine):
-        return [heading("The machine"), inside(rig)]
-    return [] if rig is None else [heading("The rig"), figure(sketch(rig)), of_rig.inputs(rig)]
+        return [heading("The machine"), result_html(rig)]
+    return [] if rig is None else [heading("The rig"), figure(sketch(rig)), rig_report.input_table(rig)]
 
 
 @parts_of.register
@@ -88,14 +88,14 @@ def _thresholds(result: Thresholds) -> Parts:
     head = f"Survives {' and '.join(limits)}" if limits else none
     basins = [found] if (found := result.__dict__.get("basin")) is not None else []
     body = [
-        *about_rig(result.rig),
+        *rig_section(result.rig),
         heading("What was found"), table(rows),
         paragraph("Sizes have no unit: logarithms of ratios of velocities, natural lengths of displacement, shares of "
                   "the normal stress, and for blows velocities of the drive.", "small"),
         *(figure(figure_html(one.plot, "basin", 6.0), "What comes of every starting point.") for one in basins),
     ]  # fmt: skip
     question = "How large a kick does the steady sliding of this rig survive, and what happens beyond?"
-    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+    return Parts(head, "", question, body, result.rig)
 
 
 @parts_of.register
@@ -104,14 +104,14 @@ def _basin(result: Basin) -> Parts:
     rows = [(name, f"{100 * count / result.outcome.size:.3g} %") for name, count in zip(names, counts, strict=True)]
     reasons, numbers = np.unique(result.doubt[result.doubt != ""], return_counts=True)
     body = [
-        *about_rig(result.rig),
+        *rig_section(result.rig),
         heading("What was found"), table(rows, ("comes to", "share of the points")),
         figure(figure_html(result.plot, "basin", 6.5), "What comes of every starting point."),
         *(paragraph(f"{n} undecided: {why}.", "small") for why, n in zip(reasons, numbers, strict=True)),
     ]  # fmt: skip
     question = "From which starting points does this rig return to steady sliding?"
     head = f"{100 * result.share:.3g} % of the starting points return"
-    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+    return Parts(head, "", question, body, result.rig)
 
 
 @parts_of.register
@@ -121,7 +121,11 @@ def _sensitivity(result: Sensitivity) -> Parts:
         (name, format_range(low, high, known[name].role.unit, result.rig.area_of(name)), spacing, known[name].role.doc)
         for name, (low, high, spacing) in result.ranges.items()
     ]
-    body = [*about_rig(result.rig), heading("What varied"), table(ranges, ("parameter", "range", "spacing", "meaning"))]
+    body = [
+        *rig_section(result.rig),
+        heading("What varied"),
+        table(ranges, ("parameter", "range", "spacing", "meaning")),
+    ]
     for name in result.first:
         rows = []
         for parameter in result.ranked(name):
@@ -139,7 +143,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
         body.append(paragraph("It was stopped before all points were done.", "warning"))
     (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
     head = f"{result.ranked(first)[0]} decides most about the {first.replace('_', ' ')}"
-    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+    return Parts(head, "", question, body, result.rig)
 
 
 @parts_of.register
@@ -151,7 +155,7 @@ def _rig(
         found = predict(result, fit)
         result = found.rig
     within = tolerate(result, tolerances) if tolerances else None
-    return of_rig.about(analyze(result, branch=branch), found, within)
+    return rig_report.verdict_parts(analyze(result, branch=branch), found, within)
 
 
 @parts_of.register
@@ -160,38 +164,38 @@ def _machine(
 ) -> Parts:  # fmt: skip
     if branch or fit is not None:
         raise NotAvailable("a machine has one steady sliding, and fits are of a slider; leave branch and fit out")
-    return of_machine.about(analyze(result), tolerate(result, tolerances) if tolerances else None)
+    return machine_report.verdict_parts(analyze(result), tolerate(result, tolerances) if tolerances else None)
 
 
 @parts_of.register
 def _machine_analysis(result: MachineAnalysis) -> Parts:
-    return of_machine.about(result)
+    return machine_report.verdict_parts(result)
 
 
 @parts_of.register
 def _tolerated(result: Tolerated) -> Parts:
     if isinstance(result.rig, Machine):
-        return of_machine.about(analyze(result.rig), result)
-    return of_rig.about(analyze(result.rig), None, result)
+        return machine_report.verdict_parts(analyze(result.rig), result)
+    return rig_report.verdict_parts(analyze(result.rig), None, result)
 
 
 @parts_of.register
 def _analysis(result: Analysis) -> Parts:
-    return of_rig.about(result)
+    return rig_report.verdict_parts(result)
 
 
 @parts_of.register
 def _history(result: History) -> Parts:
-    rig, text = result.rig, of_rig.as_file(result.rig, result.protocol)
-    said = PLANE_OF_CONTACT if isinstance(rig, Machine) else PLANE
-    plane = figure(figure_html(lambda: figures.phase_plane(result), "phase plane", 5.5), said)
+    rig = result.rig
+    caption = CONTACT_PHASE_PLANE if isinstance(rig, Machine) else PHASE_PLANE
+    plane = figure(figure_html(lambda: figures.phase_plane(result), "phase plane", 5.5), caption)
     body = [
-        *about_rig(rig),
-        heading("What was done to it"), *done_to(rig, result.protocol),
-        heading("What it did"), *_words(result.summary()),
-        figure(figure_html(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load(rig)}."),
+        *rig_section(rig),
+        heading("What was done to it"), *protocol_table(rig, result.protocol),
+        heading("What it did"), text_html(result.summary()),
+        figure(figure_html(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load_name(rig)}."),
         plane,
-        *_slips(result),
+        *_slip_table(result),
     ]  # fmt: skip
     slips = len(result.slip_events)
     head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {format_quantity(result.end, 's')}"
@@ -201,35 +205,35 @@ def _history(result: History) -> Parts:
         f"What does this rig do in {format_quantity(result.protocol.until or result.end, 's')} "
         "under the protocol below?"
     )
-    return Parts(head, sentence(result.message), question, body, rig, text)
+    return Parts(head, sentence(result.message), question, body, rig, result.protocol)
 
 
-def _load(rig: Slider | Machine) -> str:
-    """What presses, as the pictures of a rig have it."""
+def _load_name(rig: Slider | Machine) -> str:
+    """Name of the normal load in the figures of a rig: force for machines and rigs with an area, else stress."""
     return "normal force" if isinstance(rig, Machine) or rig.area is not None else "normal stress"
 
 
-def done_to(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
-    """The pieces of a protocol one below the other, numbers in units that people read."""
-    area = rig.area if isinstance(rig, Slider) else 1.0  # in forces
+def protocol_table(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
+    """HTML table of the pieces of a protocol, with numbers in display units."""
+    area = rig.area if isinstance(rig, Slider) else 1.0  # machines are loaded by forces: 1 m² shows Pa as N
     turns = rig.parameters()["drive.velocity"].role.unit == "rad/s"
     rows = []
     for piece in protocol.pieces:
-        told = []
+        items = []
         for item, role in own_fields(type(piece)):
             value = getattr(piece, item.name)
             if value is None or value == item.default:
                 continue
             if isinstance(role, Parameter) and isinstance(value, float | int):
                 unit = {"m/s": "rad/s", "m": "rad"}.get(role.unit, role.unit) if turns else role.unit
-                told.append(f"{key_of(item)} {format_quantity(value, unit, area=area)}")
+                items.append(f"{key_of(item)} {format_quantity(value, unit, area=area)}")
             else:
-                told.append(f"{key_of(item)} {value if isinstance(value, str) else f'{np.size(value)} numbers'}")
-        rows.append((piece.name.replace("-", " "), ", ".join(told)))
+                items.append(f"{key_of(item)} {value if isinstance(value, str) else f'{np.size(value)} numbers'}")
+        rows.append((piece.name.replace("-", " "), ", ".join(items)))
     yield table(rows) if rows else paragraph("Nothing: it starts in steady sliding.")
 
 
-def _slips(result: History) -> Iterator[str]:
+def _slip_table(result: History) -> Iterator[str]:
     slips = result.slip_events
     if not slips:
         return
@@ -243,9 +247,9 @@ def _slips(result: History) -> Iterator[str]:
         for i, one in enumerate(slips, start=1)
     ]  # fmt: skip
     drop = "force drop" if isinstance(slips[0], ContactSlip) else "stress drop"
-    if len(rows) > LISTED:
-        yield paragraph(f"The last {LISTED} of {len(rows)}.", "small")
-    yield table(rows[-LISTED:], ("", "begins", "lasts", "slip", "peak velocity", drop))
+    if len(rows) > MAX_ROWS:
+        yield paragraph(f"The last {MAX_ROWS} of {len(rows)}.", "small")
+    yield table(rows[-MAX_ROWS:], ("", "begins", "lasts", "slip", "peak velocity", drop))
 
 
 @parts_of.register
@@ -261,52 +265,41 @@ def _branch(result: CycleBranch) -> Parts:
          "attracts" if one.stable else "unstable")
         for one in result.cycles
     ]  # fmt: skip
-    listed = _told_apart(rows)
+    listed = _distinct_rows(rows)
     special = [
         (one.kind, format_quantity(one.cycle.value, unit, area=area), format_quantity(one.cycle.period, "s"))
         for one in result.special
     ]
     body = [
-        *about_rig(result.rig),
-        heading("The cycles"), *_words(rest),
+        *rig_section(result.rig),
+        heading("The cycles"), text_html(rest),
         figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
         table(special, ("special", along, "period")),
         table(listed, (along, "period", "peak velocity", drop, ""), left=False),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
     question = f"Which stick-slip cycles does this rig have as {along} varies?"
-    return Parts(
-        f"{len(result.cycles)} cycles along {along}",
-        sentence(first),
-        question,
-        body,
-        result.rig,
-        of_rig.as_file(result.rig),
-    )
+    return Parts(f"{len(result.cycles)} cycles along {along}", sentence(first), question, body, result.rig)
 
 
-def _told_apart(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Rows whose first cells differ from those of the row before; evenly taken from them where they are many."""
+def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Rows whose first three cells differ from those of the row before; every n-th of these if more than `MAX_ROWS`."""
     apart = [row for i, row in enumerate(rows) if i == 0 or row[:3] != rows[i - 1][:3]]
-    step = max(1, -(-len(apart) // LISTED))
+    step = max(1, -(-len(apart) // MAX_ROWS))
     return apart[::-step][::-1]
 
 
 @parts_of.register
 def _map(result: MapResult) -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
-    about, found = sentence(first).rstrip(".").replace(" x ", " × "), _verdicts(result)
-    body = [
-        *about_rig(rig),
-        heading("The map"), *_words(rest),
-        *_pictures(result),
-    ]  # fmt: skip
+    about, found = sentence(first).rstrip(".").replace(" x ", " × "), _status_shares(result)
+    body = [*rig_section(rig), heading("The map"), text_html(rest), *_map_figures(result)]
     question = "How does the answer depend on the numbers that vary here?"
-    return Parts(found or about, f"{about}." if found else "", question, body, rig, of_rig.as_file(rig))
+    return Parts(found or about, f"{about}." if found else "", question, body, rig)
 
 
-def _verdicts(result: MapResult) -> str:
-    """How large a share of the points has each verdict, the largest first; empty where there is none."""
+def _status_shares(result: MapResult) -> str:
+    """Sentence with the share of points of each status, largest first; empty for maps without status."""
     if "status" not in result.results:
         return ""
     shares = sorted(result.statistics()["status"].items(), key=lambda one: -one[1])
@@ -315,8 +308,8 @@ def _verdicts(result: MapResult) -> str:
     ).rstrip(".")
 
 
-def _pictures(result: MapResult) -> Iterator[str]:
-    """Over the first two parameters: for each of a few values of a third, else at the values of the rig."""
+def _map_figures(result: MapResult) -> Iterator[str]:
+    """HTML figure of a map over its first two parameters: a panel for each value of a third, or at the rig's values."""
     others = [name for name in result.dims if name != "sample"][2:]
     if len(others) == 1 and len(result.read(others[0])) <= MAX_FACETS:
         words = f"One picture for each value of {others[0]}."
@@ -327,10 +320,5 @@ def _pictures(result: MapResult) -> Iterator[str]:
 
 
 def sentence(text: str) -> str:
-    """A line with a capital and a full stop."""
+    """Text with a capital first letter and a full stop."""
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
-
-
-def _words(text: str) -> Iterator[str]:
-    """Lines of an answer: columns of name and words as a table, the rest as paragraphs."""
-    yield rows_of(text)

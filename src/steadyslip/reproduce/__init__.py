@@ -1,6 +1,6 @@
-"""The figures and numbers of Dupont & Bapna (1994), from this package's general route.
+"""Figures and numbers of Dupont & Bapna (1994), recomputed with this package.
 
-rig -> numbers (paper beside ours), drawings (each figure) -> files. Another figure is one more entry of `FIGURES`.
+`rig.py` has the rig of the paper, `drawings.py` its figures (list `FIGURES`), `numbers.py` its numbers beside ours.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = [
 
 
 class OutputError(SteadyslipError, OSError):
-    """Results cannot be written where they were asked for."""
+    """The output folder cannot be created or written to."""
 
 
 def reproduce(folder: str | PathLike[str], *, progress: bool | None = None) -> list[Path]:
@@ -39,9 +39,9 @@ def reproduce(folder: str | PathLike[str], *, progress: bool | None = None) -> l
     Parameters
     ----------
     folder : path
-        Where to write; created if missing. Files of the same names are replaced.
+        Output folder, created if missing. Files with equal names are replaced.
     progress : bool, optional
-        Whether to show a progress bar; on a terminal unless given. Ctrl-C leaves the files that are written.
+        If True, show a progress bar; by default only on a terminal. Ctrl-C keeps the files written so far.
 
     Returns
     -------
@@ -63,10 +63,8 @@ def reproduce(folder: str | PathLike[str], *, progress: bool | None = None) -> l
                 if advanced is not None:
                     advanced(1)
             table = paper_table()
-        for path, text in (
-            (folder / "paper-numbers.md", table.markdown()),
-            (folder / "paper-numbers.csv", table.csv()),
-        ):
+        for suffix, text in (("md", table.markdown()), ("csv", table.csv())):
+            path = folder / f"paper-numbers.{suffix}"
             path.write_text(text, encoding="utf-8", newline="\n")
             written.append(path)
     except KeyboardInterrupt:

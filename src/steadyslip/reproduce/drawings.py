@@ -1,4 +1,4 @@
-"""The figures of Dupont & Bapna (1994): simulated motion (1, 2, 5, 6) and critical stiffness (7).
+"""Figures of Dupont & Bapna (1994): simulated motion (1, 2, 5, 6) and critical stiffness (7).
 
 The paper does not print the stiffnesses and starting points of its Figs 5 and 6; those used here are named in
 the figures. Its "closed" trajectory at k = k_cr is closed to linear order only: it is a very weak inward spiral
@@ -23,15 +23,15 @@ from steadyslip.protocol import NormalStressStep, VelocityStep
 from steadyslip.reproduce.rig import D_C, V0, paper_rig
 from steadyslip.units import MPa, deg
 
-SIGMA = 5 * MPa
-STEP = 1.0  # s, when Figs 1 and 2 step
-PROMPT = 1e-4  # s, in which the stiff machine has followed and the state has hardly moved
-_STIFF = 1e16  # Pa/m: friction itself, without the machine; a million times critical
+SIGMA = 5 * MPa  # normal stress of Figs 1 and 2: the preload of `paper_rig`
+STEP_TIME = 1.0  # time of the step in Figs 1 and 2, s
+DIRECT_TIME = 1e-4  # time after the step at which its direct effect is read, s: 1e-4 of d_c/v0
+_STIFF = 1e16  # stiffness of the rig of Figs 1 and 2, Pa/m: a million times critical, so that slip follows the drive
 
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of the paper: name of its files, and how to draw it on given Axes."""
+    """Figure of the paper: stem of its file names, and a function that draws it on given Axes."""
 
     name: str
     draw: Callable[[Any], Any]
@@ -41,19 +41,19 @@ def _figure_7(ax: Any) -> Any:
     return figures.critical_stiffness_against_mass(paper_rig(), ax=ax)
 
 
-def sheared(protocol: Any, slip: float = 8 * D_C) -> History:
-    """The paper's rock at constant velocity in a stiff machine, without coupling to the normal stress."""
+def simulate_shear(protocol: Any, slip: float = 8 * D_C) -> History:
+    """Simulated shear of the rock of the paper in a stiff machine at constant normal stress, over a slip in m."""
     paper = paper_rig()
     rig = Slider(friction=paper.friction, contact=Constant(preload=SIGMA), stiffness=_STIFF, drive=paper.drive)
     return simulate(rig, protocol, until=slip / V0, method="rosenbrock", events=False)
 
 
-def _response(ax: Any, run: History, direct: str, evolution: str) -> Any:
-    """Shear stress over slip, with the direct and the evolving part of the change marked."""
+def _plot_step(ax: Any, run: History, direct: str, evolution: str) -> Any:
+    """Plot shear stress over slip, with labels at the direct and the evolving part of its change."""
     change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
     slip = run["slip"] / D_C
     ax.plot(slip, change, color=style.BLUE)
-    peak = float(np.interp(STEP + PROMPT, run["t"], change))
+    peak = float(np.interp(STEP_TIME + DIRECT_TIME, run["t"], change))
     last, where = float(change[-1]), float(slip[-1])
     middle = 1.0 + 0.55 * (where - 1.0)
     for low, high, text, x in ((0.0, peak, direct, middle * 0.55), (peak, last, evolution, middle)):
@@ -67,22 +67,25 @@ def _response(ax: Any, run: History, direct: str, evolution: str) -> Any:
 
 
 def _figure_1(ax: Any) -> Any:
-    run = sheared(VelocityStep(at=STEP, to=float(np.e) * V0))
-    _response(ax, run, "A", "B")
+    run = simulate_shear(VelocityStep(at=STEP_TIME, to=float(np.e) * V0))
+    _plot_step(ax, run, "A", "B")
     ax.set_title("Step of velocity by a factor e", fontsize="medium")
     return ax
 
 
 def _figure_2(ax: Any) -> Any:
     step = 0.01 * SIGMA
-    run = sheared(NormalStressStep(at=STEP, by=step))
-    _response(ax, run, "≈ (μ − α) Δσ", "≈ α Δσ")
+    run = simulate_shear(NormalStressStep(at=STEP_TIME, by=step))
+    _plot_step(ax, run, "≈ (μ − α) Δσ", "≈ α Δσ")
     ax.set_title("Step of normal stress by 1 %", fontsize="medium")
     return ax
 
 
-def trajectory(angle: float, stiffness: float, cycles: float = 4.0, kick: float = 0.5) -> History:
-    """The quasistatic inclined spring, its velocity e^kick times that of the load point at first."""
+def simulate_orbit(angle: float, stiffness: float, cycles: float = 4.0, kick: float = 0.5) -> History:
+    """Simulated motion of the quasistatic inclined spring, started at x = 0 with velocity e^kick v0.
+
+    Angle in rad, stiffness in Pa/m; `cycles` is the duration in periods at the edge.
+    """
     rig = paper_rig(angle).with_values({"slider.stiffness": stiffness})
     until = cycles * 2 * np.pi * D_C / V0 / 0.19  # 0.19: angular frequency at the edge for −45 degrees, eq. 26
     return simulate(rig, until=float(until), initial={"v": float(np.exp(kick)) * V0}, rtol=1e-9, events=False)
@@ -91,7 +94,7 @@ def trajectory(angle: float, stiffness: float, cycles: float = 4.0, kick: float 
 def _figure_5(ax: Any) -> Any:
     edge = float(critical_stiffness(paper_rig()))
     for share, color in ((0.97, style.VERMILION), (1.0, style.BLUE), (1.1, style.GREEN)):
-        run = trajectory(-45 * deg, share * edge, cycles=3.0)
+        run = simulate_orbit(-45 * deg, share * edge, cycles=3.0)
         figures.phase_plane(run, ax=ax, label=f"k = {share:g} k_cr", color=color)
     ax.set_title("ψ = −45°, start at x = 0, ln(v/v0) = 0.5; k_cr: closed to linear order only", fontsize="medium")
     ax.legend(fontsize="small")
@@ -101,7 +104,7 @@ def _figure_5(ax: Any) -> Any:
 def _figure_6(ax: Any) -> Any:
     stiffness = 1.1 * float(critical_stiffness(paper_rig()))
     for angle, color in ((-45, style.BLUE), (0, style.ORANGE), (45, style.GREEN)):
-        run = trajectory(angle * deg, stiffness, cycles=3.0)
+        run = simulate_orbit(angle * deg, stiffness, cycles=3.0)
         drive = run.rig.drive.velocity
         scaled = run["spring_stress"] / run["spring_stress"][0]
         ax.plot(np.log(run["v"] / drive), scaled, color=color, linewidth=1, label=f"ψ = {angle}°".replace("-", "−"))

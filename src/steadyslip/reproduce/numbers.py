@@ -1,4 +1,4 @@
-"""The equations of Dupont & Bapna (1994), evaluated with the paper's parameters, beside ours.
+"""Equations of Dupont & Bapna (1994) evaluated with the parameters of the paper, beside our numbers.
 
 The paper prints one such number only. Ours come from the Model's critical stiffness, eigenvalues and boundaries, or
 from simulated motion, and not from the closed forms of `steadyslip.paper`.
@@ -18,14 +18,14 @@ from steadyslip import figures
 from steadyslip.figures import mass
 from steadyslip.linear import boundary, critical_stiffness, eigenvalues
 from steadyslip.protocol import NormalStressStep, VelocityStep
-from steadyslip.reproduce.drawings import PROMPT, SIGMA, STEP, sheared, trajectory
+from steadyslip.reproduce.drawings import DIRECT_TIME, SIGMA, STEP_TIME, simulate_orbit, simulate_shear
 from steadyslip.reproduce.rig import D_C, V0, paper_rig
 from steadyslip.units import deg
 
 
 @dataclass(frozen=True)
 class PaperNumber:
-    """One equation or figure of the paper in numbers, beside ours.
+    """Number from an equation or figure of the paper, beside ours.
 
     Attributes
     ----------
@@ -33,9 +33,9 @@ class PaperNumber:
         Equation or figure of the paper.
     quantity, unit : str
     expected, found : float
-        The equation evaluated to 18 digits (of a figure, what its parameters say), and ours by the general route.
+        The equation evaluated to 18 digits (for figures, a value from its parameters), and ours from the Model.
     printed : str
-        The number as the paper prints it; empty where it prints none.
+        The number as printed in the paper; empty if it prints none.
     """
 
     source: str
@@ -51,7 +51,7 @@ class PaperNumber:
         return abs(self.found / self.expected - 1)
 
     def cells(self) -> tuple[str, ...]:
-        """What a table shows, in the order of `PaperTable.header`."""
+        """Cells of a table row, in the order of `PaperTable.header`."""
         return (
             self.source,
             self.quantity,
@@ -65,7 +65,7 @@ class PaperNumber:
 
 @dataclass(frozen=True)
 class PaperTable:
-    """Rows of `paper_table`; prints itself, and as Markdown or CSV."""
+    """Table of numbers of the paper beside ours, as text, Markdown or CSV."""
 
     rows: tuple[PaperNumber, ...]
     header = ("source", "quantity", "unit", "printed", "equation", "steadyslip", "relative difference")
@@ -97,7 +97,8 @@ class PaperTable:
         return text.getvalue()
 
 
-# From eqs 25-28, 30 and 31 at 25 digits, with the paper's parameters; keys are spring angles in degrees.
+# From eqs 25-28, 30 and 31 at 25 digits, with the parameters of the paper; keys: spring angles in degrees;
+# values: dimensionless unless a unit is given.
 _KAPPA = {
     -45: 0.00174418604651162791,
     -30: 0.0016319053380718911,
@@ -112,25 +113,30 @@ _MASS_2 = {15: 0.100258458410265573, 30: 0.0484727441245512871, 45: 0.0295178571
 _MASS_1 = 0.003625
 _LOCK_UP = -55.0079798014413379  # degrees
 _STIFFNESS = 29069767441.8604651  # Pa/m at −45 degrees
-_M_STAR = 0.01
+_M_STAR = 0.01  # dimensionless mass of the rows with mass, below m*_cr2 of all angles used
 
 
 @lru_cache(maxsize=1)
 def paper_table() -> PaperTable:
-    """The paper's equations in numbers beside ours, with the relative difference of each."""
+    """Table of the equations of the paper in numbers beside ours, with relative differences."""
     rows = [
-        PaperNumber("eq. 25", _at("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg))))
+        PaperNumber(
+            "eq. 25", _quantity("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg)))
+        )
     ]
-    rows += [PaperNumber("eq. 28", _at("κ_cr", angle), "1", value, _kappa(angle)) for angle, value in _KAPPA.items()]
     rows += [
-        PaperNumber("eq. 28", _at("κ_cr", angle, _M_STAR), "1", value, _kappa(angle, _M_STAR))
+        PaperNumber("eq. 28", _quantity("κ_cr", angle), "1", value, _kappa(angle)) for angle, value in _KAPPA.items()
+    ]
+    rows += [
+        PaperNumber("eq. 28", _quantity("κ_cr", angle, _M_STAR), "1", value, _kappa(angle, _M_STAR))
         for angle, value in _KAPPA_WITH_MASS.items()
     ]
     rows += [
-        PaperNumber("eq. 26", _at("β d_c/v0", angle), "1", value, _frequency(angle)) for angle, value in _BETA.items()
+        PaperNumber("eq. 26", _quantity("β d_c/v0", angle), "1", value, _frequency(angle))
+        for angle, value in _BETA.items()
     ]
     rows += [
-        PaperNumber("eq. 26 with mass", _at("β d_c/v0", angle, _M_STAR), "1", value, _frequency(angle, _M_STAR))
+        PaperNumber("eq. 26 with mass", _quantity("β d_c/v0", angle, _M_STAR), "1", value, _frequency(angle, _M_STAR))
         for angle, value in _BETA_WITH_MASS.items()
     ]
     lock_up = next(edge.value for edge in boundary(paper_rig(), "contact.angle") if edge.kind == "lock-up")
@@ -138,13 +144,15 @@ def paper_table() -> PaperTable:
     crossing = mass.mass_of_equal_stiffness(paper_rig(), figures.ANGLES)
     rows.append(PaperNumber("eq. 30", "m*_cr1", "1", _MASS_1, crossing, printed="0.0036"))
     rows += [
-        PaperNumber("eq. 31", _at("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg))
+        PaperNumber(
+            "eq. 31", _quantity("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg)
+        )
         for angle, value in _MASS_2.items()
     ]
-    return PaperTable((*rows, *_from_motion()))
+    return PaperTable((*rows, *_motion_numbers()))
 
 
-def _at(symbol: str, angle: int, m_star: float | None = None) -> str:
+def _quantity(symbol: str, angle: int, m_star: float | None = None) -> str:
     inertia = "" if m_star is None else f", m* = {m_star:g}"
     return f"{symbol} at ψ = {angle}°{inertia}".replace("-", "−")
 
@@ -154,18 +162,18 @@ def _kappa(angle: float, m_star: float = 0.0) -> float:
 
 
 def _frequency(angle: float, m_star: float = 0.0) -> float:
-    """β d_c/v0 from the eigenvalues at the critical stiffness."""
+    """Dimensionless angular frequency β d_c/v0, from the eigenvalues at the critical stiffness (angle in degrees)."""
     heavy = mass.mass_at(paper_rig(), angle * deg, m_star)
     rig = paper_rig(angle * deg).with_values({"slider.mass": float(heavy)})
     found = eigenvalues(rig, {"slider.stiffness": critical_stiffness(rig)})
     return float(np.nanmax(found.imag)) * D_C / V0
 
 
-def _from_motion() -> tuple[PaperNumber, ...]:
-    """What Figs 1, 2 and 5 show, read from simulated motion: good to the finite time of a step or size of a kick."""
-    rise, settled = _parts(VelocityStep(at=STEP, to=float(np.e) * V0))
+def _motion_numbers() -> tuple[PaperNumber, ...]:
+    """Numbers of Figs 1, 2 and 5 from simulated motion, limited by the finite time of a step or size of a kick."""
+    rise, settled = _step_response(VelocityStep(at=STEP_TIME, to=float(np.e) * V0))
     share = 0.01
-    jump, final = _parts(NormalStressStep(at=STEP, by=share * SIGMA))
+    jump, final = _step_response(NormalStressStep(at=STEP_TIME, by=share * SIGMA))
     at_once = (1 + share) * (0.7 - 0.56 * np.log1p(share)) - 0.7  # eq. 1; (μss − α) Δσ/σ to first order
     edge = float(critical_stiffness(paper_rig()))
     return (
@@ -177,16 +185,16 @@ def _from_motion() -> tuple[PaperNumber, ...]:
     )
 
 
-def _parts(piece: VelocityStep | NormalStressStep) -> tuple[float, float]:
-    """Change of shear stress over σ just after a step, and in the end."""
-    run = sheared(piece, 20 * D_C)
+def _step_response(piece: VelocityStep | NormalStressStep) -> tuple[float, float]:
+    """Change of shear stress over σ just after a step, and at the end of the run."""
+    run = simulate_shear(piece, 20 * D_C)
     change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
-    return float(np.interp(STEP + PROMPT, run["t"], change)), float(change[-1])
+    return float(np.interp(STEP_TIME + DIRECT_TIME, run["t"], change)), float(change[-1])
 
 
 def _orbit_frequency(stiffness: float) -> float:
-    """From the times at which a small orbit returns to v0 from below."""
-    run = trajectory(-45 * deg, stiffness, cycles=4.0, kick=0.02)
+    """Dimensionless angular frequency of a small orbit, from the times at which v rises through v0."""
+    run = simulate_orbit(-45 * deg, stiffness, cycles=4.0, kick=0.02)
     u, t = np.log(run["v"] / V0), run["t"]
     i = np.nonzero((u[:-1] < 0) & (u[1:] >= 0))[0]
     returns = t[i] - u[i] * (t[i + 1] - t[i]) / (u[i + 1] - u[i])

@@ -1,4 +1,4 @@
-"""The paper's rig."""
+"""Rig of the paper."""
 
 from __future__ import annotations
 
@@ -13,18 +13,12 @@ V0 = 1 * um / s
 
 
 def paper_rig(angle: float = -45 * deg) -> Slider:
-    """The paper's inclined spring (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
+    """Inclined spring of the paper (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
 
-    The paper gives neither v0 nor a stiffness; both are round numbers that no dimensionless result depends on.
+    The paper gives neither v0 nor a stiffness; both are round numbers without effect on dimensionless results.
     """
     rock = RateState(
-        a=0.0145,
-        b=0.0160,
-        d_c=D_C,
-        mu_ref=0.7,
-        v_ref=V0,
-        evolution=Slip(),
-        normal_memory=LinkerDieterich(alpha=0.56),
+        a=0.0145, b=0.0160, d_c=D_C, mu_ref=0.7, v_ref=V0, evolution=Slip(), normal_memory=LinkerDieterich(alpha=0.56)
     )
     contact = InclinedSpring(preload=5 * MPa, angle=angle)
     return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=Steady(V0))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import steadyslip as ss
 from edges_at_random import drawn
@@ -83,6 +84,27 @@ def test_an_edge_that_is_none_is_left_out():
     assert [one.passed for one in found if "friction.b" in one.what] == [False]
     assert all(one.passed for one in found if "friction.b" not in one.what)
     assert in_words(found).startswith(f"not decided: edge of friction.b at {wrong.value:.6g}; checked: ")
+
+
+def test_where_the_growth_rate_touches_zero_it_is_said_to_touch():
+    """The largest of the critical stiffnesses over the velocity: unstable at that velocity alone, stable around."""
+    held = drawn(np.random.default_rng(0)).with_values({"drive.velocity": 1e-4})
+
+    def critical(velocity):
+        return -float(ss.critical_stiffness(held, {"drive.velocity": velocity}))
+
+    found = minimize_scalar(critical, bounds=(5e-4, 1.5e-3), options={"xatol": 1e-9})
+    known = margins(held.with_values({"slider.stiffness": -found.fun * (1 - 1e-4)}))
+    (margin,) = [one for one in known if one.parameter == "drive.velocity"]
+    assert [edge.stable for edge in margin.edges] == ["below", "above"]
+    touched = replace(margin.edges[0], value=float(found.x))
+    told = [replace(margin, edges=(touched,), edge=touched)]
+    kept, (one,) = edge_checks(held.with_values({"slider.stiffness": -found.fun}), told, 0)
+    assert one.passed
+    assert in_words([one]) == f"checked: drive.velocity touches an edge at {found.x:.6g} m/s"
+    assert kept[0].edge is None
+    _, (one,) = edge_checks(held.with_values({"slider.stiffness": -found.fun * 1.001}), told, 0)
+    assert in_words([one]).startswith("not decided: edge of drive.velocity")
 
 
 def test_the_critical_stiffness_has_its_root_on_the_axis():

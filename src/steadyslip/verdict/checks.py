@@ -188,16 +188,41 @@ def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple
             shares[rest] = [
                 share if _as_said(edges[i][1], *pair) else np.inf for i, pair in zip(rest, sides, strict=True)
             ]
+    lost = np.flatnonzero(np.isinf(shares))
+    touching = dict(zip(lost.tolist(), _touching(rig, [edges[i] for i in lost], branch), strict=True))
     checks = []
-    for (_, edge), share in zip(edges, shares, strict=True):
-        what = f"edge of {edge.parameter} at {edge.value:.6g} {edge.unit}".removesuffix(" 1")
-        checks.append(check(what, "roots on both sides", share, max(BESIDE)))
-    lost = [edge for (_, edge), one in zip(edges, checks, strict=True) if not one.passed]
-    return without_edges(margins, lost), tuple(checks)
+    for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
+        where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
+        if touching.get(i, np.inf) <= ON_AXIS:
+            what, how = f"{edge.parameter} touches an edge at {where}", "a root on the imaginary axis, sides alike"
+            checks.append(check(what, how, touching[i], ON_AXIS))
+        else:
+            checks.append(check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, max(BESIDE)))
+    return without_edges(margins, [edges[i][1] for i in lost]), tuple(checks)
+
+
+def _touching(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], branch: int) -> Array:
+    """Of each edge by what share of its size the rightmost root misses the axis there; inf where sides differ."""
+    if not edges:
+        return np.empty(0)
+    sides = np.array(_sides(rig, edges, max(BESIDE), branch))
+    alike = (sides[:, 0] == sides[:, 1]) & np.isin(sides[:, 0], (STABLE, UNSTABLE))
+    with np.errstate(all="ignore"):
+        roots = spectrum(_beside(rig, edges, 0.0, branch)).reshape(2, len(edges), -1)[0]
+        real = np.where(np.isnan(roots.real), -np.inf, roots.real)
+        least = np.take_along_axis(roots, np.argmax(real, axis=-1)[:, None], axis=-1)[:, 0]
+        return np.where(alike, np.abs(least.real) / np.abs(least), np.inf)
 
 
 def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> list[list[int]]:
     """Of each edge the status below and above, a share of its value away; one question for all."""
+    with np.errstate(all="ignore"):
+        found = _by_roots(_beside(rig, edges, share, branch)).reshape(2, len(edges))
+    return [[int(one) for one in pair] for pair in found.T]
+
+
+def _beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> OperatingPoint:
+    """The rigs a share of the value of each edge below it, and those above, (2 n,)."""
     values = np.array([edge.value for _, edge in edges])
     sizes = np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
     beside = values + share * sizes * np.array([[-1.0], [1.0]])
@@ -208,9 +233,7 @@ def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, bra
         allowed = rig.parameters()[margin.parameter].role.domain.contains(beside[:, at])
         own[:, at] = np.where(allowed, beside[:, at], values[at])
         vary[margin.parameter] = own.ravel()
-    with np.errstate(all="ignore"):
-        found = _by_roots(operating_point(rig, vary, present_zeros(rig), branch, scan=True))
-    return [[int(one) for one in pair] for pair in found.reshape(beside.shape).T]
+    return operating_point(rig, vary, present_zeros(rig), branch, scan=True)
 
 
 def _as_said(edge: Boundary, below: int, above: int) -> bool:

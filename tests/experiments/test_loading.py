@@ -14,7 +14,7 @@ from steadyslip.experiments.loading import runs
 from steadyslip.experiments.loading.kinks import load_course, smooth_load
 from steadyslip.experiments.loading.loading import Loading, shifted
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
-from steadyslip.experiments.loading.runs import Run, _without_returns, levelled
+from steadyslip.experiments.loading.runs import Run, _joined_across_flanks, fitted_run
 
 STEPS = [(40.3, 1.0, 3.0), (80.1, 3.0, 10.0), (121.7, 10.0, 3.0), (160.2, 3.0, 1.0)]
 HOLDS = [(30.3, 1.0, 0.0), (40.3, 0.0, 1.0), (90.1, 1.0, 0.0), (120.2, 0.0, 1.0)]
@@ -337,8 +337,8 @@ def test_a_flank_of_a_glitch_is_no_change_of_rate(offset):
     x = 1e-6 * (x + 0.03 * np.random.default_rng(2).standard_normal(len(time)))
     places = np.searchsorted(time, [0.0, 48.0, 48.4, 49.0, 100.0]).tolist()
     pieces = list(pairwise(places))
-    runs = [levelled(Run(members), time, x) for members in (pieces[:2], pieces[2:3], pieces[3:])]
-    assert len(_without_returns(runs, time, x, 3e-8)) == (1 if offset == 0.0 else 3)
+    runs = [fitted_run(Run(members), time, x) for members in (pieces[:2], pieces[2:3], pieces[3:])]
+    assert len(_joined_across_flanks(runs, time, x, 3e-8)) == (1 if offset == 0.0 else 3)
 
 
 def test_a_brief_stop_is_no_glitch():

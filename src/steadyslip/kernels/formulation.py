@@ -195,7 +195,7 @@ class Formulation:
         ((contact,), (sliding,)) = reduction.model.contacts, reduction.slidings
         speed, v, own = sliding.outputs["v"], contact.velocity, sliding.variable
         if own is None:
-            raise InternalError("a single contact has its own velocity variable")
+            raise InternalError("a velocity variable at a single contact")
         inverse = own.w_of_v
         variables = {*reduction.state, *reduction.continuous, *reduction.inputs, *reduction.unknowns}
         alone = speed.free_symbols & variables == {own.w} and not inverse.free_symbols & variables

@@ -192,4 +192,4 @@ def _slip(begin: AnyEvent, peak: AnyEvent, end: AnyEvent, recurrence: float) -> 
         return ContactSlip(contact=begin.contact, force_drop=begin.pull - end.pull, **times, **top)
     if isinstance(begin, Event) and isinstance(end, Event):
         return SlipEvent(stress_drop=begin.spring_stress - end.spring_stress, **times, **top)
-    raise InternalError("events of one run are of one kind")
+    raise InternalError("events of one kind in a run")

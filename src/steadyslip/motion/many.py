@@ -236,7 +236,7 @@ def simulate_many(
             if not _run(jobs, store, index, count, requested, threads, advanced):
                 break
     if store is None:
-        raise InternalError("the runs were split into no groups")
+        raise InternalError("at least one group of runs")
     return store.result(shape, together.dims or (), together.coords)
 
 

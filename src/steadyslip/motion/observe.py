@@ -166,7 +166,7 @@ def _load_point_lead(model: Model) -> ArrayFunction:
     """Displacement of a let-go drive's load point ahead of steady motion, and its rate."""
     own = model.letting_go
     if own is None:
-        raise InternalError("the drive is never let go")
+        raise InternalError("a drive that is let go")
     given = _function(model)[1]
     names = {name: symbol for symbol, name in _given(model).items()}
     return model.function([own.ahead, own.speed], *(names[name] for name in given), own.loading_rate)

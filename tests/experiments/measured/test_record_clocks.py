@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from measured_columns import HEAD, ROWS, check, columns, plain, read_as, rows
-from steadyslip.experiments.measured.formats.moments import from_the_first, moment
+from steadyslip.experiments.measured.formats.moments import moment, seconds_since_first
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_dates_as_people_write_them(text, seconds):
 
 
 def test_a_clock_passes_midnight():
-    np.testing.assert_array_equal(from_the_first(np.array([86399.0, 0.0, 1.0])), [0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(seconds_since_first(np.array([86399.0, 0.0, 1.0])), [0.0, 1.0, 2.0])
 
 
 @pytest.mark.parametrize("start", ["23:59:50", "2024-02-28T23:59:50"])

@@ -7,8 +7,8 @@ import pytest
 
 import steadyslip as ss
 from measured_columns import HEAD, check, columns, plain, read_as, rows
-from steadyslip.experiments.measured.clean import without_stand_ins
-from steadyslip.experiments.measured.columns import guessed_role as role, split_name
+from steadyslip.experiments.measured.clean import without_placeholders
+from steadyslip.experiments.measured.columns import guess_role as role, split_name
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_large_plain_text_is_read_like_small_text(tmp_path, monkeypatch):
     )
     plain = ss.read_record(tmp_path / "r.txt")
     monkeypatch.setattr(text, "LARGE", 1000)
-    monkeypatch.setattr(text, "LOOKED_AT", 4000)
+    monkeypatch.setattr(text, "SAMPLE_BYTES", 4000)
     monkeypatch.setattr(text, "_numbers", None)  # is not asked
     fast = ss.read_record(tmp_path / "r.txt")
     for name in ("time", "friction", "normal"):
@@ -140,8 +140,8 @@ def test_a_record_that_passes_such_a_number_keeps_it():
     time = np.arange(900.0, 1100.0)
     values = np.where(time == 1000, 999.0, time)
     notes = []
-    assert without_stand_ins(values, "x", notes) is values
-    assert without_stand_ins(np.repeat([999.0, 0.0], 50), "command", notes)[0] == 999.0
+    assert without_placeholders(values, "x", notes) is values
+    assert without_placeholders(np.repeat([999.0, 0.0], 50), "command", notes)[0] == 999.0
     assert not notes
 
 

@@ -1,1 +1,1 @@
-"""What was commanded in an experiment, found in what was measured. Knows arrays, not laws."""
+"""Commanded loading of an experiment, found in measured columns; works on arrays, independent of laws."""

@@ -1,4 +1,4 @@
-"""From a measured displacement to the rates that were commanded, and when, and how fast, they changed."""
+"""Course of the load-point rate from a measured displacement: rates, and times and durations of their changes."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.loading.ends import STILL, off_the_line, turned
+from steadyslip.experiments.loading.ends import REST_SHARE, reversed_column, samples_off_line
 from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
 from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import displacement_noise
 
-RAMP = 40.0  # how much better a ramp must fit a displacement than a step, in units of its noise
-OUTLYING = 9.0  # squared deviation, in those units, from which on a sample weighs less
-BRIEF = 0.1  # of the samples of a run: a level of the sensor so short-lived may be the bottom of a glitch
-AT_REST = 1e-3  # of the highest rate: a hold
-SLOW = 0.02  # of it: a hold, if the error allows it
-MOST_CHANGES = 40  # beyond, and
-MOST_BETWEEN = 0.35  # share of the record that lies between runs: there is no piecewise-linear loading
-TELLING = 30  # samples that tell how noisy they are
-EXACT = 1e-2  # of a sampling interval: times known so well are not fitted
+RAMP_GAIN = 40.0  # decrease of chi squared by which a ramp must fit better than a step; chosen by trial
+OUTLIER = 9.0  # squared deviation (in units of the noise) from which a sample weighs less: three standard deviations
+BRIEF = 0.1  # share of a run's samples below which a sensor level may be the bottom of a glitch; chosen by trial
+AT_REST = 1e-3  # share of the highest rate up to which a rate is a hold
+SLOW = 0.02  # share of the highest rate up to which a rate may be a hold, if the error allows it; chosen by trial
+MOST_CHANGES = 40  # more changes than this, or
+MOST_BETWEEN = 0.35  # a larger share of the time between runs, and the loading is not piecewise linear; chosen by trial
+ENOUGH_SAMPLES = 30  # samples that determine their own noise; chosen by trial
+EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
 
 
 def load_course(time: Array, displacement: Array, blurred: bool = False) -> Course:
-    """The load point's rate from a displacement: straight runs, else a smooth curve.
+    """Course of the load-point rate from a displacement: straight runs or, if these do not fit, a smooth curve.
 
-    A displacement that was integrated from a rate is `blurred`: it does not tell when, within a sampling interval, the
-    rate changed.
+    `blurred` is for a displacement that was integrated from a rate: it does not determine within a sampling interval
+    when the rate changed.
     """
     if not np.ptp(displacement) > 0:
         return Course(0.0)
@@ -42,43 +42,43 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     strays, errors, inflation = _errors(runs, time, displacement)
     rates = np.array([run.rate for run in runs])
     top = float(np.max(np.abs(rates)))
-    slow = np.array([SLOW if len(run.rows) >= TELLING else STILL for run in runs]) * top
+    slow = np.array([SLOW if len(run.rows) >= ENOUGH_SAMPLES else REST_SHARE for run in runs]) * top
     rest = np.abs(rates) <= np.maximum(AT_REST * top, np.minimum(4 * np.array(errors), slow))
     rest &= len(runs) > 1
     rates = np.where(rest, 0.0, rates)
     changes = []
     for k in range(1, len(runs)):
         scale, worth = max(strays[k - 1 : k + 1]), max(inflation[k - 1 : k + 1])
-        kink = _Kink(time, displacement, runs[k - 1], runs[k], (errors[k - 1], errors[k]), scale, worth)
+        kink = _ChangeFit(time, displacement, runs[k - 1], runs[k], (errors[k - 1], errors[k]), scale, worth)
         changes.append(kink.change(float(rates[k - 1]), float(rates[k]), blurred))
-    found = tuple(_inside(one, time) for one in _in_order(changes))
+    found = tuple(_within_record(one, time) for one in _without_overlap(changes))
     return Course(
         float(rates[0]), found, np.where(rest, 0.0, errors), None, float(np.median(strays)),
         sum(max(run.groups) for run in runs),
         sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs),
-        off_the_line(time, displacement, runs[0], max(strays)),
-        off_the_line(turned(time), turned(displacement), runs[-1].turned(time), max(strays)),
+        samples_off_line(time, displacement, runs[0], max(strays)),
+        samples_off_line(reversed_column(time), reversed_column(displacement), runs[-1].reversed(time), max(strays)),
     )  # fmt: skip
 
 
 def smooth_load(time: Array, displacement: Array) -> Course:
-    """The load point's rate from a smoothing curve through its displacement."""
+    """Course of the load-point rate from a smoothing curve through its displacement."""
     spline = smoothing_curve(time, displacement, displacement_noise(time, displacement))
     strays = displacement - spline(time)
     return Course(0.0, curve=spline.derivative(), strays=1.4826 * float(np.median(np.abs(strays))))
 
 
 def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[float], list[float], list[float]]:
-    """How far runs stray from their lines, the errors of their rates, and how many samples are worth one.
+    """Standard deviations of runs from their lines, errors of their rates, and samples per independent sample.
 
-    A run of few samples does not tell its noise; it is as noisy as the longest.
+    A run of few samples does not determine its noise; it gets that of the longest run.
     """
     found = [_error(run, time, displacement) for run in runs]
     longest = max(range(len(runs)), key=lambda k: len(runs[k].rows))
     scale, _, inflation = found[longest]
     for k, run in enumerate(runs):
         count = len(run.rows)
-        if count < TELLING and count < len(runs[longest].rows) and found[k][0] < scale:
+        if count < ENOUGH_SAMPLES and count < len(runs[longest].rows) and found[k][0] < scale:
             size = float(np.sum((time[run.rows] - time[run.rows].mean()) ** 2))
             noisy = scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300)
             found[k] = scale, scale * float(np.sqrt(inflation / size)) if noisy else 0.0, inflation
@@ -87,7 +87,7 @@ def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[flo
 
 
 def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, float]:
-    """Of one run, by itself."""
+    """Deviation, error of the rate and samples per independent sample of one run."""
     rows = run.rows
     own = np.repeat(run.groups, [j - i for i, j in run.members])
     t = time[rows] - time[0]
@@ -103,8 +103,8 @@ def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, fl
     return scale, float(np.sqrt(max(variance, 0.0))), max(noise.inflation, 1.0)
 
 
-class _Kink:
-    """Where the lines of two runs meet, and whether what lies between is a ramp."""
+class _ChangeFit:
+    """Change between two runs: the meeting point of their lines, and a ramp or step there."""
 
     def __init__(
         self, time: Array, displacement: Array, before: Run, after: Run, errors: tuple[float, float],
@@ -136,11 +136,11 @@ class _Kink:
         self.time, self.displacement = time[rows], displacement[rows]
 
     def change(self, before: float, after: float, blurred: bool) -> Change:
-        """The change that fits the displacement."""
+        """Change that fits the displacement best."""
         slack = 6 * self.deviation + 2 * self.spacing
         own = 6 * self.deviation + 3 * self.strays / abs(self.rates[1] - self.rates[0])
         if not self.zone[0] - slack <= self.meet <= self.zone[1] + slack:
-            return self._vague(before, after, own + slack)
+            return self._uncertain_change(before, after, own + slack)
         at_once = self.adjacent and self.zone[0] <= self.meet <= self.zone[1]
         if not blurred and own < EXACT * self.spacing and (at_once or self._ramp()[0]):
             duration, _, _ = self._ramp()
@@ -153,8 +153,8 @@ class _Kink:
         low, high = (start - half + end - self.meet for end in (min(self.meets), max(self.meets)))
         return Change(start, duration, before, after, low, high + 2 * half, shortest, longest)
 
-    def _vague(self, before: float, after: float, slack: float) -> Change:
-        """The change where lines do not meet between the runs: a glitch hides it, or the sensor slipped meanwhile."""
+    def _uncertain_change(self, before: float, after: float, slack: float) -> Change:
+        """Change where the lines do not meet between the runs, because of a glitch or a slip of the sensor."""
         first, last = self.zone
         length = last - first
         hidden = first - 2 * length - slack <= self.meet <= last + 2 * length + slack
@@ -165,7 +165,7 @@ class _Kink:
         return Change(middle, 0.0, before, after, low, high, 0.0, length)
 
     def _ramp(self) -> tuple[float, float, float]:
-        """Duration that fits best, zero for a step, and the range of durations that fit nearly as well."""
+        """Best duration (zero for a step), and the range of durations that fit nearly as well."""
         if len(self.time) < 8 or not self.reach > 0:
             return 0.0, 0.0, 0.0
         grid = np.concatenate([[0.0], np.geomspace(0.2 * self.spacing, self.reach, 60)])
@@ -175,16 +175,16 @@ class _Kink:
         fine = minimize_scalar(self._misfit, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
         duration, least = float(fine.x), float(fine.fun) / self.inflation
         inside = np.abs(self.time - self.meet) <= 0.5 * duration
-        unlike = self._misfit(duration, inside) > 0.5 * OUTLYING * max(int(np.sum(inside)), 1)
-        if misfits[0] - least <= RAMP or unlike:
-            beyond = int(np.argmax(misfits > misfits[0] + OUTLYING))
+        unlike = self._misfit(duration, inside) > 0.5 * OUTLIER * max(int(np.sum(inside)), 1)
+        if misfits[0] - least <= RAMP_GAIN or unlike:
+            beyond = int(np.argmax(misfits > misfits[0] + OUTLIER))
             return 0.0, 0.0, float(grid[beyond - 1]) if beyond else float(grid[-1])
-        near = np.flatnonzero(misfits <= least + OUTLYING)
+        near = np.flatnonzero(misfits <= least + OUTLIER)
         ends = (grid[near[0]], grid[near[-1]]) if len(near) else (low, high)
         return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)
 
     def _misfit(self, duration: float, rows: Array | slice = slice(None)) -> float:
-        """Squared deviation from a ramp between the two lines, in units of the noise; that of glitches weighs less."""
+        """Chi squared of a ramp between the two lines, robust against glitches."""
         t = self.time - self.origin
         lines = [level + rate * t for level, rate in zip(self.levels, self.rates, strict=True)]
         since = self.time - (self.meet - 0.5 * duration)
@@ -192,11 +192,11 @@ class _Kink:
         model = np.where(since <= 0, lines[0], np.where(since >= duration, lines[1], bend))
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
         squares = ((self.displacement - model)[rows] / scale) ** 2
-        return float(OUTLYING * np.sum(np.log1p(squares / OUTLYING)))
+        return float(OUTLIER * np.sum(np.log1p(squares / OUTLIER)))
 
 
 def _levels(run: Run, edge: int) -> list[float]:
-    """Levels of the sensor that a run may have at one of its ends, 0 or -1: a short-lived one, and the next as well."""
+    """Levels of the sensor at an end of a run (0 or -1): the last one, and the next if that lasted briefly."""
     counts = np.bincount(np.repeat(run.groups, [j - i for i, j in run.members]))
     found = [float(run.levels[edge])]
     if len(counts) > 1 and counts[edge] < BRIEF * np.sum(counts):
@@ -204,15 +204,15 @@ def _levels(run: Run, edge: int) -> list[float]:
     return found
 
 
-def _inside(change: Change, time: Array) -> Change:
-    """A change that begins within the record: two samples at least lie on each side of it."""
+def _within_record(change: Change, time: Array) -> Change:
+    """Change moved so that it begins with at least two samples of the record on each side."""
     low, high = float(time[1]), float(time[-2])
     begin, earliest, latest = (min(max(at, low), high) for at in (change.time, change.earliest, change.latest))
     return replace(change, time=begin, earliest=earliest, latest=latest)
 
 
-def _in_order(changes: list[Change]) -> list[Change]:
-    """Changes that cannot overlap: between neighbours, the window of one ends where that of the next begins."""
+def _without_overlap(changes: list[Change]) -> list[Change]:
+    """Changes with windows cut so that neighbours cannot overlap."""
     for i in range(len(changes) - 1):
         one, other = changes[i : i + 2]
         middle = 0.5 * (one.time + one.duration + other.time)

@@ -1,8 +1,8 @@
-"""What was commanded in an experiment: rates of the load point, normal stress, and when they changed.
+"""Commanded loading of an experiment: rates of the load point, normal stress, and their changes.
 
-A sensor's noise must not drive a model: it makes errors in variables, which pull the stiffness and the direct effect
-down. What drives it is a course found in the measured column: levels, with steps or straight ramps between them, and
-a smooth curve where there is no such thing.
+Noise of a sensor must not drive a model: errors in variables bias the stiffness and the direct effect to low values. A
+model is driven by a `Course` fitted to the measured column: levels joined by steps or straight ramps, and a smooth
+curve where these do not fit.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly, read_only
 
 LoadCurve = Callable[[Array], Array]
-FELT = 1e-6  # of the highest level: uncertainty that could matter
+FELT = 1e-6  # error of a level, relative to the highest, below which it has no effect on a fit
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,15 @@ class Change:
     Attributes
     ----------
     time : float
-        When it begins, s.
+        Time at which it begins, s.
     duration : float
-        How long it takes, s: a straight ramp; zero if at once.
+        Duration of a straight ramp, s; zero for a step.
     before, after : float
         Levels.
     earliest, latest : float
-        Between which times it begins, s; equal where the column itself tells exactly.
+        Range of the time at which it may begin, s; equal if the column determines it.
     shortest, longest : float
-        How long it may take, s. Of a step: zero, and the longest ramp that cannot be told from it.
+        Range of the duration, s. For a step: zero, and the longest ramp that fits as well.
     """
 
     time: float
@@ -49,38 +49,38 @@ class Change:
 
     @property
     def free(self) -> bool:
-        """Whether the column leaves open when it begins."""
+        """True if the column does not determine when it begins."""
         return self.latest > self.earliest
 
     @property
     def stretches(self) -> bool:
-        """Whether it is a ramp whose duration the column leaves open."""
+        """True for a ramp whose duration the column does not determine."""
         return self.free and self.duration > 0
 
 
 @dataclass(frozen=True, eq=False)
 class Course(ReadOnly):
-    """What one channel does: levels, changes between them, and a smooth curve on top.
+    """Commanded course of one channel: levels, changes between them, and a smooth curve added to them.
 
     Attributes
     ----------
     first : float
-        Level before the first change: load-point rate, m/s, or normal stress, Pa.
+        Level before the first change: load-point rate (m/s) or normal stress (Pa).
     changes : tuple of Change
         In order of time.
     errors : ndarray (changes + 1,)
-        Standard deviations of the levels, of which all are independent.
+        Standard deviations of the levels, which are independent.
     curve : callable or None
-        What is added to the levels, at times in s.
+        Function of time (s) added to the levels.
     strays : float
-        How far the measured column strays from it, m or Pa.
+        Standard deviation of the measured column from the course, m or Pa.
     slips : int
-        Sudden changes of the level of a displacement sensor that were left out.
+        Number of sudden changes of a displacement sensor's level that were left out.
     glitches : int
-        Stretches of the column that were left out besides.
+        Number of other parts of the column that were left out.
     early, late : int
-        Samples at the beginning and at the end of the record that do not lie on it: whether the sensor or the loading
-        was another there, so few do not tell.
+        Number of samples at the beginning and at the end of the record that are not on the course; too few to tell if
+        the sensor or the loading differed.
     """
 
     first: float
@@ -98,7 +98,7 @@ class Course(ReadOnly):
         return np.asarray(read_only(np.array([self.first, *(change.after for change in self.changes)])))
 
     def at(self, time: Array) -> Array:
-        """Values at given times, s."""
+        """Values at given times (s)."""
         knots, values = [-np.inf], [self.first]
         for change in self.changes:
             end = change.time + max(change.duration, 1e-12 * (1 + abs(change.time)))
@@ -109,25 +109,25 @@ class Course(ReadOnly):
         return np.asarray(found if self.curve is None else found + self.curve(time))
 
     def integral(self, time: Array) -> Array:
-        """Its integral from the first of given times."""
+        """Integral from the first of given times."""
         knots = [c.time for c in self.changes] + [c.time + c.duration for c in self.changes]
         inner = [k for k in knots if time[0] < k < time[-1]]
         grid = np.unique(np.concatenate([time, inner]))
-        middle = 0.5 * (grid[1:] + grid[:-1])  # each interval lies within one level or ramp, on which this is exact
+        middle = 0.5 * (grid[1:] + grid[:-1])  # the midpoint rule is exact: each interval is in one level or ramp
         gone = np.concatenate([[0.0], np.cumsum(self.at(middle) * np.diff(grid))])
         return np.asarray(gone[np.searchsorted(grid, time)])
 
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """What was commanded in an experiment.
+    """Commanded loading of an experiment.
 
     Attributes
     ----------
     load : Course or None
-        Of the load-point rate; None where it was not measured.
+        Course of the load-point rate; None if it was not measured.
     stress : Course or None
-        Of the normal stress; None where it was not measured.
+        Course of the normal stress; None if it was not measured.
     """
 
     load: Course | None
@@ -135,7 +135,7 @@ class Loading:
 
     @cached_property
     def changes(self) -> tuple[tuple[str, int, Change], ...]:
-        """Channel (``load`` or ``stress``), place in its course, and change itself, in order of time."""
+        """(channel, index, change) in order of time; the channel is ``load`` or ``stress``."""
         found = [
             (channel, i, change)
             for channel, course in (("load", self.load), ("stress", self.stress))
@@ -146,7 +146,7 @@ class Loading:
 
 
 def resting_rate(loading: Loading) -> float | None:
-    """The rate at which a load point that rests at first moves later, m/s; None where it moves from the start."""
+    """Rate (m/s) at which a load point moves after an initial rest; None if it moves from the start."""
     course = loading.load
     if course is None or course.curve is not None or course.first != 0.0:
         return None
@@ -154,7 +154,7 @@ def resting_rate(loading: Loading) -> float | None:
 
 
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
-    """The loading with each of its levels in turn off by its standard deviation, where that is more than rounding."""
+    """Loadings with one level each raised by its standard deviation, for levels with an error above rounding."""
     for channel in ("load", "stress") if pressed else ("load",):
         course = getattr(loading, channel)
         if course is None:

@@ -1,4 +1,4 @@
-"""Finds what the normal stress did: constant or smooth, with steps and short straight ramps where it changed."""
+"""Course of the normal stress: constant or smooth, with steps and short straight ramps."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.numerics.smoothing import Smooth, smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
-LEAST_STRESS = 2e-3  # change of normal stress, as a share, that counts as one
-APART = 6.0  # standard deviations from a level: on the way to another
-SUDDEN = 0.7  # share of the difference of two levels that lies between a few samples on both sides,
-NEAR = 3  # of them
-BINS = 40  # of a span between changes, whose means
-UNEVEN = 3.0  # times the variance that noise would give them say that it is not constant
-JUST = 1e-6  # of the time between two samples: as soon as possible after one
-SLOW = 400  # knots of a curve between two changes: what is briefer is noise
-PER_PERIOD = 60  # knots of an oscillation
-OSCILLATION = 8  # alternating changes that are one oscillation
+LEAST_STRESS = 2e-3  # relative change of normal stress that counts as a change; chosen by trial
+OFF_LEVEL = 6.0  # standard deviations from a level beyond which a sample is not on it
+SUDDEN = 0.7  # share of a change that must happen between the few samples on both sides; chosen by trial,
+NEAR = 3  # samples on each side
+BINS = 40  # number of means of a span that are tested for being constant; chosen by trial
+UNEVEN = 3.0  # ratio of their variance to that of noise from which the span is not constant; chosen by trial
+EARLIEST_STEP = 1e-6  # share of a sampling interval: earliest time of a step after the sample before it
+SLOW = 400  # knots of a curve between two changes: faster variation counts as noise; chosen by trial
+PER_PERIOD = 60  # knots per period of an oscillation; chosen by trial
+OSCILLATION = 8  # sign changes from which a stress oscillates; chosen by trial
 
 
 @dataclass(frozen=True)
 class StressWave:
-    """An oscillation: when it begins, s, its period, s, mean and amplitude, Pa."""
+    """Oscillation of the normal stress: start (s), period (s), mean and amplitude (Pa)."""
 
     time: float
     period: float
@@ -34,48 +34,48 @@ class StressWave:
 
 
 def stress_course(time: Array, normal: Array) -> Course:
-    """The normal stress that was commanded; one sample by itself at an end of the record is not."""
-    early, late = (_alone(column) for column in (normal, normal[::-1]))
+    """Commanded normal stress; a single deviating sample at an end of the record is left out."""
+    early, late = (_deviates_alone(column) for column in (normal, normal[::-1]))
     if early or late:
         inner = slice(early, len(time) - late)
         return replace(stress_course(time[inner], normal[inner]), early=early, late=late)
     noise = level_noise(normal)
     if (wave := oscillation(time, normal)) is not None:
         level, knots = float(np.mean(normal)), int(PER_PERIOD * (time[-1] - time[0]) / wave.period)
-        return Course(level, curve=JoinedCurves([_span(time, normal, level, noise, knots)]))
+        return Course(level, curve=JoinedCurves([_curve_on_span(time, normal, level, noise, knots)]))
     if len(time) < 2 * FEWEST:
         return Course(float(np.mean(normal)), strays=noise)
     places = _transitions(time, normal, split(time, normal, noise, linear=False))
-    for _ in range(2):  # the ends of slow ramps, lost in the noise at first, belong to them once their line is known
+    for _ in range(2):  # the second pass adds the ends of slow ramps, which noise hid before their line was known
         ends = [0, *(place for pair in places for place in pair), len(time)]
         spans = [slice(i, j) for i, j in zip(ends[::2], ends[1::2], strict=True)]
         levels = [float(np.mean(normal[span])) for span in spans]
         changes = tuple(
             _change(time, normal, last - 1, first, levels[k : k + 2], noise) for k, (last, first) in enumerate(places)
         )
-        places = [_whole(time, pair, change) for pair, change in zip(places, changes, strict=True)]
+        places = [_whole_ramp(time, pair, change) for pair, change in zip(places, changes, strict=True)]
     curves = []
     for span, level in zip(spans, levels, strict=True):
-        if _uneven(normal[span], noise):
-            curves.append(_span(time[span], normal[span], level, noise, SLOW))
+        if _is_not_constant(normal[span], noise):
+            curves.append(_curve_on_span(time[span], normal[span], level, noise, SLOW))
     errors = np.array([noise / np.sqrt(span.stop - span.start) for span in spans])
     errors[noise <= 2e-7 * abs(levels[0])] = 0.0
     return Course(levels[0], changes, errors, JoinedCurves(curves) if curves else None, noise)
 
 
-def _alone(normal: Array) -> int:
-    """Whether the first sample is far from those that follow, which agree: 0 or 1."""
+def _deviates_alone(normal: Array) -> int:
+    """1 if the first sample is far from those that follow, which agree; else 0."""
     if len(normal) < 4 * FEWEST:
         return 0
     following = normal[1 : 1 + FEWEST]
-    least = max(LEAST_STRESS * float(np.max(np.abs(following))), APART * level_noise(normal))
+    least = max(LEAST_STRESS * float(np.max(np.abs(following))), OFF_LEVEL * level_noise(normal))
     return int(abs(normal[0] - np.mean(following)) > least and float(np.ptp(following)) < least)
 
 
 def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """For every change: the sample behind the last before it, and the first after it."""
+    """For every change: one past the last sample before it, and the first sample after it."""
     levels = np.array([float(np.median(normal[i:j])) for i, j in ranges])
-    for k, edge in ((0, slice(0, 2)), (-1, slice(-2, None))):  # the shortest range at an end may have two levels
+    for k, edge in ((0, slice(0, 2)), (-1, slice(-2, None))):  # the shortest range at an end may contain a change
         if ranges[k][1] - ranges[k][0] < 2 * FEWEST:
             levels[k] = float(np.mean(normal[edge]))
     lengths = np.array([time[j - 1] - time[i] for i, j in ranges])
@@ -87,7 +87,7 @@ def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> l
         while last < len(ranges) - 1 and _is_passing(levels, lengths, first, last):
             last += 1
         apart = abs(levels[first] - levels[last])
-        if apart > LEAST_STRESS * max(abs(levels[first]), abs(levels[last])) and apart > APART * noise:
+        if apart > LEAST_STRESS * max(abs(levels[first]), abs(levels[last])) and apart > OFF_LEVEL * noise:
             pair = _between(normal, ranges[first], ranges[last], levels[first], levels[last], noise)
             if (
                 _sudden(normal, pair, apart)
@@ -100,7 +100,7 @@ def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> l
 
 
 def _is_passing(levels: Array, lengths: Array, first: int, middle: int) -> bool:
-    """Whether a range lies on the way from the one before to the next: between them in value, and short."""
+    """True for a short range between its neighbours in value: part of a change."""
     low, high = sorted((levels[first], levels[middle + 1]))
     between = low < levels[middle] < high
     return bool(between and lengths[middle] < 0.2 * max(lengths[first], lengths[middle + 1]))
@@ -109,10 +109,10 @@ def _is_passing(levels: Array, lengths: Array, first: int, middle: int) -> bool:
 def _between(
     normal: Array, one: tuple[int, int], other: tuple[int, int], before: float, after: float, noise: float
 ) -> tuple[int, int]:
-    """Samples that belong to neither level lie between the two returned places."""
+    """Range of samples that belong to neither level."""
     i, j = max(one[1] - FEWEST, one[0] + 1), min(other[0] + FEWEST, other[1] - 1)
     part = normal[i:j]
-    away, there = np.abs(part - before) > APART * noise, np.abs(part - after) <= APART * noise
+    away, there = np.abs(part - before) > OFF_LEVEL * noise, np.abs(part - after) <= OFF_LEVEL * noise
     last = i + (int(np.argmax(away)) if np.any(away) else 0)
     late = np.flatnonzero(~there)
     first = max(i + (int(late[-1]) + 1 if len(late) else 0), last)
@@ -120,14 +120,14 @@ def _between(
 
 
 def _sudden(normal: Array, pair: tuple[int, int], apart: float) -> bool:
-    """Whether a stress that two levels describe changed between them, not slowly all along, which is a smooth curve."""
+    """True if the change happens within the few samples between two levels, not slowly all along."""
     last, first = pair
     before, after = normal[max(last - NEAR, 0) : last], normal[first : first + NEAR]
     return bool(len(before) and len(after) and abs(np.mean(after) - np.mean(before)) > SUDDEN * apart)
 
 
 def _straight(time: Array, normal: Array, pair: tuple[int, int], noise: float) -> bool:
-    """Whether what lies between two levels is a straight ramp to within the noise; few samples do not tell."""
+    """True if the samples between two levels are a straight ramp within noise; also if they are too few to tell."""
     inner = slice(*pair)
     t, s = time[inner], normal[inner]
     if len(t) < FEWEST:
@@ -136,8 +136,8 @@ def _straight(time: Array, normal: Array, pair: tuple[int, int], noise: float) -
     return bool(np.std(s - level - slope * (t - t[0])) < UNEVEN * noise)
 
 
-def _whole(time: Array, pair: tuple[int, int], change: Change) -> tuple[int, int]:
-    """All samples of a ramp that is longer than a few of them."""
+def _whole_ramp(time: Array, pair: tuple[int, int], change: Change) -> tuple[int, int]:
+    """Range of all samples of a ramp, extended for long ramps."""
     last, first = pair
     if first - last < FEWEST:
         return pair
@@ -146,11 +146,11 @@ def _whole(time: Array, pair: tuple[int, int], change: Change) -> tuple[int, int
 
 
 def _change(time: Array, normal: Array, last: int, first: int, levels: list[float], noise: float) -> Change:
-    """A step between two samples, or a straight ramp through those in between."""
+    """Change from one sample to a later one: a step, or the ramp through the samples between."""
     before, after = levels
     early, late = float(time[last]), float(time[first])
-    if first == last + 1:  # later than the sample that shows none of it: friction jumps with the stress
-        return Change(0.5 * (early + late), 0.0, before, after, early + JUST * (late - early), late, 0.0, 0.0)
+    if first == last + 1:  # begins after the earlier sample, because friction jumps with the stress
+        return Change(0.5 * (early + late), 0.0, before, after, early + EARLIEST_STEP * (late - early), late, 0.0, 0.0)
     t, s = time[last + 1 : first], normal[last + 1 : first]
     if len(t) == 1:
         share = float(np.clip((s[0] - before) / (after - before), 0.05, 0.95))
@@ -161,15 +161,15 @@ def _change(time: Array, normal: Array, last: int, first: int, levels: list[floa
     begin, end = early + (before - at_zero) / slope, early + (after - at_zero) / slope
     if len(t) < FEWEST:
         begin, end = float(np.clip(begin, early, t[0])), float(np.clip(end, t[-1], late))
-    unsure = APART * noise / abs(slope)
+    unsure = OFF_LEVEL * noise / abs(slope)
     if unsure < 1e-2 * float(np.median(np.diff(time))):
         return Change(begin, end - begin, before, after, begin, begin, end - begin, end - begin)
     low, high = begin - unsure, begin + unsure
     return Change(begin, end - begin, before, after, low, high, 0.5 * (end - begin), end - begin + 2 * unsure)
 
 
-def _uneven(values: Array, noise: float) -> bool:
-    """Whether a stress between two changes is not constant."""
+def _is_not_constant(values: Array, noise: float) -> bool:
+    """True if a stress between two changes is not constant."""
     if len(values) < 2 * FEWEST:
         return False
     size = max(len(values) // BINS, 1)
@@ -177,13 +177,13 @@ def _uneven(values: Array, noise: float) -> bool:
     return bool(np.var(means) > UNEVEN * noise**2 / size)
 
 
-def _span(time: Array, normal: Array, level: float, noise: float, knots: int) -> tuple[float, float, Smooth]:
+def _curve_on_span(time: Array, normal: Array, level: float, noise: float, knots: int) -> tuple[float, float, Smooth]:
     curve = smoothing_curve(time, normal - level, noise, knots)
     return float(time[0]), float(time[-1]), curve
 
 
 class JoinedCurves:
-    """Curves, each on a span of its own; what lies between joins their ends, what lies outside is level."""
+    """Function that joins curves, each on its own span: linear between spans, constant outside."""
 
     def __init__(self, spans: list[tuple[float, float, Smooth]]) -> None:
         self.spans = spans
@@ -199,7 +199,7 @@ class JoinedCurves:
 
 
 def oscillation(time: Array, normal: Array) -> StressWave | None:
-    """A normal stress that keeps crossing its mean at regular intervals."""
+    """Oscillation of a normal stress that crosses its mean at regular intervals; None if it does not."""
     mean, noise = float(np.mean(normal)), level_noise(normal)
     if len(normal) < 2 * FEWEST or float(np.std(normal)) < LEAST_STRESS / 4 * abs(mean):
         return None

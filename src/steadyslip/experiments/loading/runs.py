@@ -1,8 +1,8 @@
-"""Finds the straight runs of a measured displacement, through noise, glitches and slips of the sensor.
+"""Straight runs of a measured displacement, found through noise, glitches and slips of the sensor.
 
-The displacement is cut wherever a line no longer fits, which cuts at glitches too. Pieces then join into runs of one
-rate: across what comes back to the same line (a glitch), and across a sudden change of level (a slip of the sensor).
-What lies between two runs and belongs to neither is the way from one rate to the next.
+The displacement is cut wherever a line no longer fits, which cuts at glitches too. Pieces are then joined to runs of
+one rate: across excursions that return to the line (glitches), and across sudden changes of level (slips of the
+sensor). Samples between two runs are the transition from one rate to the next.
 """
 
 from __future__ import annotations
@@ -13,39 +13,39 @@ from itertools import pairwise
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.loading.ends import run_at_start, turned
+from steadyslip.experiments.loading.ends import reversed_column, run_at_start
 from steadyslip.experiments.numerics.splitting import displacement_noise, split
 
-SURE = 4.0  # standard errors by which rates must differ, and
-LIKE = 0.02  # share of the rate
-LEAST_CHANGE = 0.05  # share of the rate that counts as a change of it
-BACK = 5.0  # standard errors within which a displacement has come back to a line
-LONGEST_GLITCH = 0.2  # share of the time of a record
-CHANGE = 3.0  # price of a change of rate
-FRAGMENT = 0.1  # price of a piece that is left out, besides that of its length:
-SHORTEST = 0.05  # share of the record, in time or displacement, that is worth a change of rate
-SLIP = 0.01  # share of the time of a record that a slip of the sensor may take
-MAIN = 0.6  # share of what is left out between two pieces that one of them makes up: a run of its own
-LEAD = 8.0  # how far a change of rate must lead, in units of how far a displacement strays from straight lines
-PLAIN = 100.0  # how far a piece must lead, in the same units, to be a run of its own however short
-RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record
-COARSE = 20_000  # samples on which runs are looked for
+RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
+LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
+LEAST_CHANGE = 0.05  # relative change of rate that counts as a change; chosen by trial
+BACK = 5.0  # standard errors within which a displacement has returned to a line
+LONGEST_GLITCH = 0.2  # share of the time of a record; chosen by trial
+CHANGE = 3.0  # cost of a change of rate, in units of a misfit of `RATE_SIGMAS` standard errors; chosen by trial
+FRAGMENT = 0.1  # cost of leaving out a piece, besides the cost of its length; chosen by trial:
+SHORTEST = 0.05  # share of the record (time or displacement) that costs as much as a change of rate; chosen by trial
+SLIP = 0.01  # longest slip of the sensor, as share of the time of a record; chosen by trial
+MAIN = 0.6  # share of what is left out between two pieces that a piece needs to be a run of its own; chosen by trial
+LEAD = 8.0  # displacement by which rates must differ over a run, in standard deviations of the noise; chosen by trial
+PLAIN = 100.0  # the same displacement that makes a piece a run of its own, however short; chosen by trial
+RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record; chosen by trial
+COARSE = 20_000  # samples above which means are segmented, to bound the time; chosen by trial
 
 
 @dataclass
 class Run:
-    """Samples that share one rate.
+    """Samples with one common rate.
 
     Attributes
     ----------
     members : list of (int, int)
-        Ranges of samples, in order; what lies between them are glitches.
+        Ranges of samples, in order; gaps between them are glitches.
     rate : float
         m/s.
     groups : list of int
-        For each member: which level of the sensor it lies on.
+        Sensor level of each member.
     levels : ndarray (groups,)
-        Displacement that the line of each level has at the first time of the record, m.
+        Displacement of the line of each sensor level at the first time of the record, m.
     """
 
     members: list[tuple[int, int]]
@@ -59,15 +59,15 @@ class Run:
 
     @property
     def last(self) -> int:
-        """The sample behind the last."""
+        """One past the last sample."""
         return self.members[-1][1]
 
     @property
     def rows(self) -> Array:
         return np.concatenate([np.arange(i, j) for i, j in self.members])
 
-    def turned(self, time: Array) -> Run:
-        """The run as it is in turned columns."""
+    def reversed(self, time: Array) -> Run:
+        """Run of the reversed record (see `ends.reversed_column`)."""
         count, span = len(time), float(time[-1] - time[0])
         members = [(count - j, count - i) for i, j in reversed(self.members)]
         groups = [self.groups[-1] - group for group in reversed(self.groups)]
@@ -75,7 +75,7 @@ class Run:
 
 
 class _Pieces:
-    """Lines through ranges of samples, and how well they are known."""
+    """Lines through ranges of samples, with their errors."""
 
     def __init__(self, time: Array, values: Array, ends: list[tuple[int, int]], noise: float) -> None:
         self.ends = ends
@@ -101,7 +101,7 @@ class _Pieces:
 
 
 def straight_runs(time: Array, displacement: Array) -> list[Run]:
-    """The runs of a displacement, in order of time; neighbours differ in rate.
+    """Runs of a displacement, in order of time; neighbours differ in rate.
 
     Parameters
     ----------
@@ -113,40 +113,43 @@ def straight_runs(time: Array, displacement: Array) -> list[Run]:
         runs = straight_runs(*(_means(values, step) for values in (time, displacement)))
         for run in runs:
             run.members = [(i * step, min(j * step, len(time))) for i, j in run.members]
-        return _parted(runs, step, time, displacement)
+        return _with_exact_boundaries(runs, step, time, displacement)
     noise = displacement_noise(time, displacement)
     pieces = _Pieces(time, displacement, split(time, displacement, noise, linear=True), noise)
-    groups = _with_holds(_chosen(pieces), pieces)
+    groups = _with_holds(_segmented(pieces), pieces)
     count = len(groups) + 1
     while len(groups) < count:
         count = len(groups)
-        groups = _without_wander(_without_excursions(_of_one_rate(groups, pieces), pieces), pieces)
-    runs = [levelled(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
-    return _with_ends(_without_returns(runs, time, displacement, pieces.usual), time, displacement, pieces.usual)
+        groups = _joined_across_wander(_without_glitches(_joined_by_rate(groups, pieces), pieces), pieces)
+    runs = [fitted_run(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
+    return _with_ends(_joined_across_flanks(runs, time, displacement, pieces.usual), time, displacement, pieces.usual)
 
 
 def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
-    """Runs of their own of the few samples before the first run and behind the last, where they tell a rate.
+    """Add runs of the few samples before the first run and after the last, where they determine a rate.
 
-    A run so short at an end is asked again, as the ranges that it is made of may have a kink within.
+    A very short run at an end is examined again, because its ranges may contain a change of rate.
     """
     found, count = list(runs), len(time)
     if len(found) > 1 and found[0].last <= RELIABLE:
         found = found[1:]
     if len(found) > 1 and count - found[-1].first <= RELIABLE:
         found = found[:-1]
-    sides = ((found[0], time, displacement), (found[-1].turned(time), turned(time), turned(displacement)))
+    sides = (
+        (found[0], time, displacement),
+        (found[-1].reversed(time), reversed_column(time), reversed_column(displacement)),
+    )
     own = [run_at_start(t, x, run, noise) for run, t, x in sides]
     if own[0]:
-        found.insert(0, levelled(Run([(0, own[0])]), time, displacement))
+        found.insert(0, fitted_run(Run([(0, own[0])]), time, displacement))
     if own[1]:
-        found.append(levelled(Run([(count - own[1], count)]), time, displacement))
+        found.append(fitted_run(Run([(count - own[1], count)]), time, displacement))
     return found
 
 
-def _parted(runs: list[Run], step: int, time: Array, displacement: Array) -> list[Run]:
-    """Runs that were found on means of so many samples, neighbours parted at the very sample where their lines meet."""
-    runs = [levelled(run, time, displacement) for run in runs]
+def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement: Array) -> list[Run]:
+    """Runs found on means of `step` samples, with each boundary moved to the sample where the lines meet."""
+    runs = [fitted_run(run, time, displacement) for run in runs]
     for before, after in pairwise(runs):
         if before.last != after.first or before.rate == after.rate:
             continue
@@ -155,27 +158,27 @@ def _parted(runs: list[Run], step: int, time: Array, displacement: Array) -> lis
         first, last = before.members[-1][0], after.members[0][1]
         if abs(sample - before.last) <= 2 * step and first + 1 < sample < last - 1:
             before.members[-1], after.members[0] = (first, sample), (sample, last)
-    return [levelled(run, time, displacement) for run in runs]
+    return [fitted_run(run, time, displacement) for run in runs]
 
 
-def _without_returns(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
-    """Runs joined across a short one after which the displacement goes on as if it had not been: a flank of a glitch.
+def _joined_across_flanks(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
+    """Join runs across a short one after which the displacement continues as before: the flank of a glitch.
 
-    Its bottom may have passed for a level of the sensor, so that the flank alone looked like a change of rate.
+    The bottom of a glitch may look like a sensor level, so that its flank alone looks like a change of rate.
     """
     runs, i = list(runs), 0
     while i < len(runs) - 2:
         before, middle, after = runs[i : i + 3]
-        if _goes_on(before, middle, after, time, noise):
-            runs[i : i + 3] = [levelled(Run(before.members + after.members), time, displacement)]
+        if _is_continued(before, middle, after, time, noise):
+            runs[i : i + 3] = [fitted_run(Run(before.members + after.members), time, displacement)]
             i = max(i - 1, 0)
         else:
             i += 1
     return runs
 
 
-def _goes_on(before: Run, middle: Run, after: Run, time: Array, noise: float) -> bool:
-    """Whether one run goes on along a line of the other, beyond a short one in between."""
+def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: float) -> bool:
+    """True if two runs are on one line, beyond a short run between them."""
     if time[middle.last - 1] - time[middle.first] > LONGEST_GLITCH * (time[-1] - time[0]):
         return False
     at, errors, lines = 0.5 * (time[middle.first] + time[middle.last - 1]), [], []
@@ -184,7 +187,7 @@ def _goes_on(before: Run, middle: Run, after: Run, time: Array, noise: float) ->
         slope = noise / np.sqrt(max(float(np.sum((t - t.mean()) ** 2)), 1e-300))
         errors.append((slope, float(np.hypot(noise / np.sqrt(len(t)), slope * (at - t.mean())))))
         lines.append(run.levels + run.rate * (at - time[0]))
-    if not _alike((before.rate, errors[0][0]), (after.rate, errors[1][0])):
+    if not _rates_agree((before.rate, errors[0][0]), (after.rate, errors[1][0])):
         return False
     known = BACK * float(np.hypot(errors[0][1], errors[1][1]))
     return bool(np.min(np.abs(lines[0] - lines[1][0])) <= known)
@@ -195,19 +198,19 @@ def _means(values: Array, step: int) -> Array:
     return np.asarray(values[:whole].reshape(-1, step).mean(axis=1))
 
 
-def _chosen(pieces: _Pieces) -> list[list[int]]:
-    """Pieces that make up each run: the cheapest story, in which a change of rate and what is left out have a price.
+def _segmented(pieces: _Pieces) -> list[list[int]]:
+    """Pieces of each run, by the segmentation of least cost: changes of rate and pieces left out have a cost.
 
-    Every piece either has the rate of the run that it lies in, within its error, or is left out, at a price that grows
-    with its length. The best of all such stories is found by dynamic programming over the rates of all pieces.
+    Every piece either has the rate of its run within its error, or is left out at a cost that grows with its length.
+    The optimum over the rates of all pieces is found by dynamic programming.
     """
     count = len(pieces.ends)
-    error = np.hypot(pieces.slope_error, LIKE / SURE * np.abs(pieces.slope))
+    error = np.hypot(pieces.slope_error, LIKE / RATE_SIGMAS * np.abs(pieces.slope))
     with np.errstate(all="ignore"):
         misfit = ((pieces.slope[:, None] - pieces.slope[None, :]) / np.maximum(error, 1e-300)[:, None]) ** 2
     misfit[np.arange(count), np.arange(count)] = 0.0
     price = FRAGMENT + CHANGE * pieces.lengths / SHORTEST
-    cost = np.minimum(misfit * (CHANGE / SURE**2), price[:, None])
+    cost = np.minimum(misfit * (CHANGE / RATE_SIGMAS**2), price[:, None])
     total, origin = np.zeros((count, count)), np.zeros((count, count), dtype=int)
     total[0] = cost[0]
     everyone = np.arange(count)
@@ -232,54 +235,54 @@ def _chosen(pieces: _Pieces) -> list[list[int]]:
 
 
 def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Runs of their own of long pieces that lead away from a run's line for good, such as short holds."""
+    """Split off pieces that lead away from a run's line for good, such as short holds."""
     found = []
     for members in groups:
         rate, _ = _mean_slope(members, pieces)
         own = [members[0]]
         for one, other in pairwise(members):
-            if main := _leading_away(np.arange(one + 1, other), rate, pieces.begin[other] - pieces.end[one], pieces):
+            if main := _separate_run(np.arange(one + 1, other), rate, pieces.begin[other] - pieces.end[one], pieces):
                 found += [own, main]
                 own = []
             own.append(other)
         found.append(own)
     (first, early), (last, late) = ((m, _mean_slope(m, pieces)[0]) for m in (groups[0], groups[-1]))
-    before = _leading_away(np.arange(first[0]), early, None, pieces)
-    after = _leading_away(np.arange(last[-1] + 1, len(pieces.ends)), late, None, pieces)
+    before = _separate_run(np.arange(first[0]), early, None, pieces)
+    after = _separate_run(np.arange(last[-1] + 1, len(pieces.ends)), late, None, pieces)
     return [members for members in (before, *found, after) if members]
 
 
-def _leading_away(inner: Array, rate: float, gap: float | None, pieces: _Pieces) -> list[int]:
-    """Those of some pieces, left out of a run, that are a run of their own.
+def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces) -> list[int]:
+    """Pieces (of those left out of a run) that are a run of their own.
 
-    Within a run, what is over soon (`gap`, s) is a slip of the sensor. At an end of the record there is no `gap`.
+    Within a run, a `gap` (s) that is over soon is a slip of the sensor. At an end of the record the gap is None.
     """
     if not len(inner):
         return []
     away = (pieces.slope[inner] - rate) * pieces.duration[inner]
     longest = int(inner[np.argmax(pieces.duration[inner])])
     slope, error = float(pieces.slope[longest]), float(pieces.slope_error[longest])
-    like = SURE * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
+    like = RATE_SIGMAS * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
     main = inner[np.abs(pieces.slope[inner] - slope) <= like]
     lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))
     whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= (
         RELIABLE if gap is not None else FEWEST
     )
-    still = abs(slope) < 0.02 * abs(rate) + SURE * error and SURE * error < 0.05 * abs(rate)
+    still = abs(slope) < 0.02 * abs(rate) + RATE_SIGMAS * error and RATE_SIGMAS * error < 0.05 * abs(rate)
     far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
     long = (gap is None or gap > SLIP * pieces.span) and far
     return [int(k) for k in main] if lasting and whole and (still or long) else []
 
 
-def _without_excursions(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Leave out runs that are parts of a glitch: what moves up and down again between two runs, or off their lines."""
+def _without_glitches(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
+    """Remove runs that are parts of a glitch: excursions that return, or that are off the lines of both neighbours."""
     groups = list(groups)
     i = 0
     while i < len(groups) - 2:
         for j in range(min(i + 5, len(groups) - 1), i + 1, -1):
             if _is_glitch(groups[i], groups[i + 1 : j], groups[j], pieces):
                 one, other = (_mean_slope(groups[k], pieces) for k in (i, j))
-                if _alike(one, other):
+                if _rates_agree(one, other):
                     groups[i : j + 1] = [groups[i] + groups[j]]
                 else:
                     groups[i : j + 1] = [groups[i], groups[j]]
@@ -296,7 +299,7 @@ def _is_glitch(before: list[int], between: list[list[int]], after: list[int], pi
         return False
     rates = _mean_slope(before, pieces), _mean_slope(after, pieces)
     inner = np.arange(one + 1, other)
-    if _alike(*rates):
+    if _rates_agree(*rates):
         away = (pieces.slope[inner] - rates[0][0]) * pieces.duration[inner]
         return bool(abs(np.sum(away)) < 0.5 * np.sum(np.abs(away)))
     low, high = sorted((rates[0][0], rates[1][0]))
@@ -308,10 +311,10 @@ def _is_glitch(before: list[int], between: list[list[int]], after: list[int], pi
     return bool(pieces.end[one] <= meet <= pieces.begin[other])
 
 
-def _alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether two rates, each with its error, agree."""
+def _rates_agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """True if two rates, each given with its error, agree."""
     like = LEAST_CHANGE * max(abs(one[0]), abs(other[0]))
-    return abs(one[0] - other[0]) <= SURE * float(np.hypot(one[1], other[1])) + like
+    return abs(one[0] - other[0]) <= RATE_SIGMAS * float(np.hypot(one[1], other[1])) + like
 
 
 def _mean_slope(members: list[int], pieces: _Pieces) -> tuple[float, float]:
@@ -319,19 +322,19 @@ def _mean_slope(members: list[int], pieces: _Pieces) -> tuple[float, float]:
     return float(np.sum(weight * pieces.slope[members]) / np.sum(weight)), float(1 / np.sqrt(np.sum(weight)))
 
 
-def _of_one_rate(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
+def _joined_by_rate(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
     """Join neighbours whose rates agree."""
     found: list[list[int]] = []
     for members in groups:
-        if found and _alike(_mean_slope(found[-1], pieces), _mean_slope(members, pieces)):
+        if found and _rates_agree(_mean_slope(found[-1], pieces), _mean_slope(members, pieces)):
             found[-1] = found[-1] + members
         else:
             found.append(list(members))
     return found
 
 
-def _without_wander(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Join runs that a slowly wandering displacement, not a change of rate, has set apart; the weakest first."""
+def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
+    """Join runs separated by slow wander of the displacement instead of a change of rate, the weakest first."""
     groups = list(groups)
     while len(groups) > 1:
         slopes = np.array([_mean_slope(members, pieces)[0] for members in groups])
@@ -344,8 +347,8 @@ def _without_wander(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]
     return groups
 
 
-def levelled(run: Run, time: Array, displacement: Array) -> Run:
-    """The run with its rate and the levels of the sensor, by a robust line; neighbours on one level share it."""
+def fitted_run(run: Run, time: Array, displacement: Array) -> Run:
+    """Run with its rate and sensor levels from a robust line; members on one level share it."""
     groups = list(range(len(run.members)))
     for _ in range(3):
         rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement)
@@ -365,7 +368,7 @@ def levelled(run: Run, time: Array, displacement: Array) -> Run:
 def _robust_line(
     run: Run, groups: list[int], time: Array, displacement: Array
 ) -> tuple[float, Array, Array, Array, float]:
-    """Rate, levels, their mean times and errors, error of the rate; samples far off weigh less."""
+    """Rate, levels, their mean times and errors, error of the rate; outliers have low weight."""
     rows = run.rows
     own = np.repeat(groups, [j - i for i, j in run.members])
     t, x = time[rows] - time[0], displacement[rows]

@@ -1,1 +1,1 @@
-"""From files of a laboratory to a clean record, with a note of everything that was done to it."""
+"""Reading of laboratory files as clean records, with a note of every change made to the data."""

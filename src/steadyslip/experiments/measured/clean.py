@@ -1,4 +1,4 @@
-"""From columns in SI units to a Record: rows in order of time, each whole; nothing is mended without a note."""
+"""Cleaning of columns in SI units to a Record: complete rows in order of time; every change is noted."""
 
 from __future__ import annotations
 
@@ -9,53 +9,55 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
-GAP = 10.0  # times the usual spacing
-RESTART = 0.02  # of the rows: so many on end whose time goes back are a clock that begins anew
-COARSE, EVEN = 0.6, 1.25  # share of rows with a time of their own; ticks by which even rows may miss their stamps
-AROUND = 25  # rows before and behind, from which that is told
-HUGEST = 1e60  # of a number in SI units
-PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
-STANDS_FOR_NONE = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
-"""Numbers, of either sign, that instruments and programs write where they have none."""
-APART = 4.0  # times the largest of all other numbers: the size of such a one, unless it has another sign than all
-ALIKE = 1e-6  # of such a number: single precision, and what was printed of it
-MOST_OF_NONE = 0.2  # of a column: more of one number than that are what was measured
+GAP = 10.0  # ratio to the usual spacing from which an interval is noted as a gap; chosen by trial
+RESTART = 0.02  # share of rows in a row with times before the latest one from which the clock has restarted; by trial
+COARSE, EVEN = 0.6, 1.25  # share of distinct times below which a clock may be coarse; deviation of even rows, in ticks
+AROUND = 25  # rows on each side whose mean spacing is the usual one; chosen by trial
+LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay within floating point
+PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside, a unit is wrong
+PLACEHOLDERS = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
+"""Placeholders, of either sign, that instruments and programs write for missing values."""
+PLACEHOLDER_RATIO = (
+    4.0  # ratio of a placeholder to the largest other number, unless it has another sign than all; chosen by trial
+)
+PLACEHOLDER_TOLERANCE = 1e-6  # relative difference from a placeholder: single precision, and rounding when printed
+MOST_PLACEHOLDERS = 0.2  # share of a column from which a number is no placeholder but measured; chosen by trial
 
 
-def without_stand_ins(values: Array, name: str, notes: list[str]) -> Array:
-    """Numbers of a column as the file has them, NaN in place of those that stand for none.
+def without_placeholders(values: Array, name: str, notes: list[str]) -> Array:
+    """Column with NaN in place of placeholders for missing values; adds a note for each.
 
-    A stand-in is few and far from all other numbers of its column: a record that passes 999 keeps it.
+    A placeholder is rare and far from all other numbers of its column: a record that passes 999 keeps it.
     """
     found = values
-    while (number := _stand_in(found)) is not None:
-        same = np.abs(found - number) <= ALIKE * abs(number)
+    while (number := _placeholder(found)) is not None:
+        same = np.abs(found - number) <= PLACEHOLDER_TOLERANCE * abs(number)
         found = np.where(same, np.nan, found)
         notes.append(f"{int(np.sum(same))} times {number:.6g} in column {name!r} stands for no number")
     return found
 
 
-def _stand_in(values: Array) -> float | None:
-    """The least or largest number of a column, if it stands for none."""
+def _placeholder(values: Array) -> float | None:
+    """Smallest or largest number of a column, if it is a placeholder for missing values; else None."""
     usual = values[np.isfinite(values)]
     for number in (float(np.min(usual)), float(np.max(usual))) if len(usual) else ():
         size = abs(number)
-        if not any(abs(size - one) <= ALIKE * one for one in STANDS_FOR_NONE):
+        if not any(abs(size - one) <= PLACEHOLDER_TOLERANCE * one for one in PLACEHOLDERS):
             continue
-        rest = usual[np.abs(usual - number) > ALIKE * size]
-        if len(usual) - len(rest) > MOST_OF_NONE * len(rest):
+        rest = usual[np.abs(usual - number) > PLACEHOLDER_TOLERANCE * size]
+        if len(usual) - len(rest) > MOST_PLACEHOLDERS * len(rest):
             continue
         low, high = float(np.min(rest)), float(np.max(rest))
-        if size > APART * max(-low, high) or number < 0.0 <= low or high <= 0.0 < number:
+        if size > PLACEHOLDER_RATIO * max(-low, high) or number < 0.0 <= low or high <= 0.0 < number:
             return number
     return None
 
 
 def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, any_sign: bool = False) -> Record:
-    """Rows in order of time, each whole, with a note of every one that is not.
+    """Record from columns in SI units: complete rows in order of time, with a note of every change.
 
-    Where columns may be counted with `any_sign`, as files do, compression becomes positive and the load point moves
-    forwards.
+    `any_sign` accepts columns that count compression as negative or displacement backwards, as files do, and turns
+    them.
     """
     si, lines = _without_gaps_in_rows(si, lines, notes)
     _check_sizes(si, source, lines)
@@ -69,7 +71,7 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
     if "friction" not in si:
         si["friction"] = si["shear"] / si["normal"]
         notes.append("friction computed as shear over normal stress")
-    si = _forwards(si, notes) if any_sign else si
+    si = _turned_forwards(si, notes) if any_sign else si
     _check_friction(si["friction"], source)
     spacing = np.diff(si["time"])
     usual = float(np.median(spacing))
@@ -115,7 +117,7 @@ def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) 
 
 
 def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str) -> tuple[dict[str, Array], Array]:
-    """Rows whose time goes back are left out, rows of one time told apart: see `_stamped`."""
+    """Leave out rows whose time goes back, and separate rows of equal time (see `_separated_times`)."""
     time = si["time"]
     high = np.maximum.accumulate(time)
     back = time < high
@@ -126,11 +128,11 @@ def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str)
             f"{int(back.sum())} rows whose time goes back left out (lines {where}{', ...' if back.sum() > 5 else ''})"
         )
         si, lines, time = {role: values[~back] for role, values in si.items()}, lines[~back], time[~back]
-    return _stamped(si, lines, notes)
+    return _separated_times(si, lines, notes)
 
 
 def _check_clock(time: Array, high: Array, back: Array, lines: Array, source: str) -> None:
-    """Refuse a clock that begins anew: what follows would be left out, or be taken for a jump of everything."""
+    """Raise an error for a clock that restarts: the rows after it would be left out, or look like a jump."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], back, [False]]).astype(int)))
     begin, end = ends.reshape(-1, 2)[int(np.argmax(ends[1::2] - ends[::2]))]
     if end - begin > max(RESTART * len(time), FEWEST_ROWS):
@@ -141,8 +143,8 @@ def _check_clock(time: Array, high: Array, back: Array, lines: Array, source: st
         raise ParameterError([Problem("time", message)], title=source)
 
 
-def _even(time: Array) -> Array | None:
-    """Times of rows that were taken evenly and stamped by a clock coarser than that; None if they were not."""
+def _even_times(time: Array) -> Array | None:
+    """Evenly spaced times for rows stamped by a clock coarser than the sampling; None if they do not fit."""
     rows = np.arange(len(time), dtype=float)
     tick = float(np.min(np.diff(np.unique(time))))
     slope, origin = np.polyfit(rows, time, 1)
@@ -152,18 +154,18 @@ def _even(time: Array) -> Array | None:
     return np.asarray(time[0] + slope * rows)
 
 
-def _stamped(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
-    """Rows of one time: a clock that is coarser than the sampling, or rows too many.
+def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
+    """Separate rows of equal time, which come from a clock coarser than the sampling, or are duplicates.
 
-    Where a group takes the place of so many samples at the usual spacing around it, its rows are spread evenly over
-    the time to the next stamp. Else it is one sample, its mean: another time for one of its rows would be an invention.
+    A group that has as many rows as fit into the time to the next stamp at the usual spacing is spread evenly over it.
+    Any other group becomes one row, its mean, because another time for one of its rows would be invented.
     """
     time = si["time"]
     unique, first, counts = np.unique(time, return_index=True, return_counts=True)
     if len(unique) == len(time):
         return si, lines
     uneven = len(unique) < COARSE * len(time) and np.ptp(counts[1:-1]) > 0  # groups of equal size are spread exactly
-    if uneven and (even := _even(time)) is not None:
+    if uneven and (even := _even_times(time)) is not None:
         notes.append(
             f"the clock is coarser than the sampling ({len(unique)} times for {len(time)} rows); rows taken as even, "
             f"every {even[1] - even[0]:.4g} s"
@@ -191,7 +193,7 @@ def _stamped(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict
 
 
 def _local_median(spacing: Array) -> Array:
-    """Usual spacing in blocks, so that a change of sampling rate is no row of gaps."""
+    """Median spacing in blocks of 51 intervals, so that a change of sampling rate is not a series of gaps."""
     block = 51
     if len(spacing) < 2 * block:
         return np.full(len(spacing), np.median(spacing))
@@ -201,31 +203,31 @@ def _local_median(spacing: Array) -> Array:
 
 
 def _check_sizes(si: dict[str, Array], source: str, lines: Array) -> None:
-    """Refuse numbers that no experiment gives and whose squares or ratios are none, and a clock that stands still."""
+    """Raise an error for numbers far beyond any experiment, and for a clock that stands still."""
     problems = []
     for role, values in si.items():
-        if np.any(huge := np.abs(values) > HUGEST):
+        if np.any(huge := np.abs(values) > LARGEST_NUMBER):
             i = int(np.argmax(huge))
-            message = f"line {lines[i]}: {values[i]:.4g} in SI units; allowed: sizes up to {HUGEST:g}"
+            message = f"line {lines[i]}: {values[i]:.4g} in SI units; allowed: sizes up to {LARGEST_NUMBER:g}"
             problems.append(Problem(role, message))
     time = si["time"]
-    if len(time) and not np.ptp(time) > 1 / HUGEST:
-        message = f"all {len(time)} rows lie within {1 / HUGEST:g} s of {time[0]:.4g} s; was the clock running?"
+    if len(time) and not np.ptp(time) > 1 / LARGEST_NUMBER:
+        message = f"all {len(time)} rows lie within {1 / LARGEST_NUMBER:g} s of {time[0]:.4g} s; was the clock running?"
         problems.append(Problem("time", message))
     if problems:
         raise ParameterError(problems, title=source)
 
 
 def _in_compression(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Normal stress that is negative throughout is compression, counted as tension is elsewhere."""
+    """Change the sign of a normal stress that is negative throughout (compression counted as negative)."""
     if "normal" not in si or not np.all(si["normal"] < 0):
         return si
     notes.append("normal stress is negative throughout: taken as compression, its sign changed")
     return si | {"normal": -si["normal"]}
 
 
-def _forwards(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Signs that make the load point move forwards, and friction resist, in a record that has them otherwise."""
+def _turned_forwards(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
+    """Change signs so that the load point moves forwards and friction is positive."""
     moved = si.get("displacement")
     back = moved is not None and moved[0] - moved[-1] > 0.5 * float(np.ptp(moved))
     resists = float(np.median(si["friction"])) > 0

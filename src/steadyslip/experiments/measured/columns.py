@@ -1,4 +1,4 @@
-"""Which column of a table is what, and in which unit: from names, or as the user says."""
+"""Roles and units of the columns of a table, from their names or from the user's options."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ ROLES = {
     "shear": "Pa",
     "normal": "Pa",
 }
-"""What columns may be, with SI units; displacement and velocity are those of the load point."""
+"""Roles of columns, with SI units; displacement and velocity are those of the load point."""
 
-MOST_LISTED = 40  # names in a message
+MOST_LISTED = 40  # names in a message; more would not be read
 
 _WORDS = {
     "s": ("sec", "secs", "second", "seconds"),
@@ -47,19 +47,19 @@ _BRACKETS = re.compile(r"^(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*$")
 
 @dataclass(frozen=True)
 class Column:
-    """Where a role's numbers are.
+    """Column of a role.
 
     Attributes
     ----------
     role : str
     name : str
-        As in the file.
+        Name in the file.
     unit : str
     factor : float
-        To SI; of forces, still to be divided by an area.
+        Factor to SI; forces have still to be divided by an area.
     force : bool
     place : int
-        Which column, from 0; names may occur twice.
+        Index of the column; needed because names may occur twice.
     """
 
     role: str
@@ -71,14 +71,14 @@ class Column:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names for a message, which nobody reads beyond some dozens."""
+    """Names joined for a message, at most `MOST_LISTED`."""
     every = list(names)
     more = [f"and {len(every) - MOST_LISTED} more"] if len(every) > MOST_LISTED else []
     return ", ".join([*every[:MOST_LISTED], *more])
 
 
 def split_name(name: str) -> tuple[str, str | None]:
-    """The bare name of a column and the unit written in it, if any.
+    """Name of a column without its unit, and the unit in it or None.
 
     >>> split_name("Normal_stress(MPa)"), split_name("lp_disp_um"), split_name("Friction")
     (('Normal_stress', 'MPa'), ('lp_disp', 'um'), ('Friction', None))
@@ -98,7 +98,7 @@ def split_name(name: str) -> tuple[str, str | None]:
 
 
 def known_unit(text: str) -> str | None:
-    """A unit in this package's spelling, None if it is none."""
+    """Unit in this package's spelling; None if it is none."""
     text = text.strip()
     spelled = _SPELLINGS.get(text.lower(), text)
     if not spelled:
@@ -110,8 +110,8 @@ def known_unit(text: str) -> str | None:
     return spelled
 
 
-def guessed_role(name: str, has_unit: str | None) -> str | None:
-    """The role that a bare name, and its unit, suggest."""
+def guess_role(name: str, has_unit: str | None) -> str | None:
+    """Role suggested by a name and its unit; None if none is."""
     plain = re.sub(r"[^a-zµμστäöüßéèóáíñàç]+", " ", name.lower().replace("_", " ")).strip()
     words = set(plain.split())
     dimension = None if has_unit is None else unit(has_unit)[1]
@@ -138,7 +138,7 @@ def guessed_role(name: str, has_unit: str | None) -> str | None:
     return None
 
 
-def assigned(
+def assign_columns(
     names: Sequence[str], given: Mapping[str, Any], file_units: Sequence[str | None]
 ) -> tuple[dict[str, Column], list[Problem], list[str]]:
     """Find a column for every role.
@@ -146,11 +146,11 @@ def assigned(
     Parameters
     ----------
     names : sequence of str
-        Columns of the file.
+        Names of the file's columns.
     given : mapping of str to Any
-        By role: a column's name or number (from 1), a unit, or a pair of both.
+        By role: name or number (from 1) of a column, a unit, or a pair of both.
     file_units : sequence of str or None
-        Units that the file states apart from the names.
+        Units that the file gives apart from the names.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def assigned(
     notes: list[str] = []
     chosen: dict[str, tuple[int, str | None]] = {}
     for role, value in given.items():
-        place, stated, fault = _as_given(role, value, names, [head for head, _ in bare])
+        place, stated, fault = _from_option(role, value, names, [head for head, _ in bare])
         if fault:
             problems.append(Problem(role, fault))
         if place is not None:
@@ -174,7 +174,7 @@ def assigned(
     taken = {place for place, _ in chosen.values()}
     guesses: dict[str, list[int]] = {}
     for i, (head, _) in enumerate(bare):
-        guess = guessed_role(head, units[i])
+        guess = guess_role(head, units[i])
         if guess is not None and i not in taken:
             guesses.setdefault(guess, []).append(i)
     for role in ROLES:
@@ -201,10 +201,10 @@ def assigned(
     return columns, problems, notes
 
 
-def _as_given(
+def _from_option(
     role: str, value: Any, names: Sequence[str], heads: Sequence[str]
 ) -> tuple[int | None, str | None, str | None]:
-    """Column and unit as the user says, or what is wrong with it."""
+    """(column, unit, fault) from a user's option; fault is None if it is valid."""
     stated: str | None = None
     if isinstance(value, Mapping):
         unknown = set(value) - {"column", "unit"}
@@ -237,13 +237,13 @@ def _as_given(
 
 
 def _fits(role: str, name: str) -> bool:
-    """Whether a unit is one of a role's, forces included."""
+    """True for a unit of a role, including forces for stresses."""
     dimension = unit(name)[1]
     return dimension == unit(ROLES[role])[1] or (role in ("shear", "normal") and dimension == unit("N")[1])
 
 
 def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[int]:
-    """Of several columns, those whose names point at the load point or at effective stress."""
+    """Candidates whose names mention the load point or effective stress, if there are any; else all."""
     if len(candidates) < 2:
         return candidates
     marks = {"displacement": r"load|lp|shear|ram", "velocity": r"load|lp", "normal": r"eff"}
@@ -260,7 +260,9 @@ def _missing(role: str, names: Sequence[str]) -> str:
 def _with_unit(
     role: str, name: str, own: str | None, stated: str | None
 ) -> tuple[Column | None, str | None, list[str]]:
-    """The unit of a column: its own and the stated one must agree, and fit the role."""
+    """(column, fault, notes) with the unit of a column: from its name or the option, which must agree and fit
+    the role.
+    """
     notes: list[str] = []
     stated = None if stated is None else known_unit(stated)
     if own is not None and stated is not None and unit(own) != unit(stated):
@@ -288,8 +290,8 @@ def _usual(role: str) -> str:
     return {"displacement": "um", "velocity": "um/s", "shear": "MPa", "normal": "MPa"}[role]
 
 
-def required(columns: Mapping[str, Column], names: Sequence[str]) -> list[Problem]:
-    """What a record cannot do without."""
+def missing_roles(columns: Mapping[str, Column], names: Sequence[str]) -> list[Problem]:
+    """Problems for roles that a record needs and that have no column."""
     problems = []
     if "time" not in columns:
         remedy = "; without one, give sampling (the time between rows), or rate (of the load point) with a displacement"

@@ -1,4 +1,4 @@
-"""From a file, or from arrays, to a clean Record; nothing is mended without a note."""
+"""Reading of a record from a file or from arrays; every change to the data is noted."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.roles import Parameter
-from steadyslip.experiments.measured.clean import cleaned, without_stand_ins
-from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
+from steadyslip.experiments.measured.clean import cleaned, without_placeholders
+from steadyslip.experiments.measured.columns import ROLES, Column, assign_columns, missing_roles
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
 
@@ -36,9 +36,9 @@ def read_record(
 ) -> Record:
     """Read a record of an experiment.
 
-    Columns are found by their names, units read from them: ``Normal_stress(MPa)``, ``lp_disp_um``, ``time [s]``.
-    Where that does not do, say it: ``time="t"`` (a column), ``shear="MPa"`` (a unit), ``normal=("sn", "MPa")``, or
-    ``friction=3`` (the third column). Friction is shear over normal stress unless it has a column of its own.
+    Columns are found by their names, units are read from them: ``Normal_stress(MPa)``, ``lp_disp_um``, ``time [s]``.
+    Otherwise give them: ``time="t"`` (a column), ``shear="MPa"`` (a unit), ``normal=("sn", "MPa")``, or ``friction=3``
+    (the third column). Friction is shear over normal stress unless it has a column of its own.
 
     Parameters
     ----------
@@ -47,33 +47,34 @@ def read_record(
         with a date (ISO 8601); HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``), Parquet (``.parquet``), Excel (``.xlsx``),
         TDMS (``.tdms``), netCDF (``.nc``, saved runs among them); binary files of XLOOK, whatever their name.
     area : float or str, optional
-        Contact area, m^2, where shear and normal are forces; 1 m^2 unless given, so that forces stay forces.
+        Contact area, m^2, if shear and normal are forces; by default 1 m^2, so that forces stay forces.
     normal_stress : float or str, optional
-        A constant normal stress, Pa, where there is no column of it.
+        Constant normal stress, Pa, if there is no column of it.
     table : str, optional
         Group of an HDF5 or TDMS file, variable of a MATLAB file (``p1``, ``p1.data`` in a structure, ``p(2)`` in an
         array of them), or sheet of a workbook.
     between : (start, end), optional
         Part to use, s.
     skip_bad_lines : bool, optional
-        Leave damaged lines out, and note it, instead of refusing the file.
+        True to omit damaged lines with a note, instead of refusing the file.
     sampling : float or str, optional
-        Time between rows, s, of a file without a column of time.
+        Time between rows, s, for a file without a column of time.
     rate : float or str, optional
-        Constant rate of the load point, m/s, of a file with its displacement and no time. With neither, and both
-        displacement and velocity measured, time is counted from these.
+        Constant rate of the load point, m/s, for a file with its displacement but no time. Without either option, time
+        is computed from displacement and velocity if both were measured.
     **columns
-        ``time``, ``displacement`` and ``velocity`` (of the load point), ``friction``, ``shear``, ``normal``.
+        Columns by role: ``time``, ``displacement`` and ``velocity`` (of the load point), ``friction``, ``shear``,
+        ``normal``.
 
     Returns
     -------
     Record
-        Its `notes` say everything that was done.
+        Its `notes` tell everything that was changed.
 
     Raises
     ------
     ParameterError
-        If columns are missing, ambiguous or without unit, or lines damaged; everything is listed.
+        If columns are missing, ambiguous or without unit, or lines damaged; lists every problem.
     NotAvailable
         If the file cannot be read.
     """
@@ -83,22 +84,22 @@ def read_record(
     if problems:
         raise ParameterError(problems, title=str(path))
     raw = read_columns(Path(path), table, skip_bad_lines)
-    found, faults, notes = assigned(raw.names, columns, raw.units)
+    found, faults, notes = assign_columns(raw.names, columns, raw.units)
     if normal_stress is not None and "normal" in found and "normal" not in columns:
         del found["normal"]
     asked = set(found) | ({"normal"} if normal_stress is not None else set())
     clock = None if "time" in found else _clock(sampling, rate, set(found))
     if clock is not None:
         asked.add("time")
-    faults += required({role: found.get(role) for role in asked}, raw.names)  # type: ignore[misc]
+    faults += missing_roles({role: found.get(role) for role in asked}, raw.names)  # type: ignore[misc]
     if faults:
         raise ParameterError(faults, title=str(path))
     size = 1.0 if area is None else _checked("area", "m^2", area)
     si: dict[str, Array] = {}
     for role, column in found.items():
-        own = without_stand_ins(raw.values[column.place], column.name, notes)
+        own = without_placeholders(raw.values[column.place], column.name, notes)
         si[role] = own * (column.factor / (size if column.force else 1.0))
-        notes.append(f"{role}: column {column.name!r}" + _said_unit(column, size, area is None))
+        notes.append(f"{role}: column {column.name!r}" + _format_unit(column, size, area is None))
     if normal_stress is not None:
         level = _checked("normal_stress", "Pa", normal_stress)
         si["normal"] = np.full(raw.values.shape[1], level)
@@ -113,7 +114,7 @@ def read_record(
 
 
 def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Array], int], tuple[Array, str]] | None:
-    """How to make the times of a file that has none, and what to say of it; None if that cannot be."""
+    """Function that computes the times of a file without them, with a note; None if the data do not allow it."""
     if sampling is not None:
         every = _checked("sampling", "s", sampling)
         return lambda si, rows: (every * np.arange(rows), f"time: counted, a row every {format_quantity(every, 's')}")
@@ -122,12 +123,15 @@ def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Arr
         said = f"time: displacement over the given rate, {format_quantity(speed, 'm/s')}"
         return lambda si, rows: ((si["displacement"] - si["displacement"][0]) / speed, said)
     if {"displacement", "velocity"} <= roles:
-        return lambda si, rows: (_elapsed(si["displacement"], si["velocity"]), "time: displacement over its own rate")
+        return lambda si, rows: (
+            _integrated_time(si["displacement"], si["velocity"]),
+            "time: displacement over its own rate",
+        )
     return None
 
 
-def _elapsed(displacement: Array, velocity: Array) -> Array:
-    """The time that each stretch takes at the mean of its rates; where nothing moves there is no telling."""
+def _integrated_time(displacement: Array, velocity: Array) -> Array:
+    """Elapsed time (s) from displacement and velocity: each interval at its mean velocity; zero where nothing moves."""
     with np.errstate(divide="ignore", invalid="ignore"):
         spent = np.diff(displacement) / (0.5 * (velocity[1:] + velocity[:-1]))
     return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(spent), np.maximum(spent, 0.0), 0.0))])
@@ -136,7 +140,7 @@ def _elapsed(displacement: Array, velocity: Array) -> Array:
 def _cut(
     si: dict[str, Array], lines: Array, between: tuple[Any, Any], notes: list[str]
 ) -> tuple[dict[str, Array], Array]:
-    """Rows between two times; what lies outside need not even be sound."""
+    """Rows between two times; other rows may be damaged."""
     first, last = seconds("start", between[0]), seconds("end", between[1])
     with np.errstate(invalid="ignore"):
         rows = (si["time"] >= first) & (si["time"] <= last)
@@ -155,7 +159,7 @@ def _checked(name: str, unit: str, value: Any) -> float:
         raise ParameterError([p.under(name) for p in error.problems]) from error
 
 
-def _said_unit(column: Column, area: float, assumed: bool) -> str:
+def _format_unit(column: Column, area: float, assumed: bool) -> str:
     text = f", {column.unit}" if column.unit != "1" else ""
     if column.force:
         text += f", a force over {area:g} m^2" + (" (assumed; give area)" if assumed else "")
@@ -167,24 +171,24 @@ def record_from_arrays(
     time: Any, *, friction: Any = None, shear: Any = None, normal: Any = None, displacement: Any = None,
     velocity: Any = None, source: str = "arrays",
 ) -> Record:  # fmt: skip
-    """A record from arrays in SI units, cleaned like one that is read from a file.
+    """Make a record from arrays in SI units, cleaned like one from a file.
 
     Parameters
     ----------
     time : array_like
         s.
     friction : array_like, optional
-        Shear over normal stress unless given.
+        By default shear over normal stress.
     shear, normal : array_like or float, optional
         Pa.
     displacement, velocity : array_like, optional
-        Of the load point, m and m/s.
+        Displacement (m) and velocity (m/s) of the load point.
     source : str, optional
 
     Raises
     ------
     ParameterError
-        If columns are missing, or of different lengths.
+        If columns are missing, or differ in length.
     """
     given: Mapping[str, Any] = {"time": time, "friction": friction, "shear": shear, "normal": normal,
                                 "displacement": displacement, "velocity": velocity}  # fmt: skip

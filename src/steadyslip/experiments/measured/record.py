@@ -1,4 +1,4 @@
-"""A record of an experiment: clean columns in SI units, with a note of everything that was done to them."""
+"""Record of an experiment: clean columns in SI units, with notes on every change made to them."""
 
 from __future__ import annotations
 
@@ -27,34 +27,35 @@ from steadyslip.experiments.numerics.noise import lasting
 from steadyslip.files.output import write_columns
 
 FEWEST_ROWS = 20
+"""Least number of samples of a record; chosen by trial: fewer do not determine rates and noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record(Displayed, Keeper):
-    """A record of an experiment; build one with `read_record` or `record_from_arrays`.
+    """Record of an experiment; made by `read_record` or `record_from_arrays`.
 
     Attributes
     ----------
     time : ndarray (n,)
-        s, rising.
+        Rising times, s.
     friction : ndarray (n,)
-        Shear over normal stress.
+        Shear stress over normal stress.
     normal, shear : ndarray (n,) or None
         Pa.
     displacement : ndarray (n,) or None
-        Of the load point, m; integrated where only its rate was measured.
+        Displacement of the load point, m; integrated where only its rate was measured.
     velocity : ndarray (n,) or None
-        Rate of the load point, m/s, where it was measured.
+        Rate of the load point, m/s; None if not measured.
     source : str
     notes : tuple of str
-        Everything that was noticed or changed.
+        Notes on everything that was noticed or changed.
     integrated : bool
-        Whether the displacement comes from the velocity.
+        True if the displacement is the integral of the velocity.
     worth : ndarray (n,) or None
-        How many measured samples each sample is worth that is a mean of several, less than their number where noise
-        lasts for several of them; None where each was measured. Fits weigh by it.
+        Number of independent measured samples that each sample (a mean of several) is worth, less than their count
+        where noise is correlated; None if each sample was measured. Weights of fits.
     commanded : Loading or None
-        What was commanded, where it was found in more samples than these.
+        Commanded loading, if it was found in more samples than these.
     """
 
     time: Array = field(repr=False)
@@ -74,12 +75,12 @@ class Record(Displayed, Keeper):
 
     @cached_property
     def steps(self) -> tuple[LoadStep, ...]:
-        """What was done to the sample, in the order of time."""
+        """Changes made during the experiment, in order of time."""
         return steps_of(self.loading, None if self.normal is None else oscillation(self.time, self.normal))
 
     @cached_property
     def loading(self) -> Loading:
-        """What was commanded, as found in the measured displacement and normal stress."""
+        """Commanded loading, as found in the measured displacement and normal stress."""
         if self.commanded is not None:
             return self.commanded
         load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
@@ -87,12 +88,12 @@ class Record(Displayed, Keeper):
 
     @cached_property
     def initial_rate(self) -> float | None:
-        """Load-point rate before the first change of it, m/s; None if it was not measured."""
+        """Load-point rate before its first change, m/s; None if the displacement was not measured."""
         return None if self.loading.load is None else float(self.loading.load.at(self.time[:1])[0])
 
     @cached_property
     def rate(self) -> Array | None:
-        """Load-point rate at the samples, m/s: as measured, or slopes over seven samples."""
+        """Load-point rate at the samples, m/s: measured, or slopes over seven samples."""
         if self.velocity is not None or self.displacement is None:
             return self.velocity
         half = 3
@@ -102,7 +103,7 @@ class Record(Displayed, Keeper):
         return np.asarray(read_only(rate))
 
     def taken(self, rows: Any, note: str) -> Record:
-        """Some of the samples, with a note that says which."""
+        """Record with some of the samples, and a note."""
 
         def of(values: Array | None) -> Array | None:
             return None if values is None else frozen(values[rows])
@@ -111,7 +112,7 @@ class Record(Displayed, Keeper):
         return replace(self, **columns, commanded=None, notes=(*self.notes, note))  # type: ignore[arg-type]
 
     def between(self, start: Any, end: Any) -> Record:
-        """The part between two times (s, or text such as ``"11.6e3 s"``).
+        """Part between two times (s, or text such as ``"11.6e3 s"``).
 
         Raises
         ------
@@ -127,19 +128,19 @@ class Record(Displayed, Keeper):
         return self.taken(rows, f"cut to {first:.6g} to {last:.6g} s, {np.sum(rows)} of {len(self)} samples")
 
     def decimated(self, count: int) -> Record:
-        """About `count` samples, dense after every step and thin where nothing happens.
+        """Record of about `count` samples, dense after every change and sparse in steady parts.
 
-        Each is the mean of the measured ones around it, and `worth` says how much; none lies across a step.
+        Each sample is the mean of measured samples between two changes; `worth` is what it is worth in them.
         """
         if count >= len(self):
             return self
         return binned(self, bin_starts(self, count))
 
     def detrended(self, order: int = 1) -> Record:
-        """Friction without a polynomial in the load point's displacement (in time where that is unknown).
+        """Record with friction less a polynomial in the load point's displacement (or in time, if that is unknown).
 
-        The polynomial is that of the last parts before every step and of the end, where friction is steady, levels
-        of their own allowed. A fit's own ``trend`` does the same with errors accounted for, and is to be preferred.
+        The polynomial is fitted to the parts before every change and at the end, where friction is steady, each with a
+        level of its own. The ``trend`` of a fit does the same with propagated errors, and should be preferred.
         """
         if not (isinstance(order, int) and 1 <= order <= 5):
             raise ParameterError([Problem("order", f"got {order!r}; allowed: a whole number from 1 to 5")])
@@ -172,12 +173,12 @@ class Record(Displayed, Keeper):
         return replace(self, friction=frozen(self.friction - trend), shear=None, notes=(*self.notes, note))
 
     def windows(self, before: Any = None, after: Any = None) -> tuple[Record, ...]:
-        """One part around each velocity step, hold with its reslide, or step of normal stress.
+        """Parts around each velocity step, hold with its reslide, or step of normal stress.
 
         Parameters
         ----------
         before, after : float or str, optional
-            Time to keep on both sides, s; halfway to the neighbouring steps unless given.
+            Time to keep on each side, s; by default halfway to the neighbouring changes.
         """
         steps = [s for s in self.steps if s.kind != "reslide"]
         if not steps:
@@ -194,7 +195,7 @@ class Record(Displayed, Keeper):
         return tuple(found)
 
     def summary(self) -> str:
-        """What is in it, in a few lines."""
+        """Summary in a few lines."""
         span = self.time[-1] - self.time[0]
         spacing = np.diff(self.time)
         low, high = float(np.min(self.friction)), float(np.max(self.friction))
@@ -232,7 +233,7 @@ class Record(Displayed, Keeper):
         return draw(self, ax=ax)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the columns as text, units in the header, in the form that `read_record` understands.
+        """Write the columns as CSV, units in the header, in a form that `read_record` reads.
 
         Raises
         ------
@@ -253,12 +254,12 @@ _OPTIONAL = ("normal", "shear", "displacement", "velocity")
 def whole_record(
     source: str, notes: tuple[str, ...], integrated: bool, commanded: Loading | None = None, **columns: Array | None
 ) -> Record:
-    """A record from columns that were clean once.
+    """Record from columns that were saved from a clean one.
 
     Raises
     ------
     ParameterError
-        If they are not: times that do not rise, numbers that are not finite, too few of them.
+        If they are not clean: times that do not rise, non-finite numbers, too few samples.
     """
     present = {name: frozen(values) for name, values in columns.items() if values is not None}
     time = present["time"]
@@ -279,35 +280,35 @@ def whole_record(
 
 
 def frozen(values: Any) -> Array:
-    """A copy as floats that cannot be written to."""
+    """Copy as a read-only float array."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array
 
 
 def seconds(name: str, value: Any) -> float:
-    """A time from a number or text."""
+    """Time (s) from a number or text with a unit."""
     try:
         return Parameter("s", real, name).checked(value)
     except ParameterError as error:
         raise ParameterError([p.under(name) for p in error.problems]) from error
 
 
-# -- thinning
+# -- decimation
 
 
 @question
 def transient_rows(record: Record, count: int) -> Array:
-    """Rows to keep of a record: as many after every step as before the next, evenly in the logarithm of time."""
-    cumulated = np.cumsum(_wanted(record, count))
+    """Rows to keep of a record: as many after every change as before the next, evenly in the logarithm of time."""
+    cumulated = np.cumsum(_samples_wanted(record, count))
     last = len(record) - 1
     chosen = np.searchsorted(cumulated, np.arange(0.5, cumulated[-1], 1.0))
     return np.unique(np.concatenate([[0], np.minimum(chosen, last), [last]]))
 
 
 def bin_starts(record: Record, count: int) -> Array:
-    """First rows of ranges whose means take the place of a record, none of them across a step; spread likewise."""
-    cumulated = np.cumsum(_wanted(record, count))
+    """First rows of the ranges whose means are the samples of a decimated record; no range crosses a change."""
+    cumulated = np.cumsum(_samples_wanted(record, count))
     fresh = np.flatnonzero(np.diff(np.floor(cumulated - 1e-9), prepend=-1.0))
     moments = [m for step in record.steps for m in (step.time, step.time + step.duration)]
     edges = np.searchsorted(record.time, moments)
@@ -315,12 +316,12 @@ def bin_starts(record: Record, count: int) -> Array:
 
 
 def binned(record: Record, starts: Array) -> Record:
-    """Means over ranges of samples that begin at given rows."""
+    """Record of means over ranges of samples that begin at given rows."""
     counts = np.diff(starts, append=len(record))
     weights = np.ones(len(record)) if record.worth is None else record.worth
     total = np.add.reduceat(weights, starts)
     memory = lasting(record.friction)
-    k = np.maximum(counts, 1.0)  # variance of the mean of k samples whose correlation falls as memory**lag
+    k = np.maximum(counts, 1.0)  # variance of the mean of k samples whose correlation is memory**lag
     variance = (1 + memory) / (1 - memory) / k - 2 * memory * (1 - memory**k) / ((1 - memory) * k) ** 2
     worth = total / counts / variance
 
@@ -333,8 +334,8 @@ def binned(record: Record, starts: Array) -> Record:
     return replace(record, **columns, worth=frozen(worth), commanded=record.loading, notes=notes)  # type: ignore[arg-type]
 
 
-def _wanted(record: Record, count: int) -> Array:
-    """How many of so many samples each row would get: one at most."""
+def _samples_wanted(record: Record, count: int) -> Array:
+    """Samples wanted per row (at most one), for `count` in all: dense after every change, evenly in ln(time)."""
     time, n = record.time, len(record)
     usual = float(np.median(np.diff(time)))
     weight = np.full(n, 1.0 / (time[-1] - time[0]))  # samples wanted per second
@@ -346,8 +347,8 @@ def _wanted(record: Record, count: int) -> Array:
     share = weight * np.gradient(time)
     if count >= n:
         return np.ones(n)
-    rising = np.sort(share)  # the largest are one each, the rest in proportion
+    rising = np.sort(share)  # rows with the largest share get one each, the others in proportion
     rest = np.cumsum(rising)
-    left = count - np.arange(n - 1, -1, -1)  # for those up to each, if all above it are one
+    left = count - np.arange(n - 1, -1, -1)  # samples left for the rows up to each, if all larger ones get one
     k = int(np.flatnonzero((left > 0) & (left * rising <= rest))[-1])
     return np.asarray(np.minimum(share * (left[k] / rest[k]), 1.0))

@@ -1,4 +1,4 @@
-"""The table ``[record]`` of a file: how to read records."""
+"""Options of the table ``[record]`` of a file: how to read records."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from steadyslip.core.records import Settings, given, option, parameter, part, se
 from steadyslip.experiments.measured.columns import ROLES
 
 FEWEST_KEPT = 50
+"""Least value of `decimate`: fewer samples cannot show several steps; chosen by trial."""
 
 
 class ColumnSettings(Settings):
@@ -49,7 +50,7 @@ class RecordSettings(Settings):
     decimate: int | None = setting(Whole("keep about this many samples, dense after steps", FEWEST_KEPT), default=None)
 
     def arguments(self) -> dict[str, Any]:
-        """Those of `read_record`, and ``decimate``, as far as they are given."""
+        """Options as keyword arguments of `read_record`, and ``decimate``; only those that the file gives."""
         found = given(self)
         for role in ROLES:
             if role in found:

@@ -1,4 +1,4 @@
-"""What was done to a sample, in words: changes of the load-point rate, holds, changes of normal stress."""
+"""Changes made during an experiment, for people: load-point rate, holds, normal stress."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from steadyslip.experiments.loading.pressing import StressWave
 
 @dataclass(frozen=True)
 class LoadStep:
-    """One change of what drives an experiment.
+    """One change of the load-point rate or normal stress of an experiment.
 
     Attributes
     ----------
     kind : str
         ``velocity step``, ``hold``, ``reslide``, ``normal-stress step`` or ``normal-stress oscillation``.
     time : float
-        When it begins, s.
+        Time at which it begins, s.
     duration : float
-        How long it takes, s; zero if at once. Of an oscillation: its period.
+        Duration, s; zero for a sudden change. For an oscillation: its period.
     before, after : float
-        Load-point rate (m/s) or normal stress (Pa); of an oscillation mean and amplitude.
+        Load-point rate (m/s) or normal stress (Pa); for an oscillation its mean and amplitude.
     """
 
     kind: str
@@ -48,7 +48,7 @@ class LoadStep:
 
 
 def steps_of(loading: Loading, wave: StressWave | None) -> tuple[LoadStep, ...]:
-    """The changes of a loading, in the order of time."""
+    """Changes of a loading and its oscillation, in order of time."""
     found = [_step(channel, change) for channel, _, change in loading.changes]
     if wave is not None:
         found.append(LoadStep("normal-stress oscillation", wave.time, wave.period, wave.mean, wave.amplitude))

@@ -91,7 +91,7 @@ def piece_from_text(text: str, area: float | None = None, machine: Machine | Non
     if reader.problems:
         raise ParameterError(reader.problems, title=repr(text))
     if not isinstance(piece, Piece):
-        raise InternalError(f"a piece of a protocol was read as {type(piece).__name__}")
+        raise InternalError(f"a piece of a protocol, not a {type(piece).__name__}")
     return piece
 
 

@@ -171,7 +171,7 @@ class RigFileContents:
         self.refuse_machine()
         self.refuse(*others)
         if self.rig is None:
-            raise InternalError("the file has neither a slider nor problems")
+            raise InternalError("a slider in a file without problems")
         return self.rig
 
 

@@ -43,7 +43,7 @@ def as_script(*modules: str) -> str:
     names = [name for module in modules for name in _DECLARED.findall(module)]
     names += [name for module in modules for line in _FURTHER[0].findall(module) for name in _FURTHER[1].findall(line)]
     if twice := {name for name in names if names.count(name) > 1}:
-        raise InternalError(f"several JavaScript modules declare {', '.join(sorted(twice))}")
+        raise InternalError(f"one JavaScript module to declare {', '.join(sorted(twice))}, not several")
     return "\n".join(_EXPORT.sub("", _IMPORT.sub("", module)) for module in modules)
 
 
@@ -90,7 +90,7 @@ class _JavaScript(Writer):
         if node.op == "not":
             return f"(!{arguments[0]})"
         if node.op not in _OWN and node.op not in PRIMITIVES:
-            raise InternalError(f"{node.op} has no counterpart in JavaScript, which has no integers of 64 bits")
+            raise InternalError(f"no {node.op} in a program for JavaScript, which has no integers of 64 bits")
         return f"{node.op}({', '.join(arguments)})"
 
     def named(self, name: str, value: str) -> str:

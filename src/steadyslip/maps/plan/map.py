@@ -136,7 +136,7 @@ class Map(Displayed):
         if isinstance(self.sampling, Generated):
             return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
         if self.sampling is None:
-            raise InternalError("the map has no samples")
+            raise InternalError("a map with samples")
         column = self.sampling.part(0, self.sampling.points)[name]
         return [{name: column.min()}, {name: column.max()}]
 
@@ -346,7 +346,7 @@ def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
             else:
                 law = find_law(Measure, one)
                 if not issubclass(law, Measure):
-                    raise InternalError(f"{law.__name__} is registered as a measure and is none")
+                    raise InternalError(f"a measure, not {law.__name__}, under its registered name")
                 found.append(law())
         except ParameterError as error:
             problems += [p.under("map.compute") for p in error.problems]

@@ -54,7 +54,7 @@ def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), f
     plan = _MapReader(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None
     spec.refuse(*(plan.placed() if plan is not None else ()))
     if plan is None or plan.found is None:
-        raise InternalError("the file has neither a map nor problems")
+        raise InternalError("a map in a file without problems")
     return plan.found
 
 
@@ -67,7 +67,7 @@ class _MapReader:
         self.spec, self.folder = spec, folder
         rig = spec.given
         if rig is None:
-            raise InternalError("a map was read without a rig")
+            raise InternalError("a rig in a file with a map")
         self.rig = rig
         self.known = rig.parameters() | protocol_parameters(rig, spec.protocol or Protocol())
         over, sampled = settings.over or {}, (settings.samples.over if settings.samples else None) or {}

@@ -116,7 +116,7 @@ class Measure(FrozenRecord, family="measure"):
 def as_slider(rig: Slider | Machine) -> Slider:
     """Return the rig as a `Slider`; an internal error for a machine, which `Measure.problems` should have refused."""
     if isinstance(rig, Machine):
-        raise InternalError("a measure of sliders was computed for a machine")
+        raise InternalError("a slider for a measure that refuses machines")
     return rig
 
 

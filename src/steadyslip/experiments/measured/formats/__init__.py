@@ -1,6 +1,6 @@
-"""Files of measured columns, by the ending of their names. Columns come back as they are; nothing is interpreted.
+"""Readers of files with measured columns, chosen by the ending of the name; columns are not interpreted.
 
-Each format is one module with one function from a path to a `Table`; a further format is one more line below.
+Each format is one module with one function from a path to a `Table`; to add one, add a line to `FORMATS`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from steadyslip.files.inputs import check_file
 
 __all__ = ["FORMATS", "Table", "read_columns"]
 
-MOST_BINARY = 2**31  # bytes of a file
-SHORT_TEXT = 2**20  # bytes of a text that is read without a process of its own: its own size bounds what it takes
+MOST_BINARY = 2**31  # bytes of a file; `MOST_VALUES` doubles have 2^28
+SHORT_TEXT = 2**20  # bytes of a text that is read without a separate process: its size bounds time and memory
 SECONDS, BYTES_A_SECOND, MOST_SECONDS = 10.0, 2**20, 85.0
-"""Processor time to read a file: at first, and for its bytes; the slowest, a workbook of noise, takes half as long."""
-MOST_SAID = 300  # characters of what a library says
+"""CPU time to read a file (s): fixed part, bytes per further second, and bound. The slowest, a workbook, takes half."""
+MOST_SAID = 300  # characters of another library's message that are quoted
 FORMATS = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("HDF5", "hdf5")),
     ".nc": ("netCDF", "netcdf"),
@@ -32,13 +32,13 @@ FORMATS = {
     **dict.fromkeys((".xlsx", ".xlsm"), ("Excel workbook", "excel")),
     ".tdms": ("TDMS", "tdms"),
 }
-"""Name and module of each format; everything else is text, or XLOOK's, which is known by its content."""
+"""Name and module of each format; other files are text, or XLOOK's, which are recognised by their content."""
 
 
 def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = False) -> Table:
-    """Read a file by its ending; text unless that is known.
+    """Read a file by its ending; text if the ending is unknown.
 
-    Whatever a library of others reads, and long texts, are read in a process of its own with limits.
+    Formats of other libraries and long texts are read in a separate process with limits on time and memory.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = Fa
 
 
 def read_here(name: str, table: str | None, skip_bad_lines: bool) -> tuple[dict[str, Any], list[Array]]:
-    """The same in this process, as plain data and arrays: names, units and notes, values and lines."""
+    """Read a file in this process: names, units and notes as dict, values and line numbers as arrays."""
     path = Path(name)
     ending = path.suffix.lower()
     found = _by_library(path, table, *FORMATS[ending]) if ending in FORMATS else read_text(path, skip_bad_lines)
@@ -80,6 +80,6 @@ def _by_library(path: Path, table: str | None, kind: str, module: str) -> Table:
         raise NotAvailable(
             f"{str(path)!r}: this format needs the package {package}; install steadyslip[lab]"
         ) from error
-    except Exception as error:  # the readers of foreign formats raise whatever a damaged file brings about
+    except Exception as error:  # readers of other libraries raise anything for a damaged file
         why = " ".join(str(error).split())[:MOST_SAID]
         raise NotAvailable(f"cannot read {str(path)!r} as {kind}: {type(error).__name__}: {why}") from error

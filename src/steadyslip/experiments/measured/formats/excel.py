@@ -1,4 +1,4 @@
-"""Excel workbooks: the numbers of one sheet below its names; formulas count as the value that was saved with them."""
+"""Reader of Excel workbooks: the numbers of one sheet below its names; formulas have their saved values."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import listed
 from steadyslip.experiments.measured.formats.moments import day, moment
-from steadyslip.experiments.measured.formats.numerals import either, marks_of, number
+from steadyslip.experiments.measured.formats.numerals import decimal_marks, number, number_with_any_mark
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.workbook import CLOCK, DATE, FORMULA, MOMENT, SheetCells, Workbook
 
-SPARSE = 0.05  # of the numbers of the fullest column: one of fewer belongs to something beside the record
-SHORT = 20  # rows: a sheet of fewer is none of a record
+SPARSE = 0.05  # share of the fullest column's numbers below which a column does not belong to the record; by trial
+SHORT = 20  # rows below which a sheet has no record (`FEWEST_ROWS`)
 Stated = list[float | None]
 
 
 def read(path: Path, table: str | None) -> Table:
-    """The sheet of that name, else the only one that has a record in it, or else any numbers."""
+    """Table of the named sheet; by default of the only one with a record, or with any numbers."""
     with Workbook(path) as book:
         part = chosen_part(path, "sheet", table, list(book.sheets))
         names = list(book.sheets) if part is None else [part]
@@ -36,8 +36,8 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def _table(path: Path, sheet: SheetCells) -> Table | None:
-    """The record on a sheet; None if there is none."""
-    known = {text: _stated(text) for text in set(sheet.texts)}
+    """Record on a sheet; None if there is none."""
+    known = {text: _parsed(text) for text in set(sheet.texts)}
     stated = [known[text] for text in sheet.texts]
     sheet, stated, dropped = _without_side_tables(sheet, stated)
     first = _first_row(sheet, stated)
@@ -48,7 +48,7 @@ def _table(path: Path, sheet: SheetCells) -> Table | None:
     count = 1 + max([*sheet.places(first), *(k for cells in above if len(cells) == fullest for k in cells)])
     lines = [[cells.get(k, "") for k in range(count)] for cells in above]
     names, units = names_and_units([line for line in lines if sum(map(bool, line)) == fullest], count)
-    names = [name or _higher(lines, k) or str(k + 1) for k, name in enumerate(names)]
+    names = [name or _text_above(lines, k) or str(k + 1) for k, name in enumerate(names)]
     check_size(path, count * (len(sheet.lines) - first), rows=len(sheet.lines) - first)
     values, kinds = sheet.dense(first, count)
     texts: list[list[tuple[int, str]]] = [[] for _ in range(count)]
@@ -56,7 +56,7 @@ def _table(path: Path, sheet: SheetCells) -> Table | None:
         if row >= first and k < count:
             texts[k].append((row - first, text))
     _check_formulas(path, names, values, texts)
-    marks, notes, fault = marks_of(names, ([text for _, text in own if _moment(text) is None] for own in texts))
+    marks, notes, fault = decimal_marks(names, ([text for _, text in own if _moment(text) is None] for own in texts))
     if fault is not None:
         raise ParameterError([Problem("file", fault)], title=str(path))
     faults = 0
@@ -76,7 +76,7 @@ def _table(path: Path, sheet: SheetCells) -> Table | None:
 
 
 def _check_formulas(path: Path, names: list[str], values: Array, texts: list[list[tuple[int, str]]]) -> None:
-    """Refuse columns of formulas that were never computed: a program wrote them, and no spreadsheet has opened them."""
+    """Raise an error for columns of formulas without values, written by a program that did not compute them."""
     empty = [
         name
         for name, own, column in zip(names, texts, values, strict=True)
@@ -90,7 +90,7 @@ def _check_formulas(path: Path, names: list[str], values: Array, texts: list[lis
 
 
 def _without_side_tables(sheet: SheetCells, stated: Stated) -> tuple[SheetCells, Stated, list[int]]:
-    """The same without columns that have but a few numbers, beside those of a record; which had any."""
+    """Sheet without columns that have few numbers beside a record, their parsed texts, and the removed columns."""
     is_number = [value is not None or text == FORMULA for value, text in zip(stated, sheet.texts, strict=True)]
     counts = sheet.counts(sheet.text_columns[np.array(is_number, dtype=bool)])
     few = np.flatnonzero(counts < SPARSE * max(counts, default=0))
@@ -103,7 +103,7 @@ def _without_side_tables(sheet: SheetCells, stated: Stated) -> tuple[SheetCells,
 
 
 def _first_row(sheet: SheetCells, stated: Stated) -> int | None:
-    """The first row that holds numbers and nothing else, two of them at least."""
+    """First row with at least two numbers and no other text; None if there is none."""
     is_number = np.array([value is not None for value in stated], dtype=bool)
     is_other = ~is_number & np.array([text != FORMULA for text in sheet.texts], dtype=bool)
     own, numbers, reals, others = (
@@ -118,13 +118,13 @@ def _finite(stated: Stated) -> Array:
     return np.array([value is not None and value == value for value in stated], dtype=bool)
 
 
-def _higher(above: list[list[str]], place: int) -> str:
-    """What stands above an empty cell of a header, which was merged with it."""
+def _text_above(above: list[list[str]], place: int) -> str:
+    """Text above an empty header cell, which was merged with it."""
     return next((cells[place] for cells in reversed(above) if cells[place]), "")
 
 
 def _count_all_moments(found: Table, kinds: Array) -> None:
-    """Make seconds of columns of times; dates in a column of their own belong to the clock beside them."""
+    """Convert time columns to seconds; a column of dates is added to a single column of times of day and removed."""
     own = [kind[np.isfinite(column)] for kind, column in zip(kinds, found.values, strict=True)]
     moments = [k for k, kind in enumerate(own) if len(kind) and np.all(kind[:2] > 0)]
     days = [k for k in moments if np.all(own[k] == DATE)]
@@ -140,9 +140,9 @@ def _count_all_moments(found: Table, kinds: Array) -> None:
         found.drop(days)
 
 
-def _stated(text: str) -> float | None:
-    """The number or moment that a text states, with whichever decimal mark; NaN if that there is none, None else."""
-    found = either(text)
+def _parsed(text: str) -> float | None:
+    """Number or time in a text, with either decimal mark; NaN for an empty one, None for other text."""
+    found = number_with_any_mark(text)
     return _moment(text) if found is None else found
 
 

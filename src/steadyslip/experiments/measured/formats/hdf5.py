@@ -1,4 +1,4 @@
-"""HDF5: datasets below a group, also columns of compound tables; nothing outside the file."""
+"""Reader of HDF5 files: datasets below a group, columns of compound types; no links to other files are followed."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ import h5py
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
+from steadyslip.experiments.measured.formats.table import (
+    Table,
+    check_ambiguous_names,
+    check_size,
+    chosen_part,
+    from_vectors,
+)
 
-MOST_DATASETS = 10_000
-MOST_LINKS = 16  # one after another
+MOST_DATASETS = 10_000  # chosen by trial, far above those of any record
+MOST_LINKS = 16  # soft links followed one after another, against cycles
 COLUMN_NAMES = ("columns", "column_names", "names", "header", "channels")
 
 
@@ -27,7 +33,7 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def member(group: Any, name: str, links: int = MOST_LINKS) -> Any:
-    """An object below a group of the same file, by names joined by ``/``; None if that leads to no place in it."""
+    """Object below a group of the same file by names joined with ``/``; None if it is not in the file."""
     for part in name.strip("/").split("/"):
         link = group.get(part, getlink=True) if isinstance(group, h5py.Group) else None
         if isinstance(link, h5py.SoftLink) and links:
@@ -40,19 +46,19 @@ def member(group: Any, name: str, links: int = MOST_LINKS) -> Any:
 
 
 def numbers_in(path: Path, items: Iterable[Any]) -> None:
-    """Refuse datasets that hold more than a record may, or whose numbers are in another file."""
+    """Raise an error for datasets with more numbers than a record may have, or with numbers in another file."""
     size = 0
     for item in items:
         if item.is_virtual or item.external:
             raise NotAvailable(f"dataset {item.name!r} takes its numbers from another file; copy them into this one")
-        size += (item.size or 0) * -(-item.dtype.itemsize // 8)  # whatever a row consists of
+        size += (item.size or 0) * -(-item.dtype.itemsize // 8)  # in doubles, for rows of any type
         check_size(path, size, "; name a group with table=")
 
 
 def _named(path: Path, found: Iterable[tuple[str, tuple[Any, str | None]]]) -> dict[str, tuple[Any, str | None]]:
-    """Columns by the last part of their names, where that tells them apart."""
+    """Columns by the last part of their names, or by the full name where that is ambiguous."""
     pairs = list(found)
-    check_apart(path, [name for name, _ in pairs], "group")
+    check_ambiguous_names(path, [name for name, _ in pairs], "group")
     short = [name.rpartition("/")[2] for name, _ in pairs]
     return {(last if short.count(last) == 1 else name): one for last, (name, one) in zip(short, pairs, strict=True)}
 
@@ -67,7 +73,7 @@ def _datasets(path: Path, group: Any) -> Iterator[tuple[str, tuple[Any, str | No
     items: dict[str, Any] = {}
     if isinstance(group, h5py.Dataset):
         items[group.name.rpartition("/")[2]] = group
-    else:  # each object once, however links go round; none behind a link to another file
+    else:  # visititems visits each object once, follows cycles of links no further, and no external links
         group.visititems(items.__setitem__)
     chosen = {name: item for name, item in items.items() if isinstance(item, h5py.Dataset)}
     if len(chosen) > MOST_DATASETS:
@@ -92,7 +98,7 @@ def _datasets(path: Path, group: Any) -> Iterator[tuple[str, tuple[Any, str | No
 
 
 def _names_of_columns(item: h5py.Dataset) -> list[str]:
-    """Names that a matrix gives its columns in an attribute; none if it does not."""
+    """Column names of a matrix from an attribute; empty if it has none."""
     for attribute in COLUMN_NAMES:
         raw = np.atleast_1d(item.attrs.get(attribute, ()))
         names = [one.decode() if isinstance(one, bytes) else str(one) for one in raw]

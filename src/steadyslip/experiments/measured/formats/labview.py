@@ -1,4 +1,4 @@
-"""Text files of LabVIEW (``.lvm``): a header of the file, then segments, each with a header of its channels."""
+"""Reader of LabVIEW text files (``.lvm``): a file header, then segments, each with a header of its channels."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Header = dict[str, list[str]]
 
 
 def read_labview(text: str, path: Path) -> Table:
-    """Channels by name, their times beside them or counted from the interval between them.
+    """Table of channels with their time column, or with times counted from the sampling interval.
 
     Raises
     ------
     NotAvailable
-        If channels have times of their own that differ, or a segment has other channels than the first.
+        If channels have different times, or segments have different channels.
     """
     lines = text.splitlines()
     mark = COMMA if any(line.strip().lower() == "separator,comma" for line in lines[:30]) else "\t"
@@ -62,14 +62,14 @@ def _header_before(rows: list[list[str]], end: int) -> Header:
 
 
 def _begin_of_header(rows: list[list[str]], end: int) -> int:
-    """The line of a segment's header that names the number of its channels."""
+    """First line of a segment's header, which gives the number of its channels."""
     return next(i for i in range(end, -1, -1) if rows[i][0] in ("Channels", END) and i < end)
 
 
 def _table(
     names: list[str], values: np.ndarray, lines: np.ndarray, header: Header, each: str, segments: int, path: Path
 ) -> Table:
-    """Numbers with the units of their channels, and times of one kind."""
+    """Table of the channels with units and one time column."""
     notes = ["a LabVIEW file" + (f" of {segments} segments, joined" if segments > 1 else "")]
     places = [k for k, name in enumerate(names) if name not in (TIME, "")]
     times = [k for k, name in enumerate(names) if name == TIME]
@@ -77,7 +77,7 @@ def _table(
         raise NotAvailable(
             f"{str(path)!r}: its channels were sampled at different times; export them with one time column"
         )
-    labels = dict(enumerate(header.get("Y_Unit_Label", []), start=1))  # above the columns of their channels
+    labels = dict(enumerate(header.get("Y_Unit_Label", []), start=1))  # column 0 is the time
     units = [known_unit(labels.get(k, "")) for k in places]
     if each != "No" and times:
         clock = values[times[0]]

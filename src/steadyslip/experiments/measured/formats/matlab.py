@@ -1,7 +1,7 @@
-"""MATLAB files: vectors, matrices, structures and arrays of them, cells, however deep; version 7.3 is HDF5.
+"""Reader of MATLAB files: vectors, matrices, structures, structure arrays and cells; version 7.3 is HDF5.
 
-Whatever the version, a structure becomes a dictionary, an array of structures or a cell array a list. Of an array of
-structures, ``p(2)`` is the second, as in MATLAB; where each holds a name and one vector, they are channels.
+In every version a structure becomes a dict, a structure array or cell array a list. ``p(2)`` is the second structure of
+an array, as in MATLAB; if each has a name and one vector, they are channels.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.formats.table import (
     MOST_VALUES,
     Table,
-    check_apart,
+    check_ambiguous_names,
     check_size,
     chosen_part,
     from_vectors,
 )
 from steadyslip.files.inputs import read_bytes
 
-DEEPEST = 8
-MOST_MEMBERS = 100_000
-HEAD, TAG, PACKED = 128, 8, 15  # bytes of the file's head and of the tag before an element; what a packed one is tagged
-BYTES, ONE_PIECE = 8, 2**20  # of a number; of what is unpacked at a time
+DEEPEST = 8  # levels of structures and cells that are read; chosen by trial
+MOST_MEMBERS = 100_000  # of structures and cells; chosen by trial, far above those of any record
+HEAD, TAG, PACKED = 128, 8, 15  # bytes of the file's header and of an element's tag; type of a compressed element
+BYTES, ONE_PIECE = 8, 2**20  # bytes of a number; bytes decompressed at a time
 CLASS = "MATLAB_class"
 NAMES, UNITS = ("name", "label", "channel", "title"), ("unit", "units", "dimension")
 Numbers = dict[str, tuple[Any, str | None]]
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric vectors of a file, or of one of its variables: ``p1``, ``p1.data`` within a structure, ``p(2)``."""
+    """Numeric vectors of a file or of one of its variables: ``p1``, ``p1.data`` in a structure, ``p(2)``."""
     try:
         check_size(path, sum(math.prod(shape) for _, shape, _ in whosmat(path)))
         _check_unpacked(path)
         found = loadmat(path, squeeze_me=True, struct_as_record=True)
-        variables = {name: _plain(value, DEEPEST) for name, value in found.items() if not name.startswith("__")}
+        variables = {name: _from_scipy(value, DEEPEST) for name, value in found.items() if not name.startswith("__")}
     except NotImplementedError:  # version 7.3
         variables = _of_version_73(path)
         if not variables:  # HDF5 of another program
@@ -57,7 +57,7 @@ def read(path: Path, table: str | None) -> Table:
     numeric: Numbers = {name: (one, None) for name, one in inside.items() if _is_numbers(one)}
     if channels := next((own for one in inside.values() if (own := _channels(one))), None):
         return from_vectors(path, channels)
-    check_apart(path, list(numeric), "structure")
+    check_ambiguous_names(path, list(numeric), "structure")
     return from_vectors(path, _shortened(_with_header(numeric, inside)))
 
 
@@ -65,22 +65,22 @@ def _is_inside(name: str, part: str) -> bool:
     return name == part or name.startswith((f"{part}.", f"{part}("))
 
 
-# -- what is in a file, in Python's terms
+# -- content of a file as Python objects
 
 
-class Left:
-    """How many members of structures and cells, and numbers, were read of a file of version 7.3: some, often."""
+class ReadCount:
+    """Count of the members and numbers read from a file of version 7.3, whose links may repeat objects."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.members, self.numbers = path, 0, 0
 
     def take(self, members: int, numbers: int = 0) -> None:
-        """Count some more.
+        """Add to the counts.
 
         Raises
         ------
         NotAvailable
-            If these are too many.
+            If they exceed the limits.
         """
         self.members += members
         self.numbers += numbers
@@ -90,7 +90,7 @@ class Left:
 
 
 def _check_unpacked(path: Path) -> None:
-    """Refuse a file of MATLAB's version 5 to 7 whose packed variables unpack to more than a record."""
+    """Raise an error for a file of version 5 to 7 whose compressed variables unpack to more than a record may have."""
     size, place = 0, HEAD
     content = read_bytes(path, BYTES * MOST_VALUES)
     order = "<" if content[HEAD - 2 : HEAD] == b"IM" else ">"
@@ -107,20 +107,20 @@ def _check_unpacked(path: Path) -> None:
             check_size(path, (size := size + len(part)) // BYTES)
 
 
-def _plain(value: Any, deep: int) -> Any:
-    """What SciPy read, in dictionaries and lists."""
+def _from_scipy(value: Any, deep: int) -> Any:
+    """Value read by SciPy as dicts, lists, strings and arrays."""
     array = np.asarray(value)
     if not deep or array.dtype.kind not in "OV":
         return str(value) if array.dtype.kind == "U" and array.size == 1 else array
     if not array.dtype.names:
         own = array.ravel().tolist()
-        return _plain(own[0], deep - 1) if array.ndim == 0 else [_plain(one, deep - 1) for one in own]
-    members = [{field: _plain(one[field], deep - 1) for field in array.dtype.names} for one in array.ravel()]
+        return _from_scipy(own[0], deep - 1) if array.ndim == 0 else [_from_scipy(one, deep - 1) for one in own]
+    members = [{field: _from_scipy(one[field], deep - 1) for field in array.dtype.names} for one in array.ravel()]
     return members[0] if array.size == 1 else members
 
 
 def _of_version_73(path: Path) -> dict[str, Any]:
-    """Variables of a file of version 7.3; none if another program wrote it."""
+    """Variables of a file of version 7.3; empty if another program wrote it."""
     import h5py
 
     from steadyslip.experiments.measured.formats.hdf5 import member
@@ -129,12 +129,12 @@ def _of_version_73(path: Path) -> dict[str, Any]:
         own = {name: item for name in file if not name.startswith("#") and (item := member(file, name)) is not None}
         if not any(CLASS in item.attrs for item in own.values()):
             return {}
-        left = Left(path)
-        return {name: _unfolded(item, DEEPEST, left) for name, item in own.items()}
+        left = ReadCount(path)
+        return {name: _from_hdf5(item, DEEPEST, left) for name, item in own.items()}
 
 
-def _unfolded(item: Any, deep: int, left: Left) -> Any:
-    """An object of an HDF5 file as what it was in MATLAB, whose matrices lie there with rows for columns."""
+def _from_hdf5(item: Any, deep: int, left: ReadCount) -> Any:
+    """HDF5 object as MATLAB had it; its matrices are stored transposed."""
     import h5py
 
     from steadyslip.experiments.measured.formats.hdf5 import member, numbers_in
@@ -142,7 +142,7 @@ def _unfolded(item: Any, deep: int, left: Left) -> Any:
     if isinstance(item, h5py.Group):
         left.take(len(item))
         own = {name: one for name in item if deep and (one := member(item, name)) is not None}
-        fields = {name: _unfolded(one, deep - 1, left) for name, one in own.items()}
+        fields = {name: _from_hdf5(one, deep - 1, left) for name, one in own.items()}
         folded = [name for name, one in own.items() if isinstance(one, h5py.Dataset) and CLASS not in one.attrs]
         sizes = {len(fields[name]) for name in folded if isinstance(fields.get(name), list)}
         if not folded or len(sizes) != 1 or len(folded) != len(fields):
@@ -152,7 +152,7 @@ def _unfolded(item: Any, deep: int, left: Left) -> Any:
     numbers_in(left.path, [item])
     if h5py.check_ref_dtype(item.dtype) is not None:
         left.take(item.size)
-        return [_unfolded(item.file[one], deep - 1, left) for one in item[()].ravel()] if deep else []
+        return [_from_hdf5(item.file[one], deep - 1, left) for one in item[()].ravel()] if deep else []
     left.take(1, item.size * -(-item.dtype.itemsize // BYTES))
     numbers = np.squeeze(np.asarray(item[()]).T)
     kind = item.attrs.get(CLASS, b"")
@@ -165,7 +165,7 @@ def _unfolded(item: Any, deep: int, left: Left) -> Any:
 
 
 def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A variable and everything in it that can be named."""
+    """Pairs (name, value) of a variable and everything in it that can be named."""
     yield name, value
     if isinstance(value, Mapping):
         for field, one in value.items():
@@ -175,7 +175,7 @@ def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if all(isinstance(one, Mapping) for one in value):
         for field in value[0]:
             cells = [one.get(field) for one in value]
-            if all(_is_numbers(one) and one.size == 1 for one in cells):  # a row in each
+            if all(_is_numbers(one) and one.size == 1 for one in cells):  # one row per structure
                 yield f"{name}.{field}", np.array([one.item() for one in cells])
         if any(isinstance(one, dict | list) or one.size > 1 for member in value for one in member.values()
                if not isinstance(one, str)):  # fmt: skip
@@ -190,7 +190,7 @@ def _is_numbers(value: Any) -> bool:
 
 
 def _channels(value: Any) -> Numbers | None:
-    """Channels of an array of structures that hold a name, one vector, and perhaps a unit; None if it is none."""
+    """Channels of a structure array with a name, one vector and optionally a unit each; None if it has another form."""
     if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, Mapping) for one in value):
         return None
     found: Numbers = {}
@@ -205,7 +205,7 @@ def _channels(value: Any) -> Numbers | None:
 
 
 def _with_header(numeric: Numbers, inside: dict[str, Any]) -> Numbers:
-    """Columns of the only matrix by the names in the only list of as many words, as `importdata` leaves them."""
+    """Columns of the only matrix named by the only list of as many words, as `importdata` writes them."""
     matrices = [name for name, (value, _) in numeric.items() if value.ndim == 2]
     if len(matrices) != 1:
         return numeric
@@ -224,6 +224,6 @@ def _words(value: Any) -> list[str]:
 
 
 def _shortened(found: Numbers) -> Numbers:
-    """Names without the structures around them, where they remain different."""
+    """Names without their structures, if they stay different."""
     short = [name.rpartition(".")[2] for name in found]
     return dict(zip(short, found.values(), strict=True)) if len(set(short)) == len(short) else found

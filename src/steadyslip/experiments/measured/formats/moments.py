@@ -1,4 +1,4 @@
-"""Times of day and dates as seconds."""
+"""Conversion of times of day and dates to seconds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _DATE = re.compile(r"^(\d{4})-(\d\d)-(\d\d)[T ](\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)
 
 
 def moment(text: str) -> float | None:
-    """Seconds since midnight, or since 1970 where there is a date; None if it is neither.
+    """Seconds since midnight, or since 1970 if there is a date; None if the text is neither.
 
     >>> moment("12:30:01.5"), moment("1970-01-02T00:00:00Z"), moment("02.01.1970 1:00:00"), moment("12.5")
     (45001.5, 86400.0, 90000.0, None)
@@ -46,7 +46,7 @@ def moment(text: str) -> float | None:
 
 
 def day(text: str) -> float | None:
-    """Seconds since 1970 at the beginning of a day; None if it is no date."""
+    """Seconds since 1970 at the beginning of a date; None if the text is no date."""
     for pattern, order in _DAYS:
         if match := pattern.match(text):
             year, month, number = (int(match[k]) for k in order)
@@ -67,8 +67,8 @@ def _offset(zone: str | None) -> float:
     return size if zone[0] == "+" else -size
 
 
-def from_the_first(times: Array) -> Array:
-    """Seconds since the first, a day added wherever a clock has passed midnight."""
+def seconds_since_first(times: Array) -> Array:
+    """Seconds since the first time; a day is added whenever a clock passes midnight."""
     later = np.concatenate([[0.0], np.cumsum(np.diff(times) < -0.5 * DAY)])
     found = times + DAY * later
     return np.asarray(found - found[0])

@@ -1,4 +1,4 @@
-"""netCDF: variables of a classic file, saved runs among them; version 4 is HDF5."""
+"""Reader of netCDF files: variables of a classic file, such as a saved run; version 4 is HDF5."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steadyslip.files.inputs import read_bytes
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric variables of a file, or, of version 4, of one of its groups."""
+    """Numeric variables of a file or, in version 4, of one of its groups."""
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
     if not classic:

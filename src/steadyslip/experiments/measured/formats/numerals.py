@@ -1,4 +1,4 @@
-"""How numbers are written: with a decimal point or comma, and with marks between their thousands."""
+"""Parsing of numbers with decimal point or comma, and with thousands separators."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 
 
 def number(cell: str, mark: str) -> float | None:
-    """The number in a cell with this decimal mark; NaN for an empty one, None for anything else.
+    """Number in a cell with a given decimal mark; NaN for an empty cell, None for other text.
 
     >>> number("1,234.5", "."), number("1.234,5", ","), number("1 234", "."), number("1.2.3", "."), number("1d3", ".")
     (1234.5, 1234.5, 1234.0, None, 1000.0)
@@ -36,7 +36,7 @@ def number(cell: str, mark: str) -> float | None:
 
 
 def _float(text: str) -> float | None:
-    if "_" in text:  # Python's own thousands separator
+    if "_" in text:  # float() would accept Python's own thousands separator
         return None
     try:
         return float(text)
@@ -44,20 +44,20 @@ def _float(text: str) -> float | None:
         return float(re.sub("[dD]", "e", text)) if _FORTRAN.fullmatch(text) else None
 
 
-def either(cell: str) -> float | None:
-    """The number in a cell with whichever decimal mark makes it one; None if neither does."""
+def number_with_any_mark(cell: str) -> float | None:
+    """Number in a cell with either decimal mark; None if it is none."""
     found = number(cell, POINT)
     return number(cell, COMMA) if found is None else found
 
 
-def sure_mark(cell: str) -> str | None:
-    """The decimal mark of a cell that tells it; None of one that does not, such as 12, or 1,234.
+def decimal_mark(cell: str) -> str | None:
+    """Decimal mark of a cell; None if the cell does not determine it, such as 12 or 1,234.
 
-    >>> [sure_mark(text) for text in ("0.61", "12,5", "1.234,5", "1,234,567", "1,234", "12")]
+    >>> [decimal_mark(text) for text in ("0.61", "12,5", "1.234,5", "1,234,567", "1,234", "12")]
     ['.', ',', ',', '.', None, None]
     """
     points, commas = cell.count(POINT), cell.count(COMMA)
-    if not points + commas or either(cell) is None:
+    if not points + commas or number_with_any_mark(cell) is None:
         return None
     if points and commas:
         return POINT if cell.rfind(POINT) > cell.rfind(COMMA) else COMMA
@@ -68,22 +68,22 @@ def sure_mark(cell: str) -> str | None:
     return POINT if points else COMMA
 
 
-def marks_of(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tuple[list[str], list[str], str | None]:
-    """The decimal mark of each column, as its own numbers tell it, or else those of the others.
+def decimal_marks(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tuple[list[str], list[str], str | None]:
+    """Decimal mark of each column, from its own numbers or else from those of other columns.
 
     Returns
     -------
     marks : list of str
     notes : list of str
     fault : str or None
-        What cannot be told.
+        Description of an ambiguity; None if there is none.
     """
-    found: list[dict[str, str]] = []  # a number for each mark
+    found: list[dict[str, str]] = []  # by column: an example for each mark
     unclear: list[tuple[int, str]] = []
     grouped: list[tuple[int, str]] = []
     for k, cells in enumerate(columns):
         marked = [cell for cell in cells if POINT in cell or COMMA in cell]
-        found.append({mark: cell for cell in marked if (mark := sure_mark(cell)) is not None})
+        found.append({mark: cell for cell in marked if (mark := decimal_mark(cell)) is not None})
         vague = next((cell for cell in marked if _UNCLEAR.fullmatch(cell.strip().strip('"'))), None)
         if vague is not None and not found[-1]:
             unclear.append((k, vague))
@@ -92,7 +92,7 @@ def marks_of(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tuple[li
             grouped.append((k, split))
     everywhere = set().union(*found)
     usual = COMMA if COMMA in everywhere else POINT
-    if not everywhere and unclear:  # nothing but such as 1,234: with three decimals
+    if not everywhere and unclear:  # only numbers such as 1,234: taken as decimals
         everywhere = {POINT if POINT in cell else COMMA for _, cell in unclear}
         usual = next(iter(everywhere))
     if unclear and len(everywhere) > 1:

@@ -1,4 +1,4 @@
-"""Lines of a table that are not of it: its header written again, words below its end."""
+"""Lines of a text that are not part of its table: repeated headers, remarks below the table."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import re
 from collections.abc import Iterator, Sequence
 
 Line = tuple[int, str]
-MOST_BELOW = 200  # lines of words below a table
-SHOWN = 40  # characters of one
+MOST_BELOW = 200  # lines of remarks below a table; chosen by trial
+SHOWN = 40  # characters of a remark in a note
 _WORD = re.compile(r"[^\W\d_]{2,}|[*=#~-]{2,}|\x1a|\x00")
 
 
-def set_apart(body: Sequence[Line], header: Sequence[Line], bad: set[int]) -> tuple[set[int], list[str]]:
-    """Which of the lines that are not the table's need no mending, and what to say of them.
+def harmless_lines(body: Sequence[Line], header: Sequence[Line], bad: set[int]) -> tuple[set[int], list[str]]:
+    """Bad lines that are no damage (repeated headers, remarks at the end), and notes on them.
 
     Parameters
     ----------
     body : sequence of (int, str)
-        Lines with their numbers, empty ones left out.
+        Non-empty lines with their numbers.
     header : sequence of (int, str)
-        Those above.
+        Lines above the body.
     bad : set of int
-        Numbers of the lines of the body that do not have what its others have.
+        Numbers of the lines of the body that do not have the table's columns.
     """
     above = {line.strip() for _, line in header}
     fine, notes, repeated = set[int](), list[str](), list[int]()
@@ -43,7 +43,7 @@ def _are_words(run: Sequence[Line]) -> bool:
 
 
 def _runs(body: Sequence[Line], bad: set[int]) -> Iterator[list[Line]]:
-    """Bad lines that follow each other."""
+    """Runs of consecutive bad lines."""
     run: list[Line] = []
     for one in body:
         if one[0] in bad:

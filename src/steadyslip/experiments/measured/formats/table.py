@@ -1,4 +1,4 @@
-"""Numbers of a file as columns with names."""
+"""Numbers of a file as named columns, and limits on their size."""
 
 from __future__ import annotations
 
@@ -13,34 +13,36 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.columns import known_unit, listed
-from steadyslip.experiments.measured.formats.moments import from_the_first
+from steadyslip.experiments.measured.formats.moments import seconds_since_first
 
-ENDED = 0.03  # of a column: what the last block of an acquisition may lack in some
+LENGTH_TOLERANCE = (
+    0.03  # relative difference in length of columns that an interrupted acquisition leaves; chosen by trial
+)
 MOST_VALUES, MOST_ROWS = 40_000_000, 10_000_000
-"""Numbers of a file and of a column: what a gigabyte of memory has room for with the copies that cleaning makes."""
+"""Most numbers of a file and of a column: with the copies that cleaning makes, they fit into a gigabyte."""
 FEW_VALUES, VALUES_A_BYTE = 2**20, 16
-"""Numbers that any file may hold, and more for each of its bytes: noise of a measured row takes one, however packed."""
+"""Numbers that any file may have, plus this many per byte: even noise takes a byte per number, however compressed."""
 MISSING = {
     "", "nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "nat", "#n/a", "-nan", "missing",
     "#div/0!", "#value!", "#ref!", "#num!", "#name?", "#null!", "*", "**", "***", "?", ".",
     "1.#qnan", "1.#inf", "-1.#ind",
 }  # fmt: skip
-"""What stands in a cell that has no number."""
+"""Texts of cells without a number."""
 
 
 @dataclass
 class Table:
-    """Numbers of a file.
+    """Numbers of a file, as columns.
 
     Attributes
     ----------
     names : list of str
     values : ndarray (columns, rows)
-        NaN where a cell is empty.
+        NaN for empty cells.
     lines : ndarray of int (rows)
-        Line of the file, from 1, or row of the table.
+        Line of the file (from 1), or row of the table.
     units : list of str or None
-        Units stated apart from the names.
+        Units given apart from the names; None if absent.
     notes : list of str
     """
 
@@ -54,14 +56,14 @@ class Table:
         self.units = self.units or [None] * len(self.names)
 
     def drop(self, places: Sequence[int]) -> None:
-        """Leave columns out."""
+        """Remove columns by index."""
         keep = [k for k in range(len(self.names)) if k not in places]
         self.names, self.units = [self.names[k] for k in keep], [self.units[k] for k in keep]
         self.values = self.values[keep]
 
 
 def check_size(path: Path, size: int, remedy: str = "", rows: int = 0) -> None:
-    """Refuse more numbers than a record may have, or than a file of so many bytes holds, before they are read."""
+    """Raise an error for more numbers than a record may have, or than a file of this size can hold, before reading."""
     if size > MOST_VALUES or rows > MOST_ROWS:
         most = f"{MOST_VALUES} in all, {MOST_ROWS} in a column"
         raise NotAvailable(f"{str(path)!r} has {max(size, rows)} numbers; allowed: up to {most}{remedy}")
@@ -72,15 +74,15 @@ def check_size(path: Path, size: int, remedy: str = "", rows: int = 0) -> None:
         )
 
 
-def check_apart(path: Path, found: Sequence[str], kind: str) -> None:
-    """Refuse parts of one file that have columns of the same names: nobody can tell which is meant.
+def check_ambiguous_names(path: Path, found: Sequence[str], kind: str) -> None:
+    """Raise an error if several parts of a file have columns of the same names, so that the choice is ambiguous.
 
     Parameters
     ----------
     found : sequence of str
-        Full names of columns, parts of a name divided by ``/`` or ``.``.
+        Full names of columns, with parts separated by ``/`` or ``.``.
     kind : str
-        What such a part is called.
+        Name of such a part, for the message.
     """
     homes: dict[str, list[str]] = {}
     for name in found:
@@ -95,12 +97,12 @@ def check_apart(path: Path, found: Sequence[str], kind: str) -> None:
 
 
 def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) -> str | None:
-    """The part of a file that is asked for, None for all of it.
+    """Return the part of a file that is asked for; None for the whole file.
 
     Raises
     ------
     NotAvailable
-        If there is none of that name.
+        If the file has no part of that name.
     """
     if table is not None and table not in parts:
         raise NotAvailable(f"{str(path)!r} has no {kind} {table!r}; it has {listed(parts) or 'none'}")
@@ -108,7 +110,7 @@ def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) 
 
 
 def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes: Sequence[str] = ()) -> Table:
-    """Vectors of the most common length, by name; columns of a matrix by number."""
+    """Table of the vectors of the most common length, by name; columns of a matrix get numbers."""
     vectors: dict[str, tuple[Array, str | None]] = {}
     for name, (values, unit) in found.items():
         array = np.squeeze(np.asarray(values, dtype=float))
@@ -122,15 +124,15 @@ def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes:
         raise NotAvailable(f"{str(path)!r} has no columns of numbers in it")
     lengths = [len(values) for values, _ in vectors.values()]
     usual = max(set(lengths), key=lambda n: (lengths.count(n), n))
-    ended = [n for n in lengths if n != usual and abs(n - usual) <= max(ENDED * usual, 1)]
-    if ended:  # written to the very end of an acquisition
+    ended = [n for n in lengths if n != usual and abs(n - usual) <= max(LENGTH_TOLERANCE * usual, 1)]
+    if ended:  # the acquisition was interrupted within a row
         notes = [
             *notes,
             f"columns are {min([*ended, usual])} to {max([*ended, usual])} values long; cut to the shortest",
         ]
         usual = min([*ended, usual])
         vectors = {
-            name: (one[:usual] if usual < len(one) <= usual * (1 + 2 * ENDED) + 2 else one, unit)
+            name: (one[:usual] if usual < len(one) <= usual * (1 + 2 * LENGTH_TOLERANCE) + 2 else one, unit)
             for name, (one, unit) in vectors.items()
         }
     left = [name for name, (values, _) in vectors.items() if len(values) != usual]
@@ -144,20 +146,20 @@ def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes:
 
 
 def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[str], list[str | None]]:
-    """Names of the columns, and units from a line of their own, from lines above the numbers; else numbers as names."""
+    """Names and units of columns from the lines above the numbers; numbers as names if there are none."""
     if not lines:
         return [str(i) for i in range(1, count + 1)], [None] * count
     rows = [([*cells], _as_units(cells)) for cells in lines]
     named = [cells for cells, units in rows if units is None] or [rows[-1][0]]
     names = named[-1]
-    if len(set(names)) <= count / 2:  # such as raw, raw, computed, computed: a line about columns
+    if len(set(names)) <= count / 2:  # a line that repeats words, such as raw, raw, computed: not the names
         names = max(named, key=lambda cells: len(set(cells) - {""}))
     stated = [units for cells, units in rows if units is not None and cells is not names]
     return names, stated[-1] if stated else [None] * count
 
 
 def _as_units(cells: Sequence[str]) -> list[str | None] | None:
-    """The units that a line consists of; None if it does not."""
+    """Units of a line that consists of units only; None for other lines."""
     plain = [cell.strip("()[] ") for cell in cells]
     units = [known_unit(cell or "1") for cell in plain]
     are_words = any(re.search(r"[^\W\d_]|%|°", cell) for cell in plain)
@@ -165,7 +167,7 @@ def _as_units(cells: Sequence[str]) -> list[str | None] | None:
 
 
 def count_moments(table: Table, place: int) -> None:
-    """Make seconds since the first of a column of times of day or dates."""
-    table.values[place] = from_the_first(table.values[place])
+    """Convert a column of times of day or dates to seconds since the first."""
+    table.values[place] = seconds_since_first(table.values[place])
     table.units[place] = "s"
     table.notes.append(f"column {table.names[place]!r} holds times of day or dates; counted in seconds from the first")

@@ -1,4 +1,4 @@
-"""TDMS, the format of LabVIEW: channels in groups; where no channel is a time, their sampling interval is one."""
+"""Reader of TDMS files of LabVIEW: channels in groups; without a time channel, times from the sampling interval."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from nptdms import TdmsFile
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.columns import guessed_role, listed, split_name
+from steadyslip.experiments.measured.columns import guess_role, listed, split_name
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, from_vectors
 
 UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 TIME, WANTED = "time", {"friction", "shear"}
-logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # what is wrong is said once, by the error
+logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # problems are reported by the error alone
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric channels of the group of that name, else of the only group that has any."""
-    with path.open("rb") as stream, TdmsFile.open(stream) as file:  # which leaves what it cannot read open
+    """Numeric channels of the named group, or else of the groups that make a record."""
+    with path.open("rb") as stream, TdmsFile.open(stream) as file:  # TdmsFile leaves files open that it cannot read
         groups = {group.name: group for group in file.groups() if any(_numeric(c) for c in group.channels())}
         part = chosen_part(path, "group", table, list(groups))
         own = {name: [c for c in group.channels() if _numeric(c)] for name, group in groups.items()}
@@ -37,7 +37,9 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def _of_a_record(path: Path, own: dict[str, list[Any]]) -> tuple[list[str], list[str]]:
-    """The groups that make a record: the only one with friction or stress in it, or all, one column each."""
+    """Groups that make a record: all, if their channels are alike in length and differ in name; else one with
+    friction.
+    """
     if len(own) <= 1:
         return list(own), []
     names = [channel.name for channels in own.values() for channel in channels]
@@ -52,7 +54,7 @@ def _of_a_record(path: Path, own: dict[str, list[Any]]) -> tuple[list[str], list
 
 
 def _role(name: str) -> str | None:
-    return guessed_role(*split_name(name))
+    return guess_role(*split_name(name))
 
 
 def _numeric(channel: Any) -> bool:
@@ -60,7 +62,7 @@ def _numeric(channel: Any) -> bool:
 
 
 def _values(channel: Any) -> Any:
-    """Numbers; moments as seconds since the first."""
+    """Values of a channel; times as seconds since the first."""
     values = channel[:]
     if values.dtype.kind == "M":
         return (values - values[0]) / np.timedelta64(1, "s")

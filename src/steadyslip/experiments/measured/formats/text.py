@@ -1,4 +1,4 @@
-"""Text with columns of numbers, as people and programs write it: any separator, decimal commas, clocks, headers."""
+"""Reader of text with columns of numbers: any separator, decimal commas, times of day, headers and remarks."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
 from steadyslip.experiments.measured.formats.labview import BEGIN, read_labview
 from steadyslip.experiments.measured.formats.moments import day, moment
-from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, either, marks_of, number
-from steadyslip.experiments.measured.formats.remarks import Line, set_apart
+from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, decimal_marks, number, number_with_any_mark
+from steadyslip.experiments.measured.formats.remarks import Line, harmless_lines
 from steadyslip.experiments.measured.formats.table import Table, check_size, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
 from steadyslip.files.inputs import read_bytes
 
-SHOWN = 8  # bad lines that a message lists
-LOOKED_UP = 500  # lines among which a header ends
+SHOWN = 8  # damaged lines listed in a message
+HEADER_LINES = 500  # lines in which the end of a header is looked for with the lines below; chosen by trial
 MOST_TEXT = 2**30  # bytes of a file
-MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines that are looked at one by one; characters of one
-KNOWN = {
+MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines parsed in Python (a minute of CPU time); characters of a line
+OTHER_FORMATS = {
     b"\xd0\xcf\x11\xe0": "it is of an old Office program; save it as .xlsx",
     b"PK\x03\x04": "it is a workbook or an archive; save a workbook as .xlsx, unpack an archive",
     b"\x1f\x8b": "it is packed; unpack it",
     b"ARROW1": "it is in Arrow's own format; save it as .parquet",
 }
-"""How other files begin, and what to do."""
-UTF16 = (b"\xff\xfe", b"\xfe\xff")  # how texts begin that are written so, such as Excel's "Unicode text"
-LARGE, LOOKED_AT = 2**20, 2**17  # bytes beyond which NumPy is tried first; from which it learns the columns
+"""First bytes of other formats, and advice."""
+UTF16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of UTF-16 text, such as Excel's "Unicode text"
+LARGE, SAMPLE_BYTES = 2**20, 2**17  # bytes above which NumPy is tried first; bytes from which it learns the columns
 _BEGINS_WITH_NUMBER = re.compile(r"[\s|\"',;]*[-+\u2212]?[.,]?\d")
 _QUOTED = re.compile(r'"[^"]*"')
 _SPLIT_THOUSANDS = re.compile(r"(^|,)[-+]?\d{1,3},\d{3}(\.\d*)?(,|$)")
@@ -41,7 +41,7 @@ _BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 
 
 def read_text(path: Path, skip_bad_lines: bool) -> Table:
-    """Columns of a text, or of a file of XLOOK, which has no ending of its own.
+    """Columns of a text file, or of an XLOOK file, which has no ending of its own.
 
     Raises
     ------
@@ -57,11 +57,11 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
         return Table(names, values, np.arange(1, values.shape[1] + 1), known, ["read as XLOOK file"])
     if raw[:2] in UTF16:
         raw = raw.decode("utf-16", errors="replace").encode()
-    if b"\0" in raw[:4096] or raw.startswith(tuple(KNOWN)):
-        remedy = next((said for begin, said in KNOWN.items() if raw.startswith(begin)), "")
+    if b"\0" in raw[:4096] or raw.startswith(tuple(OTHER_FORMATS)):
+        remedy = next((said for begin, said in OTHER_FORMATS.items() if raw.startswith(begin)), "")
         endings = "endings of other formats: .h5, .hdf5, .nc, .mat, .parquet, .xlsx, .tdms"
         raise NotAvailable(f"{str(path)!r} is not text; {remedy or endings}")
-    if len(raw) > LARGE and (table := _plain(path, raw)) is not None:
+    if len(raw) > LARGE and (table := _read_with_numpy(path, raw)) is not None:
         return table
     text, notes = _decoded(raw)
     longest = max(map(len, text.splitlines()), default=0) if sum(map(text.count, _BREAKS)) <= MOST_LINES else None
@@ -75,7 +75,7 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
         return read_labview(text, path)
     layout = _layout(path, text)
     values, lines, faults, more = _numbers(path, layout)
-    fine, said = set_apart(layout.body, layout.header, {fault.line or 0 for fault in faults})
+    fine, said = harmless_lines(layout.body, layout.header, {fault.line or 0 for fault in faults})
     faults, more = [fault for fault in faults if fault.line not in fine], [*more, *said]
     table = Table(layout.names, values, lines, layout.units, [*notes, *more])
     if len(lines):
@@ -91,7 +91,7 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
 
 
 def _count_all_moments(table: Table, layout: _Layout) -> None:
-    """Make seconds of columns of times; dates in a column of their own belong to the clock beside them."""
+    """Convert time columns to seconds; a column of dates is added to a single column of times of day and removed."""
     clocks = [k for k in layout.moments if k not in layout.days]
     if layout.days and len(clocks) == 1:
         date, clock = table.names[layout.days[0]], table.names[clocks[0]]
@@ -112,7 +112,7 @@ def _decoded(raw: bytes) -> tuple[str, list[str]]:
 
 @dataclass(frozen=True)
 class _Layout:
-    """How a text is written: what stands where, with the lines of numbers and theirs in the file."""
+    """Layout of a text: names, units, separator, columns that are times (and dates), header and body lines."""
 
     names: list[str]
     units: list[str | None]
@@ -145,15 +145,15 @@ def _layout(path: Path, text: str) -> _Layout:
 
 
 def _check_split(path: Path, header: list[Line], body: list[Line], delimiter: str | None, count: int) -> None:
-    """Refuse numbers such as 1,234.5 that are torn where commas separate columns."""
+    """Raise an error if commas separate columns and thousands, so that numbers such as 1,234.5 are split."""
     named = max((len(_cells(line, delimiter)) for _, line in header), default=count)
     if delimiter != "," or not 1 < named < count:
         return
     torn = next(((i, line) for i, line in body[:200] if _SPLIT_THOUSANDS.search(line)), None)
     if torn is not None:
         message = (
-            f"{count} numbers below {named} names: {_cut(torn[1])}; do commas divide thousands as well as columns? Set "
-            "such numbers in quotes, or separate columns by semicolons or tabs"
+            f"{count} numbers below {named} names: {_format_line(torn[1])}; do commas divide thousands as well as "
+            "columns? Set such numbers in quotes, or separate columns by semicolons or tabs"
         )  # fmt: skip
         raise ParameterError([Problem("file", message, torn[0])], title=str(path))
 
@@ -162,14 +162,14 @@ def _is_moment(cell: str) -> bool:
     return moment(cell) is not None or day(cell) is not None
 
 
-def _plain(path: Path, raw: bytes) -> Table | None:
-    """A large text of nothing but numbers below its header, at the speed of NumPy; None if it is not so plain."""
-    head, notes = _decoded(raw[: raw.rfind(b"\n", 0, LOOKED_AT) + 1])
+def _read_with_numpy(path: Path, raw: bytes) -> Table | None:
+    """Table of a large text with nothing but numbers below its header, parsed by NumPy; None if it is not so simple."""
+    head, notes = _decoded(raw[: raw.rfind(b"\n", 0, SAMPLE_BYTES) + 1])
     if not head or head.count("\n") != len(head.splitlines()):
         return None
     try:
         layout = _layout(path, head)
-    except NotAvailable:  # no numbers so far
+    except NotAvailable:  # no numbers in this part
         return None
     first = layout.body[0][0]
     if layout.moments or layout.delimiter == "|":
@@ -197,7 +197,7 @@ def _plain(path: Path, raw: bytes) -> Table | None:
 
 
 def _delimiter(rows: list[Line]) -> str | None:
-    """What separates columns; None if blanks do."""
+    """Column separator; None for blanks."""
     middle = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
     sample = [_QUOTED.sub("0", line) for line in middle if _BEGINS_WITH_NUMBER.match(line)]
     sample = sample or [_QUOTED.sub("0", line) for line in middle]
@@ -210,18 +210,18 @@ def _delimiter(rows: list[Line]) -> str | None:
         return ","
     rows_of_blanks = [line.split() for line in sample]
     for decimal in (COMMA, POINT):
-        if all(len(cells) > 1 and all(_tells(cell, decimal) for cell in cells) for cells in rows_of_blanks):
+        if all(len(cells) > 1 and all(_is_number(cell, decimal) for cell in cells) for cells in rows_of_blanks):
             return None
     return ","
 
 
-def _tells(cell: str, mark: str) -> bool:
-    """Whether a cell is a number with this decimal mark, and no comma ends it."""
+def _is_number(cell: str, mark: str) -> bool:
+    """True for a number with this decimal mark that does not end with a comma."""
     return number(cell, mark) is not None and not cell.endswith(COMMA)
 
 
 def _cells(line: str, delimiter: str | None, least: int = 1) -> list[str]:
-    """What a line has between its delimiters, without empty cells at its end beyond so many."""
+    """Cells of a line, without more than `least` trailing empty ones."""
     if delimiter is None:
         return line.split()
     line = line.rstrip("\r\n")
@@ -238,7 +238,7 @@ def _cells(line: str, delimiter: str | None, least: int = 1) -> list[str]:
 
 
 def _value(cell: str, mark: str) -> float | None:
-    """The number or the moment in a cell; NaN for an empty one, None for anything else."""
+    """Number or time in a cell; NaN for an empty cell, None for other text."""
     found = number(cell, mark)
     return _moment(cell) if found is None else found
 
@@ -249,27 +249,29 @@ def _moment(cell: str) -> float | None:
 
 
 def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[Line]]:
-    """Lines before the first that holds numbers only, with others like it below, and the rest."""
-    of_numbers = [_holds_numbers(line, delimiter) for _, line in rows[:LOOKED_UP]]
+    """Split lines into header and body: at the first line of numbers followed by another, or at the first one."""
+    of_numbers = [_holds_numbers(line, delimiter) for _, line in rows[:HEADER_LINES]]
     alone = [k for k, own in enumerate(of_numbers) if own]
     for place in alone:
         if place + 1 >= len(of_numbers) or of_numbers[place + 1]:
             return rows[:place], rows[place:]
     if alone:
         return rows[: alone[0]], rows[alone[0] :]
-    for place, (_, line) in enumerate(rows[LOOKED_UP:], start=LOOKED_UP):
+    for place, (_, line) in enumerate(rows[HEADER_LINES:], start=HEADER_LINES):
         if _holds_numbers(line, delimiter):
             return rows[:place], rows[place:]
     return rows, []
 
 
 def _holds_numbers(line: str, delimiter: str | None) -> bool:
-    numbers = [either(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)]
+    numbers = [
+        number_with_any_mark(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)
+    ]
     return all(n is not None for n in numbers) and any(n == n for n in numbers)
 
 
 def _usual_count(header: list[Line], body: list[Line], delimiter: str | None) -> int:
-    """How many columns there are; the last may be empty for long, where a header has a name for it."""
+    """Number of columns: that of most lines, or of a header that also names an often empty last column."""
     counts = [len(_cells(line, delimiter)) for _, line in body[:200]]
     usual = max(set(counts), key=counts.count)
     if delimiter is not None:
@@ -282,14 +284,14 @@ def _usual_count(header: list[Line], body: list[Line], delimiter: str | None) ->
 def _names(
     header: list[Line], comments: list[Line], first: int, delimiter: str | None, count: int
 ) -> tuple[list[str], list[str | None]]:
-    """Names of the columns, and units from a line of their own; numbers as names without a header."""
+    """Names and units of the columns from the header or from comments; numbers as names without both."""
     lines = [line for _, line in header] or [line for i, line in comments if i < first]
     split = [cells for line in lines if len(cells := _header_cells(line, delimiter, count)) == count]
     return names_and_units(split, count)
 
 
 def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
-    """Cells of a header, which may be separated otherwise than the numbers; none of a line that is drawn."""
+    """Cells of a header line, whose separator may differ from the body's; none for a ruled line."""
     if delimiter == "|":
         line = line.strip().strip("|")
     if not re.search(r"[^-=+|:\s]", line):
@@ -305,7 +307,7 @@ def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
 
 
 def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], list[str]]:
-    """All numbers, their lines, the lines that are damaged, and notes."""
+    """All numbers (columns, rows), their line numbers, damaged lines, and notes."""
     count = len(layout.names)
     lines, table, faults = [], [], []
     for line_number, line in layout.body:
@@ -314,7 +316,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
             lines.append(line_number)
             table.append(cells)
             continue
-        message = f"{_counted(len(cells))} where {count} are expected: {_cut(line)}"
+        message = f"{_format_count(len(cells))} where {count} are expected: {_format_line(line)}"
         if layout.delimiter is None and "," in line:
             message += "; do blanks divide thousands as well as columns? Separate columns by semicolons or tabs"
         faults.append(Problem("file", message, line_number))
@@ -323,7 +325,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
         COMMA in cell for cells in table for cell in cells
     ):
         plain = [[] if k in layout.moments else [cells[k] for cells in table] for k in range(count)]
-        marks, notes, fault = marks_of(layout.names, plain)
+        marks, notes, fault = decimal_marks(layout.names, plain)
         if fault is not None:
             raise ParameterError([Problem("file", fault)], title=str(path))
     values, kept = [], []
@@ -339,7 +341,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
 
 
 def _row(cells: list[str], marks: list[str], names: list[str]) -> tuple[list[float], str | None]:
-    """The numbers of a line, and what is wrong with it."""
+    """Numbers of a line, and a description of the first fault or None."""
     if COMMA not in marks:
         try:
             return [float(cell) for cell in cells], None
@@ -354,11 +356,11 @@ def _row(cells: list[str], marks: list[str], names: list[str]) -> tuple[list[flo
     return row, None
 
 
-def _counted(count: int) -> str:
+def _format_count(count: int) -> str:
     return "1 column" if count == 1 else f"{count} columns"
 
 
-def _cut(line: str) -> str:
+def _format_line(line: str) -> str:
     return repr(line.strip()[:50] + ("..." if len(line.strip()) > 50 else ""))
 
 

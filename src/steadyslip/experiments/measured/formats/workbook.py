@@ -1,6 +1,6 @@
-"""What is in the cells of a workbook (Office Open XML, ECMA-376), read a row at a time; no part may unpack to floods.
+"""Cells of a workbook (Office Open XML, ECMA-376), read row by row with limits against decompression bombs.
 
-openpyxl, which knows what number formats mean, takes ten times as long for a cell.
+openpyxl is used for the meaning of number formats only; it takes ten times as long per cell.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from steadyslip.experiments.measured.formats.moments import DAY
 from steadyslip.experiments.measured.formats.table import check_size
 from steadyslip.files.apart import more_time
 
-MOST_PACKED, FEW_BYTES = 60, 2**23  # times that a part may unpack to, beyond a size that does no harm: numbers do 20
-SOME = 2**16  # numbers, for which a second of processor time is allowed: they take half of it
-MOST_PARTS, MOST_SHEET, MOST_OTHER = 10_000, 2**31, 2**28  # of an archive; bytes of a sheet, and of any other part
-MOST_COLUMNS = 1000
+MOST_PACKED, FEW_BYTES = 60, 2**23  # allowed compression of a part, beyond a harmless size; numbers reach 20
+SOME = 2**16  # numbers per second of CPU time allowed; reading takes half of it
+MOST_PARTS, MOST_SHEET, MOST_OTHER = 10_000, 2**31, 2**28  # parts of an archive; bytes of a sheet; of any other part
+MOST_COLUMNS = 1000  # of a sheet that are read; chosen by trial
 FORMULA = "="
-"""Stands for a formula whose value was not saved."""
+"""Text that stands for a formula without saved value."""
 MOMENT, DATE, CLOCK, SPAN = 1, 2, 3, 4
-"""Kinds of numbers that are times: date and time of day, date alone, time of day, a duration."""
-EPOCHS = {False: 25_569, True: 24_107}  # day of 1970-01-01, counted from 1900 or, on old Macintoshes, from 1904
-TICKS = 5  # decimals of a second that a date has, as a number of days in double precision
+"""Kinds of numbers that are times: date and time of day, date alone, time of day, duration."""
+EPOCHS = {False: 25_569, True: 24_107}  # day number of 1970-01-01: counted from 1900 or, on old Macintoshes, 1904
+TICKS = 5  # decimals of a second that a date keeps as a number of days in double precision
 
 
 @dataclass
 class SheetCells:
-    """Cells that are not empty: numbers, and texts beside them.
+    """Non-empty cells of a sheet: numbers and texts.
 
     Attributes
     ----------
     lines : ndarray of int (rows)
-        Number on the sheet of each row that is not empty.
+        Row number on the sheet of each non-empty row.
     rows, columns, numbers, kinds : ndarray (cells)
-        Place in `lines`, column from 0, value and kind of time (0 for none) of each number; times in seconds.
+        Index in `lines`, column (from 0), value and kind of time (0: none) of each number; times in seconds.
     text_rows, text_columns : ndarray of int (texts)
     texts : list of str
     """
@@ -59,17 +59,17 @@ class SheetCells:
     texts: list[str]
 
     def counts(self, more: Array) -> Array:
-        """Numbers in each column, and how often it is among more columns."""
+        """Count of numbers per column, plus the count of each column in `more`."""
         width = 1 + max((int(np.max(one)) for one in (self.columns, self.text_columns) if len(one)), default=-1)
         return np.bincount(self.columns, minlength=width) + np.bincount(more, minlength=width)
 
     def places(self, row: int) -> list[int]:
-        """Columns that have something in a row."""
+        """Columns with content in a row."""
         own = (self.columns[self.rows == row], self.text_columns[self.text_rows == row])
         return [int(k) for one in own for k in one]
 
     def words_above(self, row: int) -> list[dict[int, str]]:
-        """Texts, also of numbers, in each of the rows before one, by column."""
+        """Texts of cells (numbers as text) in each row before a given one, by column."""
         found: list[dict[int, str]] = [{} for _ in range(row)]
         for k in np.flatnonzero(self.rows < row):
             found[self.rows[k]][int(self.columns[k])] = f"{self.numbers[k]:.15g}"
@@ -78,7 +78,7 @@ class SheetCells:
         return [{place: word for place, word in cells.items() if word} for cells in found]
 
     def dense(self, first: int, count: int) -> tuple[Array, Array]:
-        """Values, NaN where there is no number, and kinds of the first columns from a row on, (columns, rows) each."""
+        """Values (NaN without a number) and kinds from row `first` on, shape (count, rows) each."""
         shape = (count, len(self.lines) - first)
         own = (self.rows >= first) & (self.columns < count)
         places = (self.columns[own], self.rows[own] - first)
@@ -87,7 +87,7 @@ class SheetCells:
         return values, kinds
 
     def without(self, columns: Array) -> tuple[SheetCells, Array]:
-        """The same without some columns, and which of the texts are left."""
+        """Sheet without some columns, and a mask of the texts that remain."""
         own, texts = (~np.isin(places, columns) for places in (self.columns, self.text_columns))
         rows, text_rows = self.rows[own], self.text_rows[texts]
         left = np.unique(np.concatenate([rows, text_rows]))
@@ -99,12 +99,12 @@ class SheetCells:
 
 
 class Workbook:
-    """A workbook that is open.
+    """Open workbook.
 
     Attributes
     ----------
     sheets : dict of str to str
-        The part of the archive in which each is, by name.
+        Part of the archive by name of the sheet.
     """
 
     def __init__(self, path: Path) -> None:
@@ -125,7 +125,7 @@ class Workbook:
                 self.sheets[one.get("name", "")] = part
         others = dict(links.values())
         self._styles = dict(self._styles_of_times(others.get("styles", "")))
-        self._strings = [_words(one) for one in self._elements(others.get("sharedStrings", ""), ("si",))]
+        self._strings = [_text_of(one) for one in self._elements(others.get("sharedStrings", ""), ("si",))]
 
     def __enter__(self) -> Workbook:
         return self
@@ -134,7 +134,7 @@ class Workbook:
         self._archive.close()
 
     def sheet(self, name: str) -> SheetCells:
-        """What is on a sheet."""
+        """Cells of a sheet."""
         lines, line, passed, timed = array("q"), 0, 0, 0
         rows, columns, numbers, kinds = array("q"), array("q"), array("d"), array("b")
         text_rows, text_columns, texts = array("q"), array("q"), list[str]()
@@ -170,7 +170,7 @@ class Workbook:
         )  # fmt: skip
 
     def _content(self, cell: Element) -> tuple[float, int] | str:
-        """The number in a cell with its kind of time, or its text, empty where there is nothing."""
+        """Number in a cell with its kind of time, or its text (empty if there is nothing)."""
         kind, said, of_formula = cell.get("t", "n"), "", False
         for part in cell:
             if part.tag.endswith("v"):
@@ -178,7 +178,7 @@ class Workbook:
             elif part.tag.endswith("}f"):
                 of_formula = True
             elif part.tag.endswith("}is"):
-                said = _words(part)
+                said = _text_of(part)
         if not said:
             return FORMULA if of_formula else ""
         if kind == "s":
@@ -196,7 +196,7 @@ class Workbook:
         return round(DAY * (value - self._origin), TICKS), DATE if value == int(value) else MOMENT
 
     def _styles_of_times(self, part: str) -> Iterator[tuple[str, int]]:
-        """Places of the styles that show numbers as moments or spans of time."""
+        """Indices of cell styles that show numbers as times, with the kind of time."""
         own: dict[int, str] = {}
         for one in self._elements(part, ("numFmt", "cellXfs")):
             if _name(one) == "numFmt":
@@ -209,7 +209,7 @@ class Workbook:
                     yield str(place), SPAN if is_timedelta_format(form) else MOMENT
 
     def _links(self, part: str) -> dict[str, tuple[str, str]]:
-        """What a part refers to: kind and part, by the reference."""
+        """Relations of a part, by reference: kind and target part."""
         folder, name = posixpath.split(part)
         found = {}
         for one in self._elements(posixpath.join(folder, "_rels", f"{name}.rels"), ("Relationship",)):
@@ -218,7 +218,7 @@ class Workbook:
         return found
 
     def _elements(self, part: str, names: tuple[str, ...], most: int = MOST_OTHER) -> Iterator[Element]:
-        """Elements of some names in a part, each emptied after its use; none if there is no such part."""
+        """Elements with some names in a part, each cleared after use; none if the part is absent."""
         if part not in self._parts:
             return
         about = self._archive.getinfo(part)
@@ -237,7 +237,7 @@ def _name(element: Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
-def _words(element: Element) -> str:
-    """A text, in pieces or whole, without how it is spoken."""
+def _text_of(element: Element) -> str:
+    """Text of an element, of its runs joined, without phonetic hints."""
     runs = [part for run in element for part in ([run] if _name(run) == "t" else run if _name(run) == "r" else [])]
     return "".join(part.text or "" for part in runs if _name(part) == "t")

@@ -1,8 +1,8 @@
-"""Binary files of XLOOK, the program that many rock-friction laboratories reduce their records with.
+"""Reader of binary files of XLOOK, with which many rock-friction laboratories process their records.
 
-A header of 36 bytes (name, numbers of records and of columns, two settings), 32 descriptions of channels of 84 bytes
-(name, unit, gain, comment, number of elements), then the columns one after another, as floating-point numbers of four
-or eight bytes. Headers are big-endian; columns are in whichever order of bytes makes numbers of them.
+A header of 36 bytes (name, numbers of records and columns, two settings), 32 channel descriptions of 84 bytes (name,
+unit, gain, comment, number of elements), then the columns one after another, as floats of four or eight bytes. Headers
+are big-endian; the byte order of columns varies and is the one that gives plausible numbers.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 
 
 def is_xlook(raw: bytes) -> bool:
-    """Whether the sizes in a header are those of the file."""
+    """True if the sizes in the header match the size of the file."""
     return _size(raw) is not None
 
 
 def _size(raw: bytes) -> tuple[int, int, int] | None:
-    """Rows, columns and bytes of a number, None if the file is no such one."""
+    """Rows, columns and bytes per number; None if it is no XLOOK file."""
     body = len(raw) - HEAD - CHANNELS * CHANNEL
     if body <= 0:
         return None
@@ -42,7 +42,7 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
     Raises
     ------
     NotAvailable
-        If its sizes do not fit together, or its columns are no numbers.
+        If its sizes do not match, or its columns are not numbers.
     """
     size = _size(raw)
     if size is None:

@@ -240,7 +240,7 @@ class _Function(Expressions):
 
     def _lasting(self, node: ast.AST, value: Operand) -> Operand:
         if isinstance(value, Scalar):
-            raise self.refuse(node, "a number among tuples that are kept")
+            raise self.refuse(node, "a number among several that are kept")
         return value
 
     def _write(self, target: ast.expr, value: Operand) -> None:

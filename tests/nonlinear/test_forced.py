@@ -1,6 +1,7 @@
 """Answers to inputs that swing: against transfer functions, closed forms of fast modulation, and SciPy."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,6 +109,160 @@ def test_what_cannot_swing_any_more():
     assert json.loads(json.dumps(found.to_dict()))["gains"][1] == [None]
 
 
+def two_bodies(area=None):
+    """Two bodies on a spring of their own, a contact under each; the first is pulled."""
+    n = 1 / (area or 1.0)
+    first = ss.RateState(**ROCK, normal_memory=ss.LinkerDieterich(alpha=0.2))
+    second = ss.RateState(a=0.012, b=0.007, d_c=3e-5, mu_ref=0.5, v_ref=1e-5, evolution=ss.Aging())
+    return ss.Machine(
+        bodies={"table": ss.SlidingBody(mass=4e9), "head": ss.SlidingBody(mass=1e9)},
+        links={
+            "spring": ss.Spring(between=("drive", "table"), stiffness=1e10, damping=2e9),
+            "column": ss.Spring(between=("table", "head"), stiffness=3e10, damping=1e9),
+        },
+        contacts={
+            "guide": ss.Surface(body="table", friction=first, contact=ss.Constant(preload=25e6 * n), area=area),
+            "seal": ss.Surface(body="head", friction=second, contact=ss.Constant(preload=10e6 * n), area=area),
+        },
+        drive=ss.Pull(velocity=1e-5),
+    )  # fmt: skip
+
+
+def typed(s):
+    """Of `two_bodies`: ways and friction of both per unit of (pull of the drive, pushes, presses); rows x, then τ."""
+    v = 1e-5
+    laws = ((0.010, 0.008, 1e-5, 0.6, 0.2, 25e6), (0.012, 0.007, 3e-5, 0.5, 0.0, 10e6))
+    by_way = np.diag([s * (a * n / v * s + (a - b) * n / d) / (s + v / d) for a, b, d, _, _, n in laws])
+    by_load = np.diag([((mu - alpha) * s + mu * v / d) / (s + v / d) for _, _, d, mu, alpha, _ in laws])
+    spring, column = 1e10 + 2e9 * s, 3e10 + 1e9 * s
+    matrix = np.array([[4e9 * s**2 + spring + column, -column], [-column, 1e9 * s**2 + column]]) + by_way
+    forces = np.column_stack([[spring / s, 0], np.eye(2), -by_load])
+    ways = np.linalg.solve(matrix, forces)
+    return np.vstack([ways, by_way @ ways + np.column_stack([np.zeros((2, 3)), by_load])])
+
+
+@pytest.mark.parametrize("area", [None, 1e-2])
+def test_a_machine_of_two_contacts_answers_as_typed_by_hand(area):
+    """With areas too all inputs and outputs are forces; small amplitudes that are simulated answer alike."""
+    machine, periods = two_bodies(area), np.array([0.7, 3.0, 40.0])
+    exact = np.array([typed(2j * np.pi / period) for period in periods])
+    inputs = [("drive-velocity", None, 1e-9), ("push", "table", 1e3), ("push", "head", 1e3),
+              ("normal-stress", "guide", 1e3), ("normal-stress", "seal", 1e3)]  # fmt: skip
+    for column, (kind, on, amplitude) in enumerate(inputs):
+        for row, output in ((0, "table.x"), (2, "guide.friction_force"), (3, "seal.friction_force")):
+            simulated = [amplitude] if (row, column) in ((3, 3), (2, 1), (0, 0)) else []
+            found = ss.response(machine, periods, input=kind, on=on, output=output, amplitudes=simulated)
+            own = found.gain * np.exp(1j * np.radians(found.phase))
+            if row == 0 and column == 0:  # places count from where the drive would have the body
+                own = own + 1 / (2j * np.pi / periods)
+            np.testing.assert_allclose(own, exact[:, row, column], rtol=1e-9)
+            for gains in found.gains:
+                np.testing.assert_allclose(gains, found.gain, rtol=2e-5)
+
+
+def test_large_amplitudes_of_two_contacts_as_scipy_has_them():
+    """A press that swings by half its load on the guide."""
+    period, size = 12.0, 12.5e6
+    k1, c1, k2, c2, v0 = 1e10, 2e9, 3e10, 1e9, 1e-5
+
+    def friction(w, psi, t):
+        load = 25e6 + size * np.sin(2 * np.pi * t / period)
+        first = load * (0.6 + 0.010 * w[0] + 0.008 * psi[0] - 0.2 * np.log(load / 25e6))
+        return np.array([first, 10e6 * (0.5 + 0.012 * w[1] + 0.007 * psi[1])]), load
+
+    def rates(t, y):
+        x, w, psi = y[:2], y[2:4], y[4:]  # w = ln(v/v0); ψ of the guide has the load in it
+        v = v0 * np.exp(w)
+        tau, load = friction(w, psi, t)
+        joint = k2 * (x[0] - x[1]) + c2 * (v[0] - v[1])
+        pull = [20e6 - k1 * x[0] - c1 * (v[0] - v0) - joint, joint]
+        theta = psi[0] - 0.2 / 0.008 * np.log(load / 25e6)
+        change = [-v[0] / 1e-5 * (w[0] + theta), v0 / 3e-5 * np.exp(-psi[1]) - v[1] / 3e-5]
+        return [*(v - v0), *((pull - tau) / [4e9, 1e9] / v), *change]
+
+    stretch = 5e6 / k2  # of the column in steady sliding
+    times = period * (30 + np.arange(256) / 256)
+    start = [0.0, -stretch, 0.0, 0.0, 0.0, 0.0]
+    run_ = solve_ivp(rates, (0, times[-1]), start, "LSODA", times, rtol=1e-10, atol=[1e-16] * 2 + [1e-11] * 4)
+    force = [friction(y[2:4], y[4:], t)[0][1] for t, y in zip(times, run_.y.T, strict=True)]
+    parts = np.fft.rfft(force) / 128
+    found = ss.response(two_bodies(), [period], on="guide", output="seal.friction_force", amplitudes=[size])
+    assert found.gains[0, 0] == pytest.approx(abs(parts[1]) / size, rel=1e-5)
+    assert found.phases[0, 0] == pytest.approx(np.degrees(np.angle(1j * parts[1])), rel=1e-5)
+    assert found.shift[0, 0] == pytest.approx(np.mean(force) - 5e6, rel=1e-4)
+    higher = np.sqrt(np.sum(np.abs(parts[2:]) ** 2)) / abs(parts[1])
+    assert found.distortion[0, 0] == pytest.approx(higher, rel=1e-5)
+
+
+def test_resonance_with_the_rig():
+    """Theory 4: at the critical stiffness T_c = 2π (d_c/v0) √(a/κ); between periods far apart it is found as well."""
+    rig = press(b=0.015, normal_memory=ss.NoMemory()).with_values({"stiffness": 1.0001 * 12.5e9})
+    kappa = 1.0001 * 12.5e9 * 1e-5 / 25e6
+    found = ss.response(rig, [1.0, 100.0], output="v")
+    period, gain, phase = found.resonances[0]
+    assert period == pytest.approx(2 * np.pi * np.sqrt(0.010 / kappa), rel=1e-5)
+    assert (gain, phase) == pytest.approx((np.abs(g := found.transfer([period])[0]), np.degrees(np.angle(g))))
+    assert gain > 1e3 * np.max(found.gain)
+    assert ss.response(rig, [20.0, 100.0], output="v").resonances.size == 0
+    answer = ss.response(two_bodies(), [0.1, 1000.0], input="drive-velocity", output="seal.friction_force")
+    dense = np.geomspace(0.1, 1000.0, 20_001)
+    gains = np.abs(answer.transfer(dense))
+    peaks = dense[1:-1][(gains[1:-1] > gains[:-2]) & (gains[1:-1] > gains[2:])]
+    np.testing.assert_allclose(np.sort(answer.resonances[:, 0]), peaks, rtol=1e-3)
+    ringing = replace(
+        two_bodies(), bodies={**two_bodies().bodies, "arm": ss.SlidingBody(mass=10.0)},
+        links={**two_bodies().links, "arm": ss.Spring(between=("head", "arm"), stiffness=1e7, damping=1e-3)},
+    )  # fmt: skip
+    period, gain, _ = ss.response(ringing, [1e-4, 1.0], input="push", on="arm", output="arm.v").resonances[0]
+    assert (period, gain) == (pytest.approx(2 * np.pi * 1e-3, rel=1e-7), pytest.approx(1000, rel=0.01))
+    assert f"resonance  period {answer.resonances[0, 0]:.4g} s" in str(answer)
+
+
+def test_limits_as_scipy_has_them():
+    """Of a weakening rig near its critical stiffness: just below the amplitude at which it is lost it swings on."""
+    a, b, d_c, mu, v, sigma, k, period = 0.010, 0.015, 1e-5, 0.6, 1e-5, 25e6, 1.3 * 12.5e9, 5.0
+    rig = press(b=b, normal_memory=ss.NoMemory()).with_values({"stiffness": k})
+    found = ss.response(rig, [period], output="v", limits=True)
+
+    def swung(size):
+        """Gain, or None where slip runs away or is not the same in the next period."""
+
+        def rates(t, y):
+            normal = sigma + size * np.sin(2 * np.pi * t / period)
+            w = ((mu * sigma - k * y[0]) / normal - mu - b * y[1]) / a
+            return [v * np.expm1(w), -v / d_c * np.exp(w) * (w + y[1])]
+
+        def runs_away(t, y):
+            normal = sigma + size * np.sin(2 * np.pi * t / period)
+            return ((mu * sigma - k * y[0]) / normal - mu - b * y[1]) / a - 30
+
+        runs_away.terminal = True
+        times = period * (100 + np.arange(128) / 64)
+        run_ = solve_ivp(rates, (0, times[-1]), [0, 0], "LSODA", times, runs_away, rtol=1e-9, atol=[1e-17, 1e-12])
+        if run_.status == 1:
+            return None
+        speed = v + np.array([rates(t, y)[0] for t, y in zip(times, run_.y.T, strict=True)])
+        one, other = np.reshape(speed, (2, 64))
+        return abs(np.fft.rfft(other)[1]) / 32 / size if np.allclose(one, other, rtol=1e-3) else None
+
+    lost, linear = found.lost_at[0], found.linear_to[0]
+    assert swung(lost * 1.02) is None
+    assert swung(lost / 1.08) is not None
+    assert abs(swung(linear / 1.08) / found.gain[0] - 1) < 0.05 < abs(swung(linear * 1.02) / found.gain[0] - 1)
+    away = ss.response(rig.with_values({"stiffness": 1e10}), [period], limits=True)
+    assert (away.linear_to[0], away.lost_at[0]) == (0, 0)
+    assert "UNSTABLE" in str(away)
+    assert len(found.plot()) == 3
+
+
+def test_outputs_that_hardly_swing_and_transients_that_outlast_the_run():
+    """Errors of the integration are no irregular motion, and what fades over millions of periods has not settled."""
+    faint = ss.response(press(), [3.0], input="push", output="shear-stress", amplitudes=[0.1], rtol=1e-8)
+    assert faint.gains[0, 0] == pytest.approx(faint.gain[0], rel=1e-3)
+    fast = ss.response(press(), [1e-6], amplitudes=[1e4])
+    assert fast.status[0, 0] == "not settled"
+
+
 def test_a_machine_of_one_body_answers_as_its_slider():
     friction = press().friction
     machine = ss.Machine(
@@ -132,8 +287,12 @@ def test_refusals():
         ss.response(press(), [1.0], output="noise")
     with pytest.raises(ss.ParameterError, match="periods"):
         ss.response(press(), [2.0, 1.0])
-    with pytest.raises(ss.ParameterError, match="amplitudes: got -1"):
+    with pytest.raises(ss.ParameterError, match=r"amplitudes: got \[-1"):
         ss.response(press(), [1.0], amplitudes=[-1.0])
+    with pytest.raises(ss.ParameterError, match="on: got 'face'; a slider is one block"):
+        ss.response(press(), [1.0], on="face")
+    with pytest.raises(ss.ParameterError, match="on: missing; allowed: guide, seal"):
+        ss.response(two_bodies(), [1.0])
     with pytest.raises(ss.NotAvailable, match="nothing that an input of kind injection acts on"):
         ss.response(press(), [1.0], input="injection")
 
@@ -147,8 +306,26 @@ def test_the_command(tmp_path):
     assert "friction under normal_disturbance" in found.stdout
     assert "amplitude 1 MPa" in found.stdout
     lines = table.read_text().splitlines()
-    assert lines[0].startswith("amplitude (Pa),period (s),gain (1/(Pa)),")
+    assert lines[0].startswith("amplitude (Pa),period (s),gain (1/Pa),")
     assert len(lines) == 11
     assert picture.read_text().startswith("<?xml")
     wrong = run(*words, "--amplitude", "1 mm")
     assert (wrong.returncode, "--amplitude" in wrong.stderr) == (2, True)
+
+
+def test_the_command_of_a_rig_with_an_area(tmp_path):
+    """Small amplitudes alone too; forces in words and columns, SI units per area in JSON."""
+    rig, table = tmp_path / "press.toml", tmp_path / "bode.csv"
+    ss.write_rig(replace(press(), area=0.01), rig)
+    words = ["response", rig, "--output", "shear-stress", "--periods", "1s", "100s", "--points", "2"]
+    assert "resonance  period" in run(*words).stdout
+    told = run(*words, "--amplitude", "10 kN", "-o", table).stdout
+    assert "amplitude 10 kN" in told
+    assert "mean shifted by -3.57" in told
+    data = json.loads(run(*words, "--amplitude", "10 kN", "--json").stdout)
+    assert data["amplitudes"] == [1e6]
+    assert data["gains"][0][0] == pytest.approx(0.01984, rel=1e-3)
+    assert len(data["resonances"][0]) == 3
+    title, *rows = table.read_text().splitlines()
+    assert title.split(",")[:5] == ["amplitude (N)", "period (s)", "gain (1)", "phase (deg)", "shift (N)"]
+    assert float(rows[2].split(",")[4]) == pytest.approx(data["shift"][0][0] * 0.01)

@@ -2,66 +2,114 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.format import format_quantity
 from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, axis_label, display_unit, new_panels
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import FrequencyResponse, FrozenVerdicts
 
 _MARKERS = ("o", "s", "^", "D", "v")
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE)
+BESIDE = 0.2  # of a resonance's period to each side: lines are drawn through more points there, closest at its peak
+HALF_TURN = 180.0  # a phase that jumps by more has gone round once
 
 
 def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
     """Plot gain and phase over the period: linear response as lines, finite amplitudes as marks with their mean shift.
 
+    Where limits were asked for, beneath: the amplitudes up to which the answer is linear, and from which sliding is
+    lost.
+
     Parameters
     ----------
     found : FrequencyResponse
     ax : sequence of matplotlib.axes.Axes, optional
-        Two, for gain and phase; a third for the shift of the mean if the response has finite amplitudes.
+        For gain, phase, the shift of the mean if the response has finite amplitudes, and limits if it has them.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes
     """
-    count = 3 if found.amplitudes.size else 2
+    drawn = [_gain, _phase]
+    drawn += [_shift] if found.amplitudes.size else []
+    drawn += [] if np.all(np.isnan(found.linear_to)) else [_limits]
     if ax is None:
-        ax = new_panels(count, 1, (6.4, 2.3 * count), sharex=True)
+        ax = new_panels(len(drawn), 1, (6.4, 2.3 * len(drawn)), sharex=True)
     axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
-    unit = "1" if found.units[0] == found.units[1] else f"{found.units[1]}/({found.units[0]})"
-    for one, values, label in zip(axes, (found.gain, found.phase), ("small amplitudes", None), strict=False):
-        one.plot(found.periods, values, color=BLACK, label=label)
-    shifts = np.abs(found.shift[np.isfinite(found.shift)])
-    factor, shift_unit = display_unit(found.units[1], float(np.max(shifts, initial=0.0)))
-    rows = zip(found.amplitudes, cycle((BLUE, VERMILION, GREEN, ORANGE)), cycle(_MARKERS), strict=False)
-    for j, (amplitude, colour, mark) in enumerate(rows):
-        style = {"color": colour, "marker": mark, "linestyle": "none", "fillstyle": "none", "markersize": 5}
-        for one, values in zip(axes, (found.gains[j], found.phases[j], found.shift[j] / factor), strict=True):
-            one.plot(found.periods, values, **style)
-        axes[0].plot([], [], **style, label=f"amplitude {format_quantity(amplitude, found.units[0])}")
-        if np.any(lost := ~np.isfinite(found.gains[j])):
-            place = np.full(np.count_nonzero(lost), np.min(found.gain))
-            axes[0].plot(found.periods[lost], place, "x", color=colour, label="no answer of that period")
-    if found.resonance is not None:
-        for one in axes:
-            one.axvline(found.resonance[0], color=GREY, linestyle=":", linewidth=1)
-    axes[0].set_xscale("log")
-    axes[0].set_yscale("log")
-    for one in axes[1:]:
+    for one, draw in zip(axes, drawn, strict=True):
+        draw(found, one)
         one.set_xscale("log")
-    axes[0].set_ylabel(f"gain ({unit})")
-    axes[1].set_ylabel("phase (deg)")
-    if count == 3:
-        axes[2].set_ylabel(axis_label("shift of the mean", shift_unit))
+        for period in found.resonances[:1, 0]:
+            one.axvline(period, color=GREY, linestyle=":", linewidth=1)
     axes[-1].set_xlabel("period (s)")
     axes[0].set_title(f"{found.output.replace('_', ' ')} under {found.input.replace('_', ' ')}", fontsize="medium")
     axes[0].legend(fontsize="small")
     return axes
+
+
+def _small(found: FrequencyResponse) -> tuple[np.ndarray, np.ndarray]:
+    """Periods close enough for a smooth line, those of resonances among them, and the answers of small amplitudes."""
+    low, high = found.periods[0], found.periods[-1]
+    peaks = np.outer(found.resonances[:, 0], 1 + np.linspace(-BESIDE, BESIDE, 41) ** 3 / BESIDE**2).ravel()
+    periods = np.unique(np.concatenate([found.periods, np.geomspace(low, high, 400), peaks]))
+    periods = periods[(periods >= low) & (periods <= high)]
+    return periods, found.transfer(periods)
+
+
+def _styles(found: FrequencyResponse) -> Iterator[tuple[int, float, dict[str, Any]]]:
+    """Of each amplitude: number, size and how it is marked."""
+    for j, amplitude in enumerate(found.amplitudes):
+        style = {"color": _COLOURS[j % len(_COLOURS)], "marker": _MARKERS[j % len(_MARKERS)]}
+        yield j, amplitude, style | {"linestyle": "none", "fillstyle": "none", "markersize": 5}
+
+
+def _gain(found: FrequencyResponse, ax: Any) -> None:
+    factor, unit = found.gain_unit
+    periods, answer = _small(found)
+    ax.plot(periods, factor * np.abs(answer), color=BLACK, label="small amplitudes")
+    for j, amplitude, style in _styles(found):
+        ax.plot(found.periods, factor * found.gains[j], **style, label=f"amplitude {found.told(amplitude)}")
+        if np.any(lost := ~np.isfinite(found.gains[j])):
+            place = np.full(np.count_nonzero(lost), factor * np.min(found.gain))
+            ax.plot(found.periods[lost], place, "x", color=style["color"], label="no answer of that period")
+    ax.set_yscale("log")
+    ax.set_ylabel(f"gain ({unit or '1'})")
+
+
+def _phase(found: FrequencyResponse, ax: Any) -> None:
+    periods, answer = _small(found)
+    phase = np.degrees(np.angle(answer))
+    breaks = np.flatnonzero(np.abs(np.diff(phase)) > HALF_TURN) + 1
+    ax.plot(np.insert(periods, breaks, np.nan), np.insert(phase, breaks, np.nan), color=BLACK)
+    for j, _, style in _styles(found):
+        ax.plot(found.periods, found.phases[j], **style)
+    ax.set_ylabel("phase (deg)")
+
+
+def _shift(found: FrequencyResponse, ax: Any) -> None:
+    times, unit = found.shown_units[1]
+    shifts = times * found.shift
+    factor, unit = display_unit(unit, float(np.max(np.abs(shifts[np.isfinite(shifts)]), initial=0.0)))
+    for j, _, style in _styles(found):
+        ax.plot(found.periods, shifts[j] / factor, **style)
+    ax.set_ylabel(axis_label("shift of the mean", unit))
+
+
+def _limits(found: FrequencyResponse, ax: Any) -> None:
+    times, unit = found.shown_units[0]
+    limits = times * np.array([found.linear_to, found.lost_at])
+    limits[~np.isfinite(limits) | (limits == 0)] = np.nan
+    factor, unit = display_unit(unit, float(np.nanmax(limits, initial=0.0)))
+    for own, line, label in zip(limits / factor, ("k--", "k-"), ("linear up to", "sliding lost from"), strict=True):
+        ax.plot(found.periods, own, line, marker=".", label=label)
+    ax.set_yscale("log")
+    ax.set_ylabel(axis_label("amplitude", unit))
+    ax.legend(fontsize="small")
 
 
 def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:

@@ -6,6 +6,7 @@ The equations are those of `steadyslip.model.descriptor`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,7 +77,16 @@ def state_matrices(
         raise beyond_range(point)
     found = described(model, known, blocks).solved(outputs, inputs)
     _require_eigenvalues(point, found.a)
-    return found
+    shares = [_pressure_of(rig, name) for name in found.inputs]
+    return replace(found, b=found.b * shares, d=found.d * shares)
+
+
+def _pressure_of(rig: Slider | Machine, name: str) -> float:
+    """What a unit of an input is in the Model: a force on a contact with an area is a stress there."""
+    contact, _, kind = name.rpartition(".")
+    if isinstance(rig, Slider) or kind not in ("press", "pores"):
+        return 1.0
+    return 1 / (rig.contacts[contact].area or 1.0)
 
 
 def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
@@ -132,7 +142,7 @@ def state_space(
         Names of ``Model.inputs``. Unless given all: of a slider perturbation of the load-point velocity (m/s),
         disturbance stress on the block q (Pa), disturbance of the normal stress (Pa; the B4 of eq. 12); of a machine
         ``load_velocity`` (m/s or rad/s), ``BODY.push`` (N or N m) and ``CONTACT.press`` (N), but for those that move a
-        body without mass at once.
+        body without mass at once. ``CONTACT.pores`` (N, of a slider ``.pores``, Pa) is the pressure around pore fluid.
 
     Returns
     -------

@@ -5,7 +5,8 @@ Knows stability and motion; no records of experiments, no maps, no words of the 
 
 from __future__ import annotations
 
-from steadyslip.nonlinear.forced import FrequencyResponse, response
+from steadyslip.nonlinear.forced import response
+from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
 from steadyslip.nonlinear.kicks.brackets import threshold_map

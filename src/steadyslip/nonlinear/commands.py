@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, QuantityError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
@@ -24,7 +25,8 @@ from steadyslip.linear.boundary import margins, oscillatory_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.commands import progress_of, read_experiment
-from steadyslip.nonlinear.forced import FrequencyResponse, amplitude_unit, response
+from steadyslip.nonlinear.forced import amplitude_unit, response
+from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.kicks import kick_problems
@@ -177,8 +179,8 @@ def response_of_file(
         raise ParameterError(
             [Problem("--periods", f"got {periods[0]} {periods[1]}; allowed: a time > 0, and a longer one")]
         )
-    unit = amplitude_unit(rig, input, on)
-    sizes = [_quantity("--amplitude", text, unit) for text in amplitudes]
+    factor, unit = outside(amplitude_unit(rig, input, on), rig.area if isinstance(rig, Slider) else None)
+    sizes = [_quantity("--amplitude", text, unit) / factor for text in amplitudes]
     return response(
         rig, np.geomspace(low, high, points), input=input, output=output, on=on, amplitudes=sizes, limits=limits
     )

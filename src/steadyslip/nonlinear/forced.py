@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.format import format_quantity
-from steadyslip.core.options import FLAG, NAME, NUMBERS, checked
-from steadyslip.core.pictures import draw
+from steadyslip.core.options import FLAG, NAME, NUMBERS, Tested, checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters
-from steadyslip.core.results import ReadOnly
-from steadyslip.files.output import write_text
-from steadyslip.linear.state_space import state_matrices
+from steadyslip.linear.frequency import resonances, transfer
 from steadyslip.linear.stiffness import growth_rate
 from steadyslip.machine.input_units import unit_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
 from steadyslip.motion import simulate
+from steadyslip.nonlinear.frequency_response import IRREGULAR, NOT_SETTLED, PERIODIC, FrequencyResponse
 from steadyslip.protocol import DisturbanceHarmonic, InjectionHarmonic, NormalStressHarmonic, VelocityHarmonic
 from steadyslip.protocol.shapes import Harmonic
 
@@ -41,169 +36,23 @@ OF_SLIDERS = {
 SAMPLES = 256  # a period: harmonics up to the 127th are told apart
 LEAST_PERIODS, MOST_PERIODS = 10, 2560  # waited for; twice as many each time
 SETTLED = 1e-7  # two periods that differ by less, of the range of the output, are the same
-FAINT = 1e-5  # of its range, by which an output may be uncertain that swings little beside errors of integration
+FAINT = 1e-5  # the same for an output that swings as little as errors of the integration, and after the most periods
 ROUGHLY = 1e-4  # the same for limits, which are told to a twentieth
 DEPARTED = 0.05  # a gain this far from that of small amplitudes is no longer linear
-LEAST_SHARE, MOST_SHARE = 1e-3, 0.99  # amplitudes tried for limits, of the steady value: just before it changes sign
-HALVINGS = 7  # of the logarithm of amplitude between smallest and largest: limits are right to 6 %
+MOST_FADED = 700.0  # e-folds that floating point can tell
+IRREGULARLY = 1e-2  # of the range: periods that differ by more for ever do so by themselves
+TIGHTER, TIGHTEST = 100, 1e-12  # share and least of the tolerance, where errors of the integration hide the answer
+MOST_SHARE = 0.99  # of the steady value, tried for limits: just before it changes sign
+DECADES = 3  # of amplitude, tried downwards of that, and once more where that is not enough
+HALVINGS = 7  # of the logarithm of amplitude over that range: limits are right to 6 %
+RISING = Tested(
+    "numbers > 0 that rise, in s", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0))
+)
+SIZES = Tested("numbers > 0, in SI units", lambda given: np.size(given) == 0 or _positive(given))
 COMPARED = 5  # periods at the end that are compared: repetition up to every 4th is seen
-PERIODIC, NOT_SETTLED, IRREGULAR = "periodic", "not settled", "irregular"
 
 
-@dataclass(frozen=True, eq=False)
-class FrequencyResponse(ReadOnly):
-    """Answer of one output to one input that swings about its steady value.
-
-    Attributes
-    ----------
-    rig : Slider or Machine
-    input, output : str
-        As in `steadyslip.build_model`: a name of ``inputs``, and one of ``observables``.
-    units : tuple of str
-        Of input and output.
-    periods : ndarray (n,)
-        s.
-    gain, phase : ndarray (n,)
-        Of small amplitudes, from the linearised equations: amplitude of the output over that of the input, and by how
-        much it leads, degrees from -180 to 180.
-    amplitudes : ndarray (m,)
-        Of the input, where motion was simulated; may be empty.
-    gains, phases : ndarray (m, n)
-        At these amplitudes: of the output's part that swings with the input's period.
-    shift : ndarray (m, n)
-        Mean of the output less its steady value.
-    mean_friction : ndarray (m, n)
-        Mean friction over mean normal stress (or force), of the slider or of the contact whose output it is; else NaN.
-    distortion : ndarray (m, n)
-        Root of the sum of squares of all higher harmonics, over the amplitude of the first.
-    status : ndarray of str (m, n)
-        ``periodic``, ``every 2nd period`` and so on, ``irregular``, ``not settled``, or how the motion ended
-        (``blow-up``, ``contact lost``, ...); numbers are NaN where it did.
-    linear_to, lost_at : ndarray (n,)
-        Amplitude up to which the gain is within 5 % of that of small ones, and amplitude at which steady sliding is
-        lost: motion ends, or no longer repeats with the input. NaN where not asked for, and inf where larger than the
-        steady value of what swings.
-    stable : bool
-        Whether steady sliding is stable; if not, no small periodic answer is ever reached.
-    """
-
-    rig: Slider | Machine = field(repr=False)
-    input: str
-    output: str
-    units: tuple[str, str]
-    periods: Array = field(repr=False)
-    gain: Array = field(repr=False)
-    phase: Array = field(repr=False)
-    amplitudes: Array = field(repr=False)
-    gains: Array = field(repr=False)
-    phases: Array = field(repr=False)
-    shift: Array = field(repr=False)
-    mean_friction: Array = field(repr=False)
-    distortion: Array = field(repr=False)
-    status: Array = field(repr=False)
-    linear_to: Array = field(repr=False)
-    lost_at: Array = field(repr=False)
-    stable: bool = True
-
-    @property
-    def resonance(self) -> tuple[float, float] | None:
-        """Period (s) and gain of the largest small-amplitude answer; None where that lies at an end of the periods."""
-        best = int(np.argmax(self.gain))
-        if best in (0, len(self.gain) - 1):
-            return None
-        return float(self.periods[best]), float(self.gain[best])
-
-    def __str__(self) -> str:
-        unit = _ratio(*self.units)
-        lines = [f"{self.output} under {self.input}: gain and phase of small amplitudes"]
-        if not self.stable:
-            lines.append("  steady sliding is UNSTABLE: this answer is never reached, any disturbance outgrows it")
-        for i in _some(len(self.periods)):
-            lines.append(
-                f"  {format_quantity(self.periods[i], 's'):>12}  {self.gain[i]:.5g}{unit}  {self.phase[i]:.4g} deg"
-            )
-        if (found := self.resonance) is not None:
-            lines.append(f"resonance  period {format_quantity(found[0], 's')}, gain {found[1]:.5g}{unit}")
-        for j, amplitude in enumerate(self.amplitudes):
-            lines.append(f"amplitude {format_quantity(amplitude, self.units[0])}")
-            for i in _some(len(self.periods)):
-                lines.append(f"  {format_quantity(self.periods[i], 's'):>12}  {self._at(j, i)}")
-        lines += self._limits()
-        return "\n".join(lines)
-
-    def _at(self, j: int, i: int) -> str:
-        if self.status[j, i] != PERIODIC:
-            return str(self.status[j, i])
-        return (
-            f"{self.gains[j, i]:.5g}{_ratio(*self.units)}  {self.phases[j, i]:.4g} deg, mean shifted by "
-            f"{format_quantity(self.shift[j, i], self.units[1])}, distortion {100 * self.distortion[j, i]:.3g} %"
-        )
-
-    def _limits(self) -> list[str]:
-        lines = []
-        limits = (("linear to within 5 % up to", self.linear_to), ("steady sliding is lost from", self.lost_at))
-        for words, found in limits:
-            if np.any(np.isfinite(found)):
-                least = int(np.nanargmin(found))
-                place = format_quantity(self.periods[least], "s")
-                lines.append(
-                    f"{words} an amplitude of {format_quantity(found[least], self.units[0])}, at period {place}"
-                )
-            elif np.any(np.isinf(found)):
-                lines.append(f"{words} no amplitude below the steady value")
-        return lines
-
-    def to_dict(self) -> dict[str, Any]:
-        """The result as JSON-ready dict, SI units; what does not exist is null."""
-        arrays = ("periods", "gain", "phase", "amplitudes", "gains", "phases", "shift", "mean_friction", "distortion",
-                  "linear_to", "lost_at")  # fmt: skip
-        return {
-            "input": self.input, "output": self.output, "units": list(self.units), "stable": self.stable,
-            **{name: _plain(getattr(self, name)) for name in arrays}, "status": self.status.tolist(),
-        }  # fmt: skip
-
-    def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write one row for each period and amplitude; amplitude 0 stands for small ones.
-
-        Raises
-        ------
-        NotAvailable
-            If the file cannot be written.
-        """
-        unit = _ratio(*self.units).strip() or "1"
-        titles = (f"amplitude ({self.units[0]})", "period (s)", f"gain ({unit})", "phase (deg)",
-                  f"shift ({self.units[1]})", "distortion (1)", "status")  # fmt: skip
-        rows: list[tuple[Any, ...]] = [titles]
-        rows += [(0, *one, 0, 0, "linear") for one in zip(self.periods, self.gain, self.phase, strict=True)]
-        for j, amplitude in enumerate(self.amplitudes):
-            columns = (self.gains[j], self.phases[j], self.shift[j], self.distortion[j], self.status[j])
-            rows += [(amplitude, *one) for one in zip(self.periods, *columns, strict=True)]
-        words = (",".join(one if isinstance(one, str) else f"{one:.12g}" for one in row) for row in rows)
-        write_text(path, "\n".join([*words, ""]))
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw gain and phase over the period; see `steadyslip.figures.frequency_response`."""
-        return draw(self, ax=ax)
-
-
-def _ratio(given: str, answered: str) -> str:
-    """Unit of a gain, with a blank before it; none where both are alike."""
-    return "" if given == answered else f" {answered}/({given})"
-
-
-def _some(count: int) -> list[int]:
-    """Places of at most nine lines of a table."""
-    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 9))})
-
-
-def _plain(values: Array) -> Any:
-    """Nested lists, null for what is no number."""
-    found = values.astype(object)
-    found[~np.isfinite(values)] = None
-    return found.tolist()
-
-
-@checked(periods=NUMBERS, amplitudes=NUMBERS, input=NAME, output=NAME, on=NAME, limits=FLAG)
+@checked(periods=RISING, amplitudes=SIZES, input=NAME, output=NAME, on=NAME, limits=FLAG)
 def response(
     rig: Slider | Machine,
     periods: Any,
@@ -261,7 +110,8 @@ def response(
     -----
     Small amplitudes: G(iω) = C(iω − A)⁻¹B + D of `state_space`, exact. Large ones: the motion is run for 10 periods,
     or as long as transients of small amplitude last, and for twice as long until two periods agree to 1e-7 of their
-    range; the last one is taken apart by a discrete Fourier transform.
+    range and so does what is still to come of a transient; the last one is taken apart by a discrete Fourier transform.
+    After 2560 periods, and where errors of the integration are not less even with a smaller tolerance, 1e-5 will do.
 
     Examples
     --------
@@ -274,11 +124,8 @@ def response(
     array([0.0263, 0.6899, 0.6038])
     """
     forced = _Forced(rig, input, on, output, rtol)
-    periods = _rising(periods)
-    amplitudes = np.ravel(np.asarray(amplitudes, dtype=float))
-    if np.any(amplitudes <= 0):
-        raise ParameterError([Problem("amplitudes", f"got {amplitudes.min():g}; allowed: numbers > 0, in SI units")])
-    answer = forced.linear(periods)
+    periods, amplitudes = (np.ravel(np.asarray(given, dtype=float)) for given in (periods, amplitudes))
+    answer = transfer(rig, forced.name, forced.output, periods)
     shape = (len(amplitudes), len(periods))
     numbers = np.full((len(_NUMBERS), *shape), np.nan)
     status = np.full(shape, "", dtype=object)
@@ -298,23 +145,20 @@ def response(
     return FrequencyResponse(
         rig, forced.name, forced.output, forced.units, periods, np.abs(answer), np.degrees(np.angle(answer)),
         amplitudes, **found, status=status.astype(str), linear_to=bounds[0], lost_at=bounds[1],
-        stable=bool(growth_rate(rig) < 0),
+        resonances=resonances(rig, forced.name, forced.output, periods[0], periods[-1]), stable=forced.decay < 0,
     )  # fmt: skip
 
 
 _NUMBERS = ("gains", "phases", "shift", "mean_friction", "distortion")
 
 
+def _positive(given: Any) -> bool:
+    return NUMBERS.passes(given) and bool(np.all(np.asarray(given) > 0))
+
+
 def amplitude_unit(rig: Slider | Machine, input: str = "normal-stress", on: str | None = None) -> str:
     """SI unit of an amplitude: that of the input on this rig."""
     return _Forced(rig, input, on, None, 1e-9).units[0]
-
-
-def _rising(periods: Any) -> Array:
-    found = np.ravel(np.asarray(periods, dtype=float))
-    if np.any(found <= 0) or np.any(np.diff(found) <= 0):
-        raise ParameterError([Problem("periods", "allowed: numbers > 0 that rise, in s")])
-    return found
 
 
 class _Forced:
@@ -339,6 +183,8 @@ class _Forced:
         ending = INPUTS[self.kind]
         if self.kind == "drive-velocity":
             return "load_velocity", None
+        if isinstance(self.rig, Slider) and on is not None:
+            raise ParameterError([Problem("on", f"got {on!r}; a slider is one block, leave it out")])
         if isinstance(self.rig, Slider) and self.kind in OF_SLIDERS:
             return OF_SLIDERS[self.kind], None
         possible = [name.removesuffix(ending) for name in model.inputs if name.endswith(ending)]
@@ -363,41 +209,40 @@ class _Forced:
         on: dict[str, Any] = {} if self.on is None else {"on": self.on}
         return PIECES[self.kind](amplitude=amplitude, period=period, **on)
 
-    def linear(self, periods: Array) -> Array:
-        """G(iω) at each period, complex."""
-        found = state_matrices(self.rig, (self.output,), (self.name,))
-        a, b, c, d = found.blocks()
-        swing = 2j * np.pi / periods
-        inner = np.linalg.solve(swing[:, None, None] * np.eye(len(a)) - a, np.broadcast_to(b, (len(periods), *b.shape)))
-        return np.asarray((c @ inner + d)[:, 0, 0])
-
     def swung(self, amplitude: float, period: float, settled: float = SETTLED) -> tuple[str, tuple[float, ...]]:
         """How the motion ends up, and the numbers of `_NUMBERS`, NaN where it does not."""
         waited = math.log(settled) / self.decay / period if self.decay < 0 else 0.0
         count = int(min(max(LEAST_PERIODS, math.ceil(waited)), MOST_PERIODS))
         nothing, before = (math.nan,) * len(_NUMBERS), math.inf
+        rtol = max(self.rtol, settled / 100) if settled > SETTLED else self.rtol
         while True:
-            rtol = max(self.rtol, settled / 100) if settled > SETTLED else self.rtol
             columns, status = self._run(amplitude, period, count, rtol)
             if status != "done":
                 return status, nothing
-            swings = columns[self.output].reshape(COMPARED, SAMPLES)
-            size = np.ptp(swings) or 1.0
-            apart = [float(np.max(np.abs(swings[-1] - swings[-1 - k]))) / size for k in range(1, COMPARED)]
-            rounding = min(FAINT, 100 * rtol * float(np.max(np.abs(swings))) / size)
-            if apart[0] < max(settled, rounding):
+            halfway, *swings = columns[self.output].reshape(1 + COMPARED, SAMPLES)
+            size = np.ptp(swings[-1]) or 1.0
+            drift, *apart = (float(np.max(np.abs(swings[-1] - one))) / size for one in (halfway, *swings[-2::-1]))
+            left = max(apart[0], drift * self._to_come(period * (count - count // 2)))
+            most = count >= MOST_PERIODS
+            if left < (max(settled, FAINT) if most or rtol <= TIGHTEST else settled):
                 return PERIODIC, self._numbers(columns, swings[-1], amplitude)
-            if count >= MOST_PERIODS:
-                break
-            before, count = apart[0], min(2 * count, MOST_PERIODS)
-        for k, own in enumerate(apart[1:], start=2):
-            if own < settled:
-                return f"every {k}{'nd' if k == 2 else 'rd' if k == 3 else 'th'} period", nothing
-        return (NOT_SETTLED if apart[0] < before / 2 else IRREGULAR), nothing
+            stalls = before / 2 < apart[0]  # errors of the integration do not fade with time
+            before = apart[0]
+            if (stalls or most) and apart[0] < IRREGULARLY and rtol > TIGHTEST:
+                rtol = max(rtol / TIGHTER, TIGHTEST)
+            elif not most:
+                count = min(2 * count, MOST_PERIODS)
+            else:
+                return _unsettled(apart), nothing
+
+    def _to_come(self, time: float) -> float:
+        """How much of a transient is still to come, over what has gone in the last so many seconds."""
+        return 1 / float(np.expm1(min(-self.decay * time, MOST_FADED))) if self.decay < 0 else 0.0
 
     def _run(self, amplitude: float, period: float, count: int, rtol: float) -> tuple[dict[str, Array], str]:
-        """Observables over the last periods of so many, and how the run ended."""
-        times = period * (count - COMPARED + np.arange(COMPARED * SAMPLES) / SAMPLES)
+        """Observables over the period before the middle of so many and over the last ones, and how the run ended."""
+        first = np.array([count // 2 - 1, *range(count - COMPARED, count)])
+        times = period * (first[:, None] + np.arange(SAMPLES) / SAMPLES).ravel()
         run = simulate(
             self.rig, self._piece(amplitude, period), until=count * period, times=times, events=False, rtol=rtol
         )
@@ -418,6 +263,8 @@ class _Forced:
 
     def limits(self, period: float, gain: float) -> tuple[float, float]:
         """Amplitudes up to which the gain is linear, and from which steady sliding is lost."""
+        if self.decay >= 0:
+            return 0.0, 0.0
         most = MOST_SHARE * self._size()
         tried: dict[float, tuple[str, float]] = {}
 
@@ -447,13 +294,24 @@ class _Forced:
         return max(found)
 
 
+def _unsettled(apart: list[float]) -> str:
+    """What periods do that are `apart` from the 1st, 2nd, ... before: repeat later, drift, or neither."""
+    for k, own in enumerate(apart[1:], start=2):
+        if own < IRREGULARLY * apart[0]:
+            return f"every {k}{'nd' if k == 2 else 'rd' if k == 3 else 'th'} period"
+    drifts = apart[0] < IRREGULARLY or apart[-1] > 0.5 * len(apart) * apart[0]
+    return NOT_SETTLED if drifts else IRREGULAR
+
+
 def _edge(beyond: Callable[[float], bool], most: float) -> float:
     """The amplitude from which on something is so, by halving logarithms; inf if it is not up to the largest."""
     if not beyond(most):
         return math.inf
-    low, high = most * LEAST_SHARE / MOST_SHARE, most
+    low, high = most / 10**DECADES, most
     if beyond(low):
-        return low
+        low, high = low / 10**DECADES, low
+        if beyond(low):
+            return 0.0
     for _ in range(HALVINGS):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if beyond(middle) else (middle, high)

@@ -1,0 +1,57 @@
+"""How the linearised rig answers an input that swings: the transfer function over periods, and where it is largest."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.signal import find_peaks
+
+from steadyslip.linear.state_space import state_matrices
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+
+Array = np.ndarray
+PLACES = 200  # periods, evenly spaced in their logarithm, at which a largest gain is looked for besides the modes' own
+PROMINENCE = 0.01  # of the gain's logarithm above the dips beside it: less is no resonance to speak of
+BESIDE = np.linspace(-8, 8, 33)  # widths of a mode's peak from its own period, tried besides those
+SHARPNESS = 1e-5  # of what is tried beside a resonance, to which its period is found
+
+
+def transfer(rig: Slider | Machine, input: str, output: str, periods: Array) -> Array:
+    """G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space` at periods (s), complex, SI units."""
+    found = state_matrices(rig, (output,), (input,))
+    return _answer(found.blocks(), periods)
+
+
+def _answer(blocks: tuple[Array, Array, Array, Array], periods: Array) -> Array:
+    a, b, c, d = blocks
+    swing = 2j * np.pi / periods
+    inner = np.linalg.solve(swing[:, None, None] * np.eye(len(a)) - a, np.broadcast_to(b, (len(periods), *b.shape)))
+    return np.asarray((c @ inner + d)[:, 0, 0])
+
+
+def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, longest: float) -> Array:
+    """Largest answers within a range of periods (s): period, gain, phase (degrees), largest gain first; (r, 3).
+
+    Looked for near the period of every mode, however little damped, and on a fine grid.
+    """
+    blocks = state_matrices(rig, (output,), (input,)).blocks()
+    values = np.linalg.eigvals(blocks[0])
+    swinging = values[values.imag > 0]
+    near = 2 * np.pi / swinging.imag * (1 + np.outer(BESIDE, np.abs(swinging.real) / np.abs(swinging)))
+    within = near[(near > shortest) & (near < longest)]
+    tried = np.unique(np.log(np.concatenate([np.geomspace(shortest, longest, PLACES), within])))
+
+    def lowered(log_period: float) -> float:
+        return -float(np.abs(_answer(blocks, np.exp([log_period])))[0])
+
+    gain = np.abs(_answer(blocks, np.exp(tried)))
+    highest, _ = find_peaks(np.log(np.maximum(gain, np.finfo(float).tiny)), prominence=PROMINENCE)
+    found = [
+        minimize_scalar(lowered, bounds=(low, high), options={"xatol": SHARPNESS * (high - low)}).x
+        for low, high in zip(tried[highest - 1], tried[highest + 1], strict=True)
+    ]
+    periods = np.exp(found)
+    answers = _answer(blocks, periods) if found else np.empty(0, dtype=complex)
+    rows = np.column_stack([periods, np.abs(answers), np.degrees(np.angle(answers))])
+    return rows[np.argsort(-rows[:, 1])]

@@ -1,0 +1,198 @@
+"""What comes of an input that swings: gain and phase over the period, and where they end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.areas import outside
+from steadyslip.core.format import format_quantity
+from steadyslip.core.pictures import draw
+from steadyslip.core.results import ReadOnly
+from steadyslip.files.output import write_text
+from steadyslip.linear.frequency import transfer
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+
+Array = np.ndarray
+PERIODIC, NOT_SETTLED, IRREGULAR = "periodic", "not settled", "irregular"
+MOST_TOLD = 4  # resonances, in words
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse(ReadOnly):
+    """Answer of one output to one input that swings about its steady value.
+
+    Attributes
+    ----------
+    rig : Slider or Machine
+    input, output : str
+        As in `steadyslip.build_model`: a name of ``inputs``, and one of ``observables``.
+    units : tuple of str
+        Of input and output.
+    periods : ndarray (n,)
+        s.
+    gain, phase : ndarray (n,)
+        Of small amplitudes, from the linearised equations: amplitude of the output over that of the input, and by how
+        much it leads, degrees from -180 to 180.
+    amplitudes : ndarray (m,)
+        Of the input, where motion was simulated; may be empty.
+    gains, phases : ndarray (m, n)
+        At these amplitudes: of the output's part that swings with the input's period.
+    shift : ndarray (m, n)
+        Mean of the output less its steady value.
+    mean_friction : ndarray (m, n)
+        Mean friction over mean normal stress (or force), of the slider or of the contact whose output it is; else NaN.
+    distortion : ndarray (m, n)
+        Root of the sum of squares of all higher harmonics, over the amplitude of the first.
+    status : ndarray of str (m, n)
+        ``periodic``, ``every 2nd period`` and so on, ``irregular``, ``not settled``, or how the motion ended
+        (``blow-up``, ``contact lost``, ...); numbers are NaN where it did.
+    linear_to, lost_at : ndarray (n,)
+        Amplitude up to which the gain is within 5 % of that of small ones, and amplitude at which steady sliding is
+        lost: motion ends, or no longer repeats with the input. NaN where not asked for, inf where larger than the
+        steady value of what swings, and 0 where less than a millionth of that.
+    resonances : ndarray (r, 3)
+        Largest small-amplitude answers within the range of the periods, wherever they lie between them: period (s),
+        gain, phase (degrees); the largest gain first.
+    stable : bool
+        Whether steady sliding is stable; if not, no small periodic answer is ever reached.
+    """
+
+    rig: Slider | Machine = field(repr=False)
+    input: str
+    output: str
+    units: tuple[str, str]
+    periods: Array = field(repr=False)
+    gain: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    amplitudes: Array = field(repr=False)
+    gains: Array = field(repr=False)
+    phases: Array = field(repr=False)
+    shift: Array = field(repr=False)
+    mean_friction: Array = field(repr=False)
+    distortion: Array = field(repr=False)
+    status: Array = field(repr=False)
+    linear_to: Array = field(repr=False)
+    lost_at: Array = field(repr=False)
+    resonances: Array = field(repr=False)
+    stable: bool = True
+
+    def transfer(self, periods: Any) -> Array:
+        """The small-amplitude answer G(iω) at other periods (s), complex, SI units."""
+        return transfer(self.rig, self.input, self.output, np.asarray(periods, dtype=float))
+
+    @property
+    def shown_units(self) -> tuple[tuple[float, str], tuple[float, str]]:
+        """Factor and unit in which people get input and output: totals where the rig has an area."""
+        return outside(self.units[0], self._area), outside(self.units[1], self._area)
+
+    @property
+    def _area(self) -> float | None:
+        return self.rig.area if isinstance(self.rig, Slider) else None
+
+    @property
+    def gain_unit(self) -> tuple[float, str]:
+        """The same of a gain; the unit is empty where input and output are alike."""
+        (below, given), (above, answered) = self.shown_units
+        divisor = f"({given})" if set(given) & set("/ ") else given
+        return above / below, "" if given == answered else f"{answered}/{divisor}"
+
+    def __str__(self) -> str:
+        lines = [f"{self.output} under {self.input}: gain and phase of small amplitudes"]
+        if not self.stable:
+            lines.append("  steady sliding is UNSTABLE: this answer is never reached, any disturbance outgrows it")
+        for i in _some(len(self.periods)):
+            period = format_quantity(self.periods[i], "s")
+            lines.append(f"  {period:>12}  {self._gain(self.gain[i])}  {self.phase[i]:.4g} deg")
+        for period, gain, phase in self.resonances[:MOST_TOLD]:
+            place = format_quantity(period, "s")
+            lines.append(f"resonance  period {place}, gain {self._gain(gain)}, phase {phase:.4g} deg")
+        for j, amplitude in enumerate(self.amplitudes):
+            lines.append(f"amplitude {self.told(amplitude)}")
+            for i in _some(len(self.periods)):
+                lines.append(f"  {format_quantity(self.periods[i], 's'):>12}  {self._at(j, i)}")
+        return "\n".join([*lines, *self._limits()])
+
+    def told(self, amplitude: float) -> str:
+        """An amplitude of the input for people."""
+        return format_quantity(amplitude, self.units[0], area=self._area)
+
+    def _gain(self, gain: float) -> str:
+        factor, unit = self.gain_unit
+        return f"{factor * gain:.5g} {unit}".rstrip()
+
+    def _at(self, j: int, i: int) -> str:
+        if self.status[j, i] != PERIODIC:
+            return str(self.status[j, i])
+        shift = format_quantity(self.shift[j, i], self.units[1], area=self._area)
+        return (
+            f"{self._gain(self.gains[j, i])}  {self.phases[j, i]:.4g} deg, mean shifted by {shift}, distortion "
+            f"{100 * self.distortion[j, i]:.3g} %"
+        )
+
+    def _limits(self) -> list[str]:
+        lines = []
+        limits = (("linear to within 5 % up to", self.linear_to), ("steady sliding is lost from", self.lost_at))
+        for words, found in limits:
+            if np.any(np.isfinite(found)):
+                least = int(np.nanargmin(found))
+                place = format_quantity(self.periods[least], "s")
+                lines.append(f"{words} an amplitude of {self.told(found[least])}, at period {place}")
+            elif np.any(np.isinf(found)):
+                lines.append(f"{words} no amplitude below the steady value")
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as JSON-ready dict, SI units; what does not exist is null."""
+        arrays = ("periods", "gain", "phase", "resonances", "amplitudes", "gains", "phases", "shift", "mean_friction",
+                  "distortion", "linear_to", "lost_at")  # fmt: skip
+        return {
+            "input": self.input, "output": self.output, "units": list(self.units), "stable": self.stable,
+            **{name: _plain(getattr(self, name)) for name in arrays}, "status": self.status.tolist(),
+        }  # fmt: skip
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write one row for each period and amplitude; amplitude 0 stands for small ones.
+
+        What does not exist is ``nan``. Forces where the rig has an area.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        ((given, amplitude_unit), (answered, shift_unit)), (ratio, unit) = self.shown_units, self.gain_unit
+        titles = (f"amplitude ({amplitude_unit})", "period (s)", f"gain ({unit or '1'})", "phase (deg)",
+                  f"shift ({shift_unit})", "distortion (1)", "status", f"linear to ({amplitude_unit})",
+                  f"lost at ({amplitude_unit})")  # fmt: skip
+        limits = (given * self.linear_to, given * self.lost_at)
+        nothing = np.zeros_like(self.periods)
+        columns: list[tuple[Any, ...]] = [(ratio * self.gain, self.phase, nothing, nothing, ["linear"] * len(nothing))]
+        for j in range(len(self.amplitudes)):
+            own = (self.shift[j] * answered, self.distortion[j], self.status[j])
+            columns.append((ratio * self.gains[j], self.phases[j], *own))
+        rows: list[tuple[Any, ...]] = [titles]
+        for amplitude, own in zip((0.0, *(given * self.amplitudes)), columns, strict=True):
+            rows += [(amplitude, *one) for one in zip(self.periods, *own, *limits, strict=True)]
+        words = (",".join(one if isinstance(one, str) else f"{one:.12g}" for one in row) for row in rows)
+        write_text(path, "\n".join([*words, ""]))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw gain and phase over the period; see `steadyslip.figures.frequency_response`."""
+        return draw(self, ax=ax)
+
+
+def _some(count: int) -> list[int]:
+    """Places of at most nine lines of a table."""
+    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 9))})
+
+
+def _plain(values: Array) -> Any:
+    """Nested lists, null for what is no number."""
+    found = values.astype(object)
+    found[~np.isfinite(values)] = None
+    return found.tolist()

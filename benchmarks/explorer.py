@@ -51,7 +51,7 @@ from machines import at_random
 from moved import compiled_run, motion_text, moved, slip_events
 from rigs_of_theory import CONTACTS
 from steadyslip.model.point import operating_point
-from steadyslip.model.posed import posed
+from steadyslip.model.posed import well_posed
 
 CHANGES = ({}, {"stiffness": 0.01}, {"stiffness": 100.0}, {"drive.velocity": 30.0}, {"stiffness": 3.0, "mass": 10.0})
 BAR = 1e-12
@@ -96,7 +96,7 @@ def motion(first: int) -> None:
     worst = 0.0
     for words, rig in itertools.islice(kinds(), first):
         protocol, until = ss.VelocityStep(at=1.0, to=2e-6), 30.0
-        if not np.all(posed(operating_point(rig))):
+        if not np.all(well_posed(operating_point(rig))):
             refused += 1  # as everywhere
             continue
         try:

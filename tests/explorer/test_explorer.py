@@ -29,7 +29,7 @@ from steadyslip.linear.polynomials import is_hurwitz, stable_set
 from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
-from steadyslip.model.posed import posed
+from steadyslip.model.posed import well_posed
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales
 from steadyslip.model.weights import eliminable
@@ -426,7 +426,7 @@ def test_scales_of_a_page_are_those_of_python(name):
     expected[Setting.GUESS] = 0.0
     np.testing.assert_allclose(settings, expected, rtol=1e-14)
     assert motion["x"] == pytest.approx(np.ravel(scales["x"])[0], rel=1e-14)
-    assert motion["posed"] == bool(posed(point)[0])
+    assert motion["posed"] == bool(well_posed(point)[0])
 
 
 def test_a_page_that_stops_a_motion_keeps_what_there_is():

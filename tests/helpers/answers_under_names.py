@@ -6,7 +6,7 @@ import steadyslip as ss
 from renamed_laws import NAMES, PLAIN, machine, renamed
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import motion_part
-from steadyslip.model.names import EVENTS, OWN
+from steadyslip.model.names import EVENTS, RESERVED_NAMES
 
 TIMES = np.linspace(0.0, 20.0, 21)
 PUSH = [ss.VelocityStep(at=1.0, to=2e-6), ss.NormalStressHarmonic(amplitude=1e5, period=3.0)]
@@ -17,7 +17,7 @@ def pairs(index):
     """Names of all that can have another, chosen by a number: a parameter of each law, both memories."""
     random = np.random.default_rng(index)
     words = [str(word) for word in random.permutation(NAMES)]
-    free = [word for word in words if word not in OWN and not word.startswith(EVENTS)]
+    free = [word for word in words if word not in RESERVED_NAMES and not word.startswith(EVENTS)]
     own = dict(zip(PARAMETERS, (word for word in words if word not in PLAIN), strict=False))
     return tuple((own | dict(zip(REMEMBERED, (w for w in free if w not in own.values()), strict=False))).items())
 

@@ -17,7 +17,7 @@ from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.waves import Waves
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model import build_model, operating_point
-from steadyslip.model.range import quasi as operating_quasi
+from steadyslip.model.range import quasipolynomial as operating_quasi
 from steadyslip.model.reducing import reduce_model
 
 

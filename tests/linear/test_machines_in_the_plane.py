@@ -9,10 +9,10 @@ import steadyslip as ss
 from machines import at_random, stacked_pads
 from machines_in_the_plane import compare
 from steadyslip.model import build, point, statics
-from steadyslip.model.eigenvalues import by_eigenvalues
+from steadyslip.model.eigenvalues import coefficients_from_eigenvalues
 from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import operating_point
-from steadyslip.model.range import quasi
+from steadyslip.model.range import quasipolynomial
 
 
 @pytest.mark.campaign
@@ -28,9 +28,9 @@ def test_the_polynomial_of_the_eigenvalues_is_the_one_that_is_written_out(machin
     """With a delay; and of bodies without mass with a root far right, where signs of the highest coefficient meet."""
     place = operating_point(machine)
     assert is_written_out(place.model)
-    written, _ = quasi(place)
+    written, _ = quasipolynomial(place)
     scale = np.max(np.abs(written), axis=0)  # of q, what p + q and p leave
-    for i, own in enumerate(by_eigenvalues(place)):
+    for i, own in enumerate(coefficients_from_eigenvalues(place)):
         np.testing.assert_allclose(own / scale, written[i] / scale, atol=1e-9)
 
 

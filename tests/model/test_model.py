@@ -11,7 +11,7 @@ import steadyslip as ss
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
-from steadyslip.model.posed import posed
+from steadyslip.model.posed import well_posed
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales, scale_rows
 from steadyslip.model.weights import weights
@@ -139,7 +139,7 @@ def test_each_contact_has_its_own_steady_normal_stress():
     last = point.part(slice(1, 3))
     assert np.array_equal(last.sigmas[1], point.sigmas[1][1:])
     assert reduce_model(point.model).form == "eliminated"
-    assert np.array_equal(posed(point), [True, True, True])
+    assert np.array_equal(well_posed(point), [True, True, True])
     for ask in (lambda: point.sigma, lambda: point.all_stresses()):
         with pytest.raises(ss.NotAvailable, match="2 contacts"):
             ask()
@@ -151,7 +151,7 @@ def test_answers_are_the_same_for_everybody():
     scales, _ = natural_scales(point, reduce_model(point.model))
     with pytest.raises(TypeError, match="item assignment"):
         scales["x"] = 2.0
-    for array in (posed(point), weights(point).direct, *weights(point).decay):
+    for array in (well_posed(point), weights(point).direct, *weights(point).decay):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 2.0
 

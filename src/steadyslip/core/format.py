@@ -49,7 +49,7 @@ def _is_own(name: str) -> bool:
 
 
 def _best(value: float, names: tuple[str, ...]) -> str | None:
-    """Of several units the one in which an SI value is closest to 10 on a log scale; None for 0 or no units."""
+    """The one of several units in which an SI value is closest to 10 on a log scale; None for 0 or no units."""
     return min(names, key=lambda name: abs(math.log10(abs(value) / unit(name)[0]) - 1), default=None) if value else None
 
 

@@ -29,7 +29,7 @@ from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
 from steadyslip.model.sliding import observed_in_steady_sliding
-from steadyslip.model.steady import GRID, SOLVED, joint_equation
+from steadyslip.model.steady import GRID, ROOT_TOLERANCE, joint_equation
 
 SLIP_RATE = "slip_rate"
 """What pages call the velocity of a contact in steady sliding."""
@@ -105,7 +105,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         "closed": closed,
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
-        "solved": SOLVED,
+        "solved": ROOT_TOLERANCE,
         "observed": [[name, _unit(model, name), meanings.get(name, "")] for name in names],
     } | further
     programs += [_linear_split(), *edges]

@@ -27,7 +27,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
-from steadyslip.model.posed import posed
+from steadyslip.model.posed import well_posed
 from steadyslip.model.reducing import EVERYWHERE, reduce_model
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.weights import LEAST_WEIGHT, eliminable
@@ -77,7 +77,7 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
     what = "machine" if isinstance(rig, Machine) else "rig"
     if not np.all(point.exists):
         raise NotAvailable(f"the {what} of the file does not slide steadily")
-    if not np.all(posed(point)):
+    if not np.all(well_posed(point)):
         raise NotAvailable(f"the motion of the {what} is ill-posed")
     eliminate = eliminable(point)
     named = isinstance(rig, Machine)

@@ -22,11 +22,17 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Contact, Coordinate, Model
-from steadyslip.model.posed import rising
+from steadyslip.model.posed import balance_jacobian
 from steadyslip.model.reducing import share_of
 from steadyslip.model.reduction import Reduction
-from steadyslip.model.scales import direct_effect_scale, joined_sizes, moving_parts, shortest_time, sizes
-from steadyslip.model.weights import Weights, weighed
+from steadyslip.model.scales import (
+    contact_scales,
+    direct_effect_scale,
+    machine_scales,
+    scale_expressions,
+    shortest_time,
+)
+from steadyslip.model.weights import Weights, weight_expressions
 from steadyslip.motion.jobs import Options, numbers
 
 
@@ -112,12 +118,12 @@ def scales_program(reduction: Reduction, eliminate: int | tuple[int | None, ...]
     wanted += [model.steady[contact.velocity] for contact in model.contacts]
     wanted += [contact.sigma_ss for contact in model.contacts]
     wanted += [contact.area for contact in model.contacts]
-    several = [weighed(model, index) for index in range(len(model.contacts))]
+    several = [weight_expressions(model, index) for index in range(len(model.contacts))]
     wanted += [sp.sympify(e).xreplace({sp.zoo: sp.nan}) for own in several for e in own]  # of what holds nothing
     if model.contacts[0].name:
-        wanted += moving_parts(model)
+        wanted += scale_expressions(model)
     if not model.is_single:
-        wanted += [e for row in rising(model) for e in row]
+        wanted += [e for row in balance_jacobian(model) for e in row]
     each = eliminate if isinstance(eliminate, tuple) else (eliminate,)
     return program(model, "scales", wanted, then=partial(_scaled, reduction, each, options, list(map(len, several))))
 
@@ -133,12 +139,15 @@ def _scaled(
     for count in counts:
         weights.append(Weights.of(rest[:count]))
         rest = rest[count:]
-    own = [sizes(one, speed, reduction, select, i) for i, (one, speed) in enumerate(zip(weights, speeds, strict=True))]
+    own = [
+        contact_scales(one, speed, reduction, select, i)
+        for i, (one, speed) in enumerate(zip(weights, speeds, strict=True))
+    ]
     way: Any
     if model.contacts[0].name:
-        count = len(moving_parts(model))
+        count = len(scale_expressions(model))
         directs = [direct_effect_scale(one, select) for one in weights]
-        scales, searched = joined_sizes(reduction, rest[:count], speeds, stresses, directs, own, select)
+        scales, searched = machine_scales(reduction, rest[:count], speeds, stresses, directs, own, select)
         way, searched, rest = speeds[0] * shortest_time(scales, select), searched or (1.0,), rest[count:]
     else:
         scales, unknown = own[0]

@@ -12,7 +12,7 @@ from steadyslip.linear.roots import Array, quietly
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic, quasi
+from steadyslip.model.range import characteristic, quasipolynomial
 
 _FAR = 1e12  # times such a size, and its inverse, beyond which rounding decides where a parameter has an edge
 _FACTORS = np.array([1 / APART, 1.0, APART])  # of a size of the parameter, at which its polynomial is asked for
@@ -60,7 +60,7 @@ def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Arra
     flat = found.reshape(-1, most, 2)
     sizes = None if size is None else np.broadcast_to(size, point.shape).ravel()
     for i, one in enumerate(point.pieces(1)):
-        if not np.all(np.isfinite(quasi(one)[0])):
+        if not np.all(np.isfinite(quasipolynomial(one)[0])):
             continue
         alone = one.with_arguments([np.reshape(a, -1)[0] for a in one.arguments], ())
         own = linear_set(alone, name, None if sizes is None else float(sizes[i]))
@@ -85,7 +85,7 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
     for _ in range(_SIZES):
         arguments = list(point.arguments)
         arguments[place] = _FACTORS.reshape(3, *(1,) * size.ndim) * size
-        c = quasi(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
+        c = quasipolynomial(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
         known = np.all(np.isfinite(c), axis=(0, -1))
         p, q, bent = _split(c)
         if np.any(known & (bent | ~np.any(q, axis=-1))):
@@ -159,7 +159,7 @@ def _split_around(
     place, found = list(point.model.parameters).index(name), None
     for _ in range(_SIZES if again else 1):
         arguments = [a if i != place else size * _FACTORS for i, a in enumerate(point.arguments)]
-        c, h = quasi(point.with_arguments(arguments, (3,)))
+        c, h = quasipolynomial(point.with_arguments(arguments, (3,)))
         if not np.all(np.isfinite(c)):
             break
         p, q, bent = _split(c)
@@ -183,7 +183,7 @@ def _alike(p: Array, q: Array) -> Array:
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
     """That of a delay that no term has twice; None elsewhere."""
     delays = delays_of_terms(point.model)
-    c, h = quasi(point)
+    c, h = quasipolynomial(point)
     if not np.all(np.isfinite(c)):
         return None
     if list(delays) == [0, symbol]:

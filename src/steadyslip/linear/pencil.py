@@ -26,7 +26,7 @@ from steadyslip.linear.spectrum import spectrum
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows, is_written_out
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic, delays_of, quasi
+from steadyslip.model.range import characteristic, delays_of, quasipolynomial
 
 GOOD = 1e-6
 """Share of an eigenvalue that its error may be; beyond it the eigenvalue is computed anew with many digits."""
@@ -140,7 +140,7 @@ def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
 
 def _count(point: OperatingPoint) -> int:
     """Growing roots by the argument principle, −1 where that takes too long."""
-    c, h = quasi(point)
+    c, h = quasipolynomial(point)
     with np.errstate(all="ignore"):
         scaled, own, _ = in_own_time(c[None], h[None])
         if outweighed(scaled)[0] or not np.all(np.isfinite(scaled)):

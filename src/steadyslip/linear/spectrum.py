@@ -14,7 +14,7 @@ from steadyslip.linear.roots import Array, ComplexArray, roots
 from steadyslip.model.eigenvalues import eigenvalues_of
 from steadyslip.model.linearisation import delays_of_terms, is_written_out
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic, quasi
+from steadyslip.model.range import characteristic, quasipolynomial
 
 _ONE_CROSSING = 2  # roots that lie right of the axis just beyond an edge, at most
 
@@ -23,7 +23,7 @@ def spectrum(point: OperatingPoint) -> ComplexArray:
     """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost, n that without."""
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else eigenvalues_of(point)
-    c, h = quasi(point)
+    c, h = quasipolynomial(point)
     return sums.rightmost(c, h, c.shape[-1] - 1)
 
 
@@ -41,13 +41,13 @@ def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
 
 @question
 def _counts(point: OperatingPoint) -> NDArray[np.int64]:
-    return sums.counted_right(*quasi(point))
+    return sums.counted_right(*quasipolynomial(point))
 
 
 @question
 def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
     """How many roots lie right of the axis, of points with delays; `quasi.INFINITE` of them, or −1 where unknown."""
-    return _counts(point) if np.all(can_be_counted(point)) else sums.count_right(*quasi(point))
+    return _counts(point) if np.all(can_be_counted(point)) else sums.count_right(*quasipolynomial(point))
 
 
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
@@ -58,7 +58,7 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
     """
     if not point.model.delays:
         return ill_posed(characteristic(point))
-    c, _ = quasi(point)
+    c, _ = quasipolynomial(point)
     return np.asarray(ill_posed(c[..., 0, :]) | (_counts(point) == sums.INFINITE))
 
 
@@ -67,7 +67,7 @@ def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
 
     Of the highest derivative, that of bodies without mass, what is delayed outweighs what acts at once.
     """
-    c, _ = quasi(point)
+    c, _ = quasipolynomial(point)
     if not point.model.delays or ill_posed(c[0]) or _counts(point) != sums.INFINITE:
         return ()
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
@@ -84,7 +84,9 @@ def ill_posed(c: Array) -> NDArray[np.bool_]:
 
 def static_sum(point: OperatingPoint) -> Array:
     """The static stiffness: the value of the characteristic function at s = 0."""
-    return characteristic(point)[..., 0] if not point.model.delays else np.sum(quasi(point)[0][..., 0], axis=-1)
+    return (
+        characteristic(point)[..., 0] if not point.model.delays else np.sum(quasipolynomial(point)[0][..., 0], axis=-1)
+    )
 
 
 @question
@@ -92,13 +94,13 @@ def nearness(point: OperatingPoint) -> Array:
     """Two functions of rigs, (2, ...), that pass through zero where a root crosses the axis, in pairs or alone."""
     if not point.model.delays:
         return damping_measures(spectrum(point))
-    return sums.nearness(*quasi(point))
+    return sums.nearness(*quasipolynomial(point))
 
 
 def crossing_frequency(point: OperatingPoint) -> float:
     """Imaginary part (rad/s) of the root nearest to the axis, of a single rig on an edge; 0 without oscillation."""
     if point.model.delays:
-        c, h = quasi(point)
+        c, h = quasipolynomial(point)
         return sums.nearest_to_axis(c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0]).imag
     found = spectrum(point).ravel()
     found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]

@@ -19,9 +19,9 @@ from steadyslip.linear.spectrum import is_ill_posed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.descriptor import Matrices, blocks_of, described
+from steadyslip.model.descriptor import Matrices, blocks_of, descriptor
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.range import beyond_range, require_range
+from steadyslip.model.range import out_of_range_error, require_range
 from steadyslip.model.sliding import explain_absence, steady_state
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ def state_matrices(
         raise NotAvailable("ill-posed: the friction law does not determine the motion (its direct effect is zero)")
     blocks = blocks_of(point, outputs, known)
     if not all(np.all(np.isfinite(block)) for block in blocks):
-        raise beyond_range(point)
-    found = described(model, known, blocks).solved(outputs, inputs)
+        raise out_of_range_error(point)
+    found = descriptor(model, known, blocks).solved(outputs, inputs)
     _require_eigenvalues(point, found.a)
     shares = [_pressure_of(rig, name) for name in found.inputs]
     return replace(found, b=found.b * shares, d=found.d * shares)

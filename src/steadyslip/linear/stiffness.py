@@ -33,7 +33,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import stiffness_split
 from steadyslip.model.point import OperatingPoint, Vary, operating_point, stacked
-from steadyslip.model.range import in_range, quasi, require_range, surely_in_range, warn_of_range
+from steadyslip.model.range import in_range, quasipolynomial, require_range, surely_in_range, warn_of_range
 from steadyslip.model.steady import steady_equation
 
 STIFFNESS = "slider.stiffness"
@@ -165,7 +165,7 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     def kernel(part: OperatingPoint) -> Array:
         with np.errstate(invalid="ignore"):
             rate = np.max(np.where(np.isnan(found := best_spectrum(part).real), -np.inf, found), axis=-1)
-        known = np.all(np.isfinite(quasi(part)[0]), axis=(-2, -1))
+        known = np.all(np.isfinite(quasipolynomial(part)[0]), axis=(-2, -1))
         return np.where(is_ill_posed(part), np.inf, np.where(known, rate, np.nan))
 
     return point.wrap(in_chunks(point, kernel), "growth_rate", "1/s")

@@ -1,6 +1,6 @@
-"""The Model: everything that is known of a rig, as expressions; the waist through which all later stages go.
+"""The Model: the symbolic equations of a rig, from which all later stages are derived.
 
-It knows laws and machines by what their methods return, and no stage that asks it: neither kernels nor protocols.
+This folder depends on the methods of laws and rigs; it does not depend on kernels, motion or stability.
 """
 
 from steadyslip.model.build import build_model

@@ -1,4 +1,4 @@
-"""From a rig to its Model: symbols in place of the numbers, and the parts joined."""
+"""Model of a rig: its numbers are replaced by symbols, and the mechanism is assembled; cached by structure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
 
 RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
-"""Letters of the equations' own."""
+"""Letters that the equations use, which parameters cannot have."""
 _LETTERS = {
     "slider.stiffness": "k",
     "slider.mass": "m",
@@ -31,28 +31,28 @@ _LETTERS = {
 
 @checked()
 def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
-    """The model of a rig.
+    """Build the Model of a rig.
 
     Parameters
     ----------
     rig : Slider or Machine
-        The rig; its numbers do not matter, only its structure (models are shared between rigs).
+        Rig; only its structure matters, not its numbers (rigs of one structure share a Model).
     present : iterable of str
-        Dotted names of parameters kept as symbols although they are zero, such as ``slider.mass`` when it
-        is about to be varied.
+        Dotted names of parameters that are kept as symbols although they are zero, such as ``slider.mass`` if it is
+        about to be varied.
     """
     return model_of(rig, present)
 
 
 def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model:
-    """`build_model` without its checks, of a drive that moves, that pulls with a force of its own, or both by turns."""
+    """Build the Model without checks; `drive` is `MOVED`, `PULLED` or `EITHER`."""
     kept = frozenset(present)
     key = (shape_of(rig), kept, drive)
     return _build_cached(_Structure(key, rig, kept, drive))
 
 
 class _Structure:
-    """A rig that compares equal to every other of the same structure."""
+    """Cache key that makes rigs of the same structure equal."""
 
     def __init__(self, key: Any, rig: Rig, present: frozenset[str], drive: str) -> None:
         self.key, self.rig, self.present, self.drive = key, rig, present, drive
@@ -77,7 +77,7 @@ def _build_cached(structure: _Structure) -> Model:
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:
-    """A symbol for every given parameter, and its letter; structural zeros stay zero, gauges stay symbols."""
+    """Symbols of the given parameters by dotted name, and their letters; structural zeros stay the number zero."""
     symbols: dict[str, Any] = {}
     every = parameters(rig)
     declared = Counter(address.role.letter for address in every.values())
@@ -100,6 +100,6 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
 
 
 def _declared_letter(address: Address, declared: Mapping[str, int]) -> str:
-    """The letter that is declared for a parameter, unless others have the same or it is one of the equations' own."""
+    """Letter declared for a parameter; empty if another parameter or the equations use the same."""
     letter = address.role.letter
     return letter if declared[letter] == 1 and letter not in (*RESERVED, *_LETTERS.values()) else ""

@@ -1,8 +1,8 @@
-"""The linearised rig in numbers, before the balances of forces are solved.
+"""Numerical descriptor system (differential-algebraic form) of the linearised rig, and its state-space matrices.
 
-Beside the rates of the Model's variables stand the balances: equations without rates, for accelerations, frictions, and
-velocities of what has no mass. Where these cannot be solved for them, as for a body without mass between two springs,
-places follow from each other: one of them is no state then, and what the balance says of places it says of velocities.
+The algebraic equations are the balances, for accelerations, friction stresses and velocities of massless bodies. If
+they are singular in these, as for a massless body between two springs, they constrain displacements: one of those is
+no state then, and the balance is differentiated (index reduction).
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, stacked
 
-NOTHING = 1e-11  # of the largest: what is left of numbers of size one that cancel
-PIVOT = 1e-6  # of the largest: what may be divided by
+ZERO_TOLERANCE = 1e-11  # relative to the largest number; cancelled sums of some numbers leave less; chosen by trial
+LEAST_PIVOT = 1e-6  # relative to the largest; a smaller pivot would lose six of 16 digits; chosen by trial
 UNDETERMINED = "ill-posed: the balances of forces do not determine the motion"
 
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
-    """A, B, C, D, and the names of states, inputs and outputs."""
+    """State-space matrices A, B, C, D, and the names of states, inputs and outputs."""
 
     a: Array
     b: Array
@@ -40,7 +40,7 @@ class Matrices:
     outputs: tuple[str, ...]
 
     def blocks(self) -> tuple[Array, Array, Array, Array]:
-        """The matrices alone."""
+        """Matrices A, B, C, D."""
         return self.a, self.b, self.c, self.d
 
 
@@ -48,7 +48,8 @@ class Matrices:
 class Descriptor:
     """x' = A x + B u + C z, y = D x + E u + F z, 0 = P x + Q u + R z, in this order.
 
-    `first` says which x go first where one of several has to.
+    x are the states, u the inputs, y the outputs, z the algebraic unknowns. `first` marks the x that index reduction
+    preferably removes.
     """
 
     states: tuple[str, ...]
@@ -65,24 +66,28 @@ class Descriptor:
     balance_z: Array
 
     def solved(self, outputs: tuple[str, ...], wanted: Sequence[str] | None) -> Matrices:
-        """The matrices; without what would have to be differentiated, unless it is wanted."""
+        """Reduce to state-space matrices.
+
+        Inputs that would have to be differentiated are left out if `wanted` is None; otherwise, if they are wanted,
+        NotAvailable is raised.
+        """
         here, kept = self, list(self.inputs if wanted is None else wanted)
         for _ in range(len(self.states) + 1):
-            bound = here._bound()
+            bound = here._singular_balances()
             if bound is None:
                 break
             rows, left = bound
-            felt = np.abs(left @ here.balance_u) > NOTHING * np.max(np.abs(left), axis=1)[:, None] * np.max(
+            acts = np.abs(left @ here.balance_u) > ZERO_TOLERANCE * np.max(np.abs(left), axis=1)[:, None] * np.max(
                 np.abs(np.concatenate([here.balance_u, here.balance_x], axis=1))
             )
-            lost = [name for i, name in enumerate(here.inputs) if name in kept and np.any(felt[:, i])]
-            if lost and wanted is not None:
+            differentiated = [name for i, name in enumerate(here.inputs) if name in kept and np.any(acts[:, i])]
+            if differentiated and wanted is not None:
                 raise NotAvailable(
-                    f"{lost[0]} moves a body without mass at once, so that velocities follow from its rate and there "
-                    "is no state space; give the body a mass or a dashpot, or name other inputs"
+                    f"{differentiated[0]} moves a body without mass at once, so that velocities follow "
+                    "from its rate and there is no state space; give the body a mass or a dashpot, or name other inputs"
                 )
-            kept = [name for name in kept if name not in lost]
-            here = here._without(rows, left)
+            kept = [name for name in kept if name not in differentiated]
+            here = here._index_reduced(rows, left)
         else:
             raise NotAvailable(UNDETERMINED)
         of = [here.inputs.index(name) for name in kept]
@@ -94,15 +99,15 @@ class Descriptor:
             here.states, tuple(kept), outputs,
         )  # fmt: skip
 
-    def _bound(self) -> tuple[NDArray[np.int64], Array] | None:
-        """Balances that z does not enter: which rows may go for them, and their combinations; None where z is fixed."""
+    def _singular_balances(self) -> tuple[NDArray[np.int64], Array] | None:
+        """Combinations of balances in which z cancels: rows to replace, and coefficients; None if there are none."""
         matrix = self.balance_z
         rows = np.max(np.abs(np.hstack([matrix, self.balance_x])), axis=1)
         even = matrix / np.where(rows > 0, rows, 1.0)[:, None]
         columns = np.max(np.abs(even), axis=0)
         even = even / np.where(columns > 0, columns, 1.0)
         left, sizes, _ = np.linalg.svd(even)
-        free = np.flatnonzero(sizes <= NOTHING * max(float(np.max(sizes, initial=0.0)), 1.0))
+        free = np.flatnonzero(sizes <= ZERO_TOLERANCE * max(float(np.max(sizes, initial=0.0)), 1.0))
         if not len(free):
             return None
         from scipy.linalg import qr  # slow to import
@@ -111,18 +116,18 @@ class Descriptor:
         gone = qr(combined, pivoting=True, mode="r")[-1][: len(free)]
         return np.asarray(gone, dtype=np.int64), combined / np.where(rows > 0, rows, 1.0)
 
-    def _without(self, rows: NDArray[np.int64], left: Array) -> Descriptor:
-        """Those balances differentiated, in place of `rows`, and as many states fewer."""
+    def _index_reduced(self, rows: NDArray[np.int64], left: Array) -> Descriptor:
+        """Replace `rows` by the time derivatives of the combinations `left`, and remove as many states."""
         constraint = left @ self.balance_x
         count, n = constraint.shape
         gone: list[int] = []
         work = constraint.copy()
-        for i in range(count):  # elimination, what is to go first as pivots
+        for i in range(count):  # Gauss elimination; the preferred states are pivots if large enough
             others = np.setdiff1d(np.arange(n), gone)
             best = np.max(np.abs(work[i:, others]), axis=0)
             if not np.any(best > 0):
                 raise NotAvailable(UNDETERMINED)
-            usable = best > PIVOT * np.max(best)
+            usable = best > LEAST_PIVOT * np.max(best)
             j = int(others[np.argmax(np.where(usable & self.first[others], np.inf, best))])
             row = i + int(np.argmax(np.abs(work[i:, j])))
             work[[i, row]] = work[[row, i]]
@@ -131,7 +136,7 @@ class Descriptor:
             work[below] -= np.outer(work[below, j], work[i])
             gone.append(j)
         kept = [j for j in range(n) if j not in gone]
-        whole = np.zeros((n, len(kept)))  # all x from those that stay
+        whole = np.zeros((n, len(kept)))  # all x as linear functions of the remaining ones
         whole[kept, range(len(kept))] = 1.0
         whole[gone] = -work[:, kept]
         others = np.delete(np.arange(len(self.balance_z)), rows)
@@ -151,12 +156,12 @@ class Descriptor:
 
 
 @question
-def parts_function(
+def block_function(
     model: Model, outputs: tuple[str, ...], inputs: tuple[str, ...], at_once: tuple[sp.Expr, ...] = ()
 ) -> tuple[ArrayFunction, list[tuple[int, int]]]:
-    """Entries of the nine blocks of a `Descriptor`, and their shapes.
+    """Array function of the entries of a `Descriptor`'s nine blocks, and the shapes of the blocks.
 
-    What acts after a delay that is in `at_once` acts without it, what acts after another not at all.
+    Terms with a delay in `at_once` act without delay, terms with another delay are left out.
     """
     linear = linearise(model)
     variables = [item.symbol for item in model.variables]
@@ -183,8 +188,8 @@ def parts_function(
 def blocks_of(
     point: OperatingPoint, outputs: tuple[str, ...], inputs: tuple[str, ...], at_once: tuple[sp.Expr, ...] = ()
 ) -> list[Array]:
-    """Numbers of the blocks of a `Descriptor`, each (..., rows, columns)."""
-    function, shapes = parts_function(point.model, outputs, inputs, at_once)
+    """Values of the nine blocks of a `Descriptor` at a point, each (..., rows, columns)."""
+    function, shapes = block_function(point.model, outputs, inputs, at_once)
     with np.errstate(all="ignore"):
         found = stacked(point.evaluate(function), point)
     ends = np.cumsum([rows * columns for rows, columns in shapes])
@@ -192,8 +197,8 @@ def blocks_of(
     return [part.reshape(*point.shape, *shape) for part, shape in zip(parts, shapes, strict=True)]
 
 
-def described(model: Model, inputs: tuple[str, ...], blocks: Sequence[Array]) -> Descriptor:
-    """A `Descriptor` of blocks of numbers."""
+def descriptor(model: Model, inputs: tuple[str, ...], blocks: Sequence[Array]) -> Descriptor:
+    """Make the `Descriptor` of one rig from its blocks."""
     massless = {one.displacement for one in model.coordinates if not one.inertial}
     first = np.array([item.symbol in massless for item in model.variables])
     return Descriptor(tuple(item.name for item in model.variables), inputs, first, *blocks)

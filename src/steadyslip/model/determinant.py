@@ -1,8 +1,8 @@
-"""Determinants of matrices of polynomials in s and in exp(−s delay), whose coefficients are expressions.
+"""Exact determinants of matrices of polynomials in s and exp(−s delay) with symbolic coefficients.
 
-Exact in the structure: what cancels whatever the numbers are, of stiffnesses and dampings of several bodies, does so
-here. A machine's contacts are first taken out of the matrix: memory and friction of each come down to one row, whose
-few entries stand as symbols for polynomials of their own, so that terms do not multiply with states and powers of s.
+Terms that cancel for all values of stiffnesses, dampings and inertias cancel exactly. For machines, the rows of memory
+and friction of each contact are first condensed to one row, whose entries are symbols for polynomials, so that the
+number of terms does not grow with states and powers of s.
 """
 
 from __future__ import annotations
@@ -16,33 +16,39 @@ from sympy.polys.domains import ZZ
 from steadyslip.core.errors import InternalError
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import Model
-from steadyslip.model.stand_ins import StandIns
+from steadyslip.model.placeholders import Placeholders
 
 Powers = tuple[int, ...]
-"""Of s, then of exp(−s delay) of each delay."""
+"""Exponents: of s, then of exp(−s delay) for each delay."""
 Polynomial = dict[Powers, sp.Expr]
-"""Coefficients; what is zero is not in it."""
+"""Nonzero coefficients by exponents."""
 Rows = Mapping[sp.Symbol, list[Polynomial]]
 Terms = list[tuple[Powers, Any]]
-LONGEST = 4000
-"""Terms of a minor beyond which writing the determinant of a machine out takes longer than its answers."""
+MAX_TERMS = 4000
+"""Number of terms of a minor above which the symbolic determinant takes longer than numerical eigenvalues; by trial."""
 
 
-class TooLong(Exception):
-    """A determinant with more terms than are of use."""
+class TooManyTerms(Exception):
+    """A determinant exceeds the allowed number of terms."""
 
 
 def determinant(
     matrix: list[list[Polynomial]], longest: int | None = None
 ) -> tuple[list[sp.Symbol], dict[Powers, Terms]]:
-    """Symbols, and by powers the coefficients of a determinant as polynomials in them: powers of each, and numbers.
+    """Expand a determinant whose entries are polynomials in symbols with integer coefficients.
 
-    Exact: by rows, each minor of the rows below once. Entries are polynomials in symbols with whole coefficients.
+    Laplace expansion by rows; each minor of the rows below is computed once.
+
+    Returns
+    -------
+    names : list of sympy.Symbol
+    parts : dict
+        By exponents of s and delays: the coefficient as list of (exponents of `names`, integer).
 
     Raises
     ------
     TooLong
-        If there are more than so many terms.
+        If a minor has more than `longest` terms.
     """
     names = sorted({n for row in matrix for entry in row for e in entry.values() for n in e.free_symbols}, key=str)
     width = max((len(powers) for row in matrix for entry in row for powers in entry), default=1)
@@ -52,7 +58,7 @@ def determinant(
     known = {frozenset[int](): ring.one}
 
     def minor(columns: frozenset[int]) -> Any:
-        """Of the last rows, as many as there are columns."""
+        """Minor of given columns and as many last rows."""
         if columns not in known:
             row, total, sign = table[len(table) - len(columns)], ring.zero, 1
             for column in sorted(columns):
@@ -61,7 +67,7 @@ def determinant(
                 sign = -sign
             known[columns] = total
             if longest is not None and len(total) > longest:
-                raise TooLong
+                raise TooManyTerms
         return known[columns]
 
     parts: dict[Powers, Terms] = {}
@@ -81,7 +87,7 @@ def _in_ring(entry: Polynomial, ring: Any) -> Any:
 
 
 def machine_determinant(model: Model, rows: Rows) -> Polynomial:
-    """The determinant of the characteristic matrix of a machine.
+    """Determinant of the characteristic matrix of a machine.
 
     Raises
     ------
@@ -96,30 +102,30 @@ def machine_determinant(model: Model, rows: Rows) -> Polynomial:
     table = list(rows.items())
     if any(row[j] for i, (_, row) in enumerate(table) for j in inside.difference(kept) if i not in inside):
         raise InternalError("memory of friction acts by way of friction only")
-    stand_ins = StandIns()
+    placeholders = Placeholders()
     forces = {one.velocity for one in model.coordinates}
     matrix = []
     for place in core:
         name, row = table[place]
-        stand_in = stand_ins.polynomial if name in forces else lambda e: -stand_ins.whole(-e)
+        stand_in = placeholders.polynomial if name in forces else lambda e: -placeholders.symbol_for(-e)
         matrix.append([{powers: stand_in(e) for powers, e in row[column].items()} for column in kept])
     nothing = (0,) * (1 + len(model.delays))
     for block in blocks:
         own = [block.symbols.get(place) for place in core]
         own += [block.whole if other is block else block.symbols.get(other.own[-1]) for other in blocks]
         matrix.append([{} if symbol is None else {nothing: symbol} for symbol in own])
-    names, found = determinant(matrix, LONGEST)
-    meant = {symbol: value for block in blocks for symbol, value in block.meant.items()}
-    factors = [stand_ins.back(name) for name in names]
-    levels = [[i for i, name in enumerate(names) if name in block.meant] for block in blocks]
+    names, found = determinant(matrix, MAX_TERMS)
+    values = {symbol: value for block in blocks for symbol, value in block.values.items()}
+    factors = [placeholders.restored(name) for name in names]
+    levels = [[i for i, name in enumerate(names) if name in block.values] for block in blocks]
     terms = [(powers, inner, number) for powers, polynomial in found.items() for inner, number in polynomial]
-    return _joined(terms, levels, [meant.get(name) for name in names], factors)
+    return _substituted(terms, levels, [values.get(name) for name in names], factors)
 
 
 class _Block:
-    """Memory and friction of a contact as one row of the matrix: D τ + Σ G_j x_j = 0, by Cramer's rule.
+    """Memory and friction of a contact condensed to one row of the matrix: D τ + Σ G_j x_j = 0, by Cramer's rule.
 
-    `symbols` stand for the G_j by column, `whole` for D; `meant` says what they are.
+    `symbols` are the symbols of G_j by column, `whole` is that of D; `values` has the polynomials of all.
     """
 
     def __init__(self, rows: Rows, columns: Mapping[sp.Symbol, int], index: int, model: Model) -> None:
@@ -131,32 +137,37 @@ class _Block:
         square = [[table[i][j] for j in self.own] for i in self.own]
         outside = [j for j in columns.values() if j not in self.own and any(table[i][j] for i in self.own)]
         self.whole = inner_symbol(f"D.{index}")
-        self.meant = {self.whole: _expanded(square)}
+        self.values = {self.whole: _small_determinant(square)}
         self.symbols: dict[int, sp.Symbol] = {}
         for j in outside:
             replaced = [[*line[:-1], table[i][j]] for i, line in zip(self.own, square, strict=True)]
-            value = _expanded(replaced)
+            value = _small_determinant(replaced)
             if value:
                 self.symbols[j] = inner_symbol(f"G.{index}.{j}")
-                self.meant[self.symbols[j]] = value
+                self.values[self.symbols[j]] = value
 
 
-def _expanded(matrix: list[list[Polynomial]]) -> Polynomial:
-    """A small determinant, its coefficients as expressions."""
-    stand_ins = StandIns()
-    symbols = [[{powers: -stand_ins.whole(-e) for powers, e in entry.items()} for entry in row] for row in matrix]
+def _small_determinant(matrix: list[list[Polynomial]]) -> Polynomial:
+    """Determinant of a small matrix, with expressions as coefficients."""
+    placeholders = Placeholders()
+    symbols = [
+        [{powers: -placeholders.symbol_for(-e) for powers, e in entry.items()} for entry in row] for row in matrix
+    ]
     names, found = determinant(symbols)
-    factors = [stand_ins.back(name) for name in names]
+    factors = [placeholders.restored(name) for name in names]
     return {powers: _nested(c, factors) for powers, c in found.items()}
 
 
-def _joined(
+def _substituted(
     terms: list[tuple[Powers, Powers, Any]],
     levels: list[list[int]],
-    meant: list[Polynomial | None],
+    values: list[Polynomial | None],
     factors: list[sp.Expr],
 ) -> Polynomial:
-    """The sum of all terms, with what symbols of contacts stand for, contact by contact; each has one in every term."""
+    """Sum of all terms with the symbols of contacts replaced by their polynomials, contact by contact.
+
+    Every term contains exactly one symbol of each contact; `levels` has the indices of these symbols by contact.
+    """
     if not levels:
         groups: dict[Powers, Terms] = {}
         for powers, inner, number in terms:
@@ -170,23 +181,23 @@ def _joined(
         by_symbol.setdefault(chosen, []).append((powers, without, number))
     sums: dict[Powers, list[sp.Expr]] = {}
     for chosen, group in by_symbol.items():
-        other = _joined(group, rest, meant, factors)
-        for mine, value in (meant[chosen] or {}).items():
+        other = _substituted(group, rest, values, factors)
+        for mine, value in (values[chosen] or {}).items():
             for powers, e in other.items():
                 both = tuple(a + b for a, b in zip(mine, powers, strict=True))
                 sums.setdefault(both, []).append(sp.Mul(value, e, evaluate=False))
     return {powers: sp.Add(*parts, evaluate=False) if len(parts) > 1 else parts[0] for powers, parts in sums.items()}
 
 
-def expanded(terms: Terms, factors: list[sp.Expr]) -> sp.Expr:
-    """A polynomial as the sum of its terms."""
+def sum_of_terms(terms: Terms, factors: list[sp.Expr]) -> sp.Expr:
+    """Expression of a polynomial as a plain sum of terms."""
     return sp.Add(*(sp.Mul(int(n), *(f**p for f, p in zip(factors, powers, strict=True) if p)) for powers, n in terms))
 
 
 def _nested(terms: Terms, factors: list[sp.Expr], first: int = 0) -> sp.Expr:
-    """A polynomial with each factor taken out of the terms that have it, one after the other: thousands stay few.
+    """Expression of a polynomial in Horner-like form, each factor taken out of the terms that contain it.
 
-    Nothing is added that was not: what cancels had cancelled in `terms`.
+    This shortens polynomials of thousands of terms; nothing needs to cancel any more, as `terms` are distinct.
     """
     if len(terms) == 1:
         powers, number = terms[0]

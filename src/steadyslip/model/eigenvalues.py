@@ -1,7 +1,7 @@
-"""The characteristic polynomial in numbers, where its coefficients are too long to be written out: from eigenvalues.
+"""Numerical characteristic polynomial from eigenvalues, for machines whose symbolic coefficients are too long.
 
-The eigenvalues are those of the state matrix; the factor before the highest power follows from the determinant of the
-characteristic matrix at one place. What cancels for structural reasons has not cancelled exactly here.
+The roots are the eigenvalues of the state matrix; the leading coefficient follows from the determinant of the
+characteristic matrix at one real s. Structural cancellations are subject to rounding here.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
-from steadyslip.model.descriptor import blocks_of, described
+from steadyslip.model.descriptor import blocks_of, descriptor
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_rows, sets_of_delays
 from steadyslip.model.point import OperatingPoint, stacked
@@ -23,11 +23,11 @@ Delays = tuple[sp.Expr, ...]
 
 
 @question
-def by_eigenvalues(point: OperatingPoint) -> list[Array]:
-    """Coefficients of the polynomial of every term of the characteristic equation, (..., n+1), lowest power first.
+def coefficients_from_eigenvalues(point: OperatingPoint) -> list[Array]:
+    """Coefficients of the polynomial of each term of the characteristic equation, (..., n+1), lowest power first.
 
-    Terms are as `steadyslip.model.linearisation.sets_of_delays` has them. The determinant is linear in each
-    exp(−s delay): from what it is with and without each follow the terms.
+    Terms are ordered as in `steadyslip.model.linearisation.sets_of_delays`. The determinant is linear in each
+    exp(−s delay), so the terms are differences of determinants with and without each delayed action.
     """
     sets = sets_of_delays(point.model)
     whole = {late: _polynomial(point, late) for late in sets}
@@ -42,9 +42,10 @@ def by_eigenvalues(point: OperatingPoint) -> list[Array]:
 
 @question
 def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.complex128]:
-    """Eigenvalues (1/s), (..., n), by falling real part, with these delays acting at once, the others not at all.
+    """Eigenvalues (1/s), (..., n), by falling real part.
 
-    NaN without steady sliding, and behind them where bodies without mass leave fewer states.
+    Terms with the delays `late` act without delay, other delayed terms are left out. NaN without steady sliding, and as
+    padding if massless bodies leave fewer states.
     """
     with np.errstate(all="ignore"):
         found = _eigenvalues(point, late)
@@ -53,13 +54,13 @@ def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.compl
 
 
 def _polynomial(point: OperatingPoint, late: Delays) -> Array:
-    """With these delays acting at once, the others not at all."""
+    """Polynomial coefficients (..., n+1) if terms with delays `late` act without delay and others are left out."""
     with np.errstate(all="ignore"):
         roots = eigenvalues_of(point, late)
         size = np.abs(roots)
         some = np.where(size > 0, size, 1.0)
         place = np.exp(np.mean(np.log(some), axis=-1)) if roots.shape[-1] else np.ones(point.shape)
-        sign, logarithm = np.linalg.slogdet(_matrix(point, late, place))
+        sign, logarithm = np.linalg.slogdet(_characteristic_matrix(point, late, place))
         apart = place[..., None] - roots
         logarithm = logarithm - np.sum(np.log(np.abs(apart)), axis=-1)
         sign = sign * np.prod(np.where(roots.imag == 0, np.sign(apart.real), 1.0), axis=-1)
@@ -72,7 +73,7 @@ def _polynomial(point: OperatingPoint, late: Delays) -> Array:
 
 
 def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
-    """Of the state matrix, in any order."""
+    """Eigenvalues of the state matrix in any order, (..., n)."""
     blocks = blocks_of(point, (), (), late)
     rate_x, rate_z, balance_x, balance_z = (blocks[i] for i in (0, 2, 6, 8))
     good = np.all([np.all(np.isfinite(one), axis=(-2, -1)) for one in (rate_x, rate_z, balance_x, balance_z)], axis=0)
@@ -85,7 +86,7 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
         found = np.linalg.eigvals(np.where(good[..., None, None], state, 0.0)).astype(complex)
         return np.where(good[..., None], found, np.nan)
     flat = [block.reshape(good.size, *block.shape[-2:]) for block in blocks]
-    rows = [_alone(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
+    rows = [_single_rig(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
     width = max((len(row) for row in rows if row is not None), default=0)
     table = np.full((len(rows), width), np.nan, dtype=complex)
     for i, row in enumerate(rows):
@@ -94,16 +95,16 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
     return table.reshape(*good.shape, width)
 
 
-def _alone(model: Model, blocks: list[Array]) -> NDArray[np.complex128] | None:
-    """Eigenvalues of a single rig; None where the balances do not determine the motion."""
+def _single_rig(model: Model, blocks: list[Array]) -> NDArray[np.complex128] | None:
+    """Eigenvalues of a single rig; None if the balances do not determine the motion."""
     try:
-        return np.asarray(np.linalg.eigvals(described(model, (), blocks).solved((), ()).a), dtype=complex)
+        return np.asarray(np.linalg.eigvals(descriptor(model, (), blocks).solved((), ()).a), dtype=complex)
     except NotAvailable:
         return None
 
 
-def _matrix(point: OperatingPoint, late: Delays, place: Array) -> Array:
-    """The characteristic matrix at a real place (...), 1/s."""
+def _characteristic_matrix(point: OperatingPoint, late: Delays, place: Array) -> Array:
+    """Characteristic matrix at real s = `place` (..., in 1/s), shape (..., n, n)."""
     function, entries = _entries(point.model, late)
     numbers = stacked(point.evaluate(function), point)
     n = 1 + max(row for row, _, _ in entries)
@@ -116,7 +117,7 @@ def _matrix(point: OperatingPoint, late: Delays, place: Array) -> Array:
 
 @question
 def _entries(model: Model, late: Delays) -> tuple[ArrayFunction, list[tuple[int, int, int]]]:
-    """What is not zero of the characteristic matrix, and its row, column and power of s."""
+    """Array function of the nonzero entries of the characteristic matrix, and row, column and power of s of each."""
     wanted, places = [], []
     for i, row in enumerate(characteristic_rows(model).values()):
         for j, entry in enumerate(row):

@@ -1,4 +1,4 @@
-"""The Model: the equations of one rig in symbols. Every later stage reads this and nothing else."""
+"""The Model class: symbolic equations of a rig, with variables, coordinates and contacts."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from steadyslip.core.symbols import inner_symbols
 
 @dataclass(frozen=True)
 class Variable:
-    """A differential variable of the model: name, symbol, SI unit, meaning.
+    """Differential variable of the Model: name, symbol, SI unit, meaning.
 
-    `kind` says what it is to the stages that must know: ``slip``, ``velocity``, ``memory`` (of friction),
-    ``state`` (of a contact law) or ``integral`` (of a controller).
+    `kind` is ``slip``, ``velocity``, ``memory`` (of friction), ``state`` (of a contact law), ``integral`` (of a
+    controller) or ``held`` (force of a released drive).
     """
 
     name: str
@@ -33,24 +33,24 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Coordinate:
-    """One way in which a body moves.
+    """Coordinate of a body.
 
     Attributes
     ----------
     name : str
-        Of the body, and what it moves in where that is not along the slide.
+        Name of the body, with a suffix for motion away from the surface.
     displacement, velocity, acceleration : sympy.Symbol
-        The first counts from steady sliding.
+        The displacement is relative to steady sliding.
     inertia, speed : sympy.Expr
         Mass or moment of inertia, and the speed in steady sliding.
     inertial : bool
-        Whether velocity is a variable of its own (inertia, or a normal stress that feels acceleration).
+        True if the velocity is a variable (with inertia, or if a normal stress depends on the acceleration).
     balance : sympy.Expr or None
-        Inertia less forces, zero in motion; None where the balance of a contact stands in its place.
+        Inertia minus forces, zero in motion; None for a slider, whose contact has the only balance.
     unit : str
-        Of the displacement.
+        Unit of the displacement, m or rad.
     push : sympy.Symbol
-        A disturbance that acts on it, a force or torque; on a slider a stress.
+        Disturbance acting on the coordinate: a force or torque, on a slider a stress.
     """
 
     name: str
@@ -67,43 +67,43 @@ class Coordinate:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Where one body slides on another: an algebraic equation with its unknown, and the steady normal stress.
+    """Contact with its algebraic equation and unknown, and its steady normal stress.
 
     Attributes
     ----------
     name : str
-        Of the contact; empty where there is but one.
+        Name of the contact; empty for a slider.
     slip, velocity, acceleration : sympy.Expr
-        x, v and its rate, of the surfaces against each other; the velocity is a symbol.
+        Slip x, slip rate v (a symbol) and its time derivative.
     spring, friction, normal : sympy.Symbol
-        Stresses T, τ and σ, which the Model's `definitions` define.
+        Stresses T, τ and σ; expressions are in the Model's `definitions`.
     memory : tuple of Variable
-        The memory variables of its friction.
+        Memory variables of the friction law.
     own_states : tuple of Variable
-        Those of its contact law, kind ``state``.
+        States of the contact law, of kind ``state``.
     balance : sympy.Expr
-        Friction law minus τ by the balance of forces; zero in motion.
+        Friction stress by the law minus τ; zero in motion.
     unknown : sympy.Symbol
-        What `balance` fixes: friction τ; or, where a single block has a single contact, so that the balance of forces
-        gives τ, `acceleration`, or without inertia `velocity`.
+        Unknown determined by `balance`: τ; for a slider, whose τ follows from the balance of forces, the
+        `acceleration`, or the `velocity` without inertia.
     area : sympy.Expr
-        Over which the stresses act.
+        Area (m²) over which the stresses act; 1 for laws in forces.
     press : sympy.Symbol
-        A disturbance of the normal stress.
+        Disturbance of the normal stress.
     outside : sympy.Symbol or None
-        Change of the pressure around, of a contact law with pore fluid.
+        Change of the surrounding pressure, for a contact law with pore fluid.
     sigma_ss : sympy.Symbol
         Normal stress in steady sliding.
     steady_stress : sympy.Expr
-        What the contact law makes of `sigma_ss`; equal to it in steady sliding.
+        Normal stress by the contact law at `sigma_ss`; equal to it in steady sliding.
     steady_coupling : sympy.Expr
-        The part of it that is due to the motion.
+        Part of `steady_stress` that is due to the motion.
     steady_load : sympy.Expr or None
-        The contact's load σ0; None where the steady normal stress is given.
+        Load σ0; None if the steady normal stress is given instead.
     imposed : sympy.Expr
         Prescribed change of normal stress with time.
     direction : sympy.Expr
-        What motion takes for sign(v), as its friction law states it: a step at rest cannot be integrated.
+        Smooth replacement of sign(v) in simulations, by the friction law.
     """
 
     name: str
@@ -129,39 +129,39 @@ class Contact:
 
     @property
     def inertial(self) -> bool:
-        """Whether velocity is a variable of its own (mass, or normal stress that feels acceleration)."""
+        """True if `balance` determines an acceleration (with mass, or a normal stress that depends on acceleration)."""
         return self.unknown is self.acceleration
 
 
 V_LP, Q, P, TIME = inner_symbols("v_lp q p t", real=True)
-"""Velocity of the load point, the first push, the first normal stress that is added, and time."""
+"""Symbols of load-point velocity, first disturbance, first added normal stress, and time."""
 HELD = "held back"
-"""Name of the variable `LettingGo.held`, which no variable of a law can have."""
+"""Name of the variable `LettingGo.held`; laws cannot use it because of the space."""
 MOVED, PULLED, EITHER = "moved", "pulled", "either"
-"""What a drive does in the course of a run: it moves, it pulls with a force of its own, or both by turns."""
+"""Modes of a drive during a run: its motion is prescribed, its force is imposed, or both alternate."""
 
 
 @dataclass(frozen=True, eq=False)
 class LettingGo:
-    """What there is to know of a drive that is moved and let go by turns.
+    """Expressions for a drive that is alternately moved and released (force imposed).
 
     Attributes
     ----------
     free : sympy.Symbol
-        Input, 1 while the drive pulls with a force of its own, else 0.
+        Input: 1 while the force is imposed, else 0.
     held : sympy.Symbol
-        Variable: by how much the force of the drive exceeds what its motion since the start would make of it, or while
-        it is free, the force itself less that of steady sliding and less ``loading``. It changes where drives are let
-        go or taken up, so that the force goes on.
+        Variable: force of the drive minus the force that its motion since the start alone would cause; while it is
+        released, the force minus that of steady sliding and minus ``loading``. It changes at release and at the end of
+        it, so that the force is continuous.
     force, driven, steady : sympy.Expr
-        Force of the drive less that of steady sliding; what its motion alone would make of it; that of steady sliding.
-        Of a slider stresses.
+        Force of the drive minus that of steady sliding; the part caused by its motion; the force in steady sliding.
+        Stresses for a slider.
     stiffness : sympy.Expr
-        Of what carries the force of the drive.
+        Stiffness of the elements that carry the force of the drive.
     ahead, speed : sympy.Expr
-        How far the load point is ahead of where steady motion since the start would have it, and how fast that grows.
+        Displacement of the load point ahead of its steady motion since the start, and the rate of that.
     loading_rate : sympy.Symbol
-        Rate of ``loading``.
+        Time derivative of ``loading``.
     """
 
     free: sp.Symbol
@@ -180,18 +180,18 @@ Entries = dict[tuple[int, int], sp.Expr]
 
 @dataclass(frozen=True)
 class Carried:
-    """Linear equations of what is displaced and carried in steady sliding: M z = r + F τ + G σ.
+    """Linear equations M z = r + F τ + G σ of displacements and link forces in steady sliding.
 
     Attributes
     ----------
     symbols : tuple of sympy.Symbol
-        z: displacements, the integral of the controller, forces in elements.
+        z: displacements, controller integral, forces of elements.
     matrix : dict of (int, int) to sympy.Expr
-        M, what is not zero of it.
+        Nonzero entries of M.
     rest : tuple of sympy.Expr
         r.
     friction, normal : dict of (int, int) to sympy.Expr
-        F and G, what is not zero of them; columns are contacts.
+        Nonzero entries of F and G; columns are contacts.
     """
 
     symbols: tuple[sp.Symbol, ...]
@@ -203,18 +203,16 @@ class Carried:
 
 @dataclass(frozen=True, eq=False)
 class Model(Keeper, Displayed):
-    """A rig's equations.
+    """Equations of a rig.
 
-    The variables y obey y' = `rates`; one scalar equation for each contact, its `balance` = 0, fixes that contact's
-    algebraic unknown, its friction; one for each coordinate, its balance of forces, the acceleration, or without
-    inertia the velocity. A single block with a single contact needs but one equation, friction law against forces.
-    Velocities of slip and the stresses T, τ, σ are given by `definitions`, in this order, from variables, unknowns and
-    inputs.
+    The variables y obey y' = `rates`. The `balance` = 0 of each contact determines its friction stress; the balance of
+    forces of each coordinate determines its acceleration, or without inertia its velocity. A slider has one equation
+    for both. Slip rates and the stresses T, τ, σ are given by `definitions`, in this order, as functions of variables,
+    unknowns and inputs.
 
-    A Model answers questions; what is worked out once is kept with it (`steadyslip.core.questions`): its `memory`,
-    expressions `inlined` or `at_steady`, array functions of its parameters (`function`), and, in the modules beside
-    this one, `linearise`, `reduce_model`, `system` (Taylor terms), `steady_equation`. Numbers come with an
-    `operating_point`.
+    Derived expressions and functions are cached with the Model (`steadyslip.core.questions`): its methods here, and in
+    neighbouring modules `linearise`, `reduce_model`, `system` (Taylor terms) and `steady_equation`. Numbers come with
+    an `operating_point`.
 
     Attributes
     ----------
@@ -227,29 +225,29 @@ class Model(Keeper, Displayed):
     coordinates : tuple of Coordinate
     contacts : tuple of Contact
     inputs : dict of str to sympy.Symbol
-        Load-point velocity, disturbance stress q, normal-stress disturbance (B4 of eq. 12), time; of machines,
-        pushes at every coordinate and normal-stress disturbances at every contact. Where there is pore fluid, the
-        change of pressure around; where the force of the drive is imposed, its change, ``loading``.
+        Load-point velocity, disturbance stress q, normal-stress disturbance (B4 of eq. 12), time; for machines a
+        disturbance of every coordinate and every normal stress. With pore fluid the change of the surrounding pressure;
+        with an imposed force of the drive its change, ``loading``.
     parameters : dict of str to sympy.Symbol
-        By dotted name. ``slider.stiffness`` is always the component along the sliding direction.
+        Symbols by dotted name. ``slider.stiffness`` is always the component along the sliding direction.
     roles : dict of str to Parameter
-        What the rig declares of its parameters: unit, domain, meaning.
+        Declarations of the parameters: unit, domain, meaning.
     letters : dict of sympy.Symbol to str
-        By what people know symbols that are not known by their own names, such as those of parameters; see `written`.
+        Display letters of symbols whose letter is not their name, such as parameters; see `written`.
     gain : sympy.Expr
         Stiffness that a controller adds to ``slider.stiffness``.
     axial_share : sympy.Expr or None
-        ``slider.stiffness`` over the axial stiffness, where that is given instead.
+        Ratio of ``slider.stiffness`` to the axial stiffness, if that is given instead.
     steady : dict of sympy.Symbol to sympy.Expr
-        Steady sliding in terms of the parameters and the contacts' `sigma_ss`.
+        Steady values as functions of the parameters and the contacts' `sigma_ss`.
     observables : dict of str to (sympy.Expr, str)
         Named results and their SI units.
     late : dict of sympy.Symbol to (sympy.Symbol, sympy.Expr)
-        Symbols for what a displacement, velocity or integral was some time ago, and how long ago (s).
+        Symbols of delayed displacements, velocities or integrals: the undelayed symbol, and the delay (s).
     letting_go : LettingGo or None
-        Where the drive moves and pulls by turns.
+        For a drive that is alternately moved and released.
     carried : Carried or None
-        Symbols for what links carry in steady sliding, where formulas of that would be too long.
+        Equations of link forces in steady sliding, if their solution would be too long as formulas.
     """
 
     variables: tuple[Variable, ...]
@@ -269,16 +267,16 @@ class Model(Keeper, Displayed):
     letting_go: LettingGo | None = None
     carried: Carried | None = None
 
-    # -- questions
+    # -- properties and expressions
 
     @property
     def contact(self) -> Contact:
-        """The contact of a single block, whose friction follows from its balance of forces.
+        """Contact of a slider.
 
         Raises
         ------
         NotAvailable
-            If the model is of another kind; what asks for this is not ready for it.
+            For machines, which the caller does not support.
         """
         if not self.is_single:
             raise NotAvailable(
@@ -289,90 +287,90 @@ class Model(Keeper, Displayed):
 
     @property
     def is_single(self) -> bool:
-        """Whether this is a block with one contact: theory 1 and its closed forms."""
+        """True for one block with one contact (theory 1)."""
         return len(self.contacts) == len(self.coordinates) == 1 and self.coordinates[0].balance is None
 
     @property
     def has_closed_form(self) -> bool:
-        """Whether the paper's cubic describes it: a slider with one memory variable, no other state and no delay."""
+        """True if the paper's cubic applies: a slider with one memory variable, no other state and no delay."""
         return self.is_slider and len(self.memory) == 1 and not self.integrals and not self.states and not self.delays
 
     @property
     def is_slider(self) -> bool:
-        """Whether it is the model of a slider, with a stiffness k of its own."""
+        """True for the Model of a `Slider`, which has a stiffness k."""
         return self.is_single and "slider.stiffness" in self.parameters
 
     @cached_property
     def inertial(self) -> bool:
-        """Whether every body has a velocity of its own."""
+        """True if the velocity of every coordinate is a variable."""
         return all(one.inertial for one in self.coordinates)
 
     @cached_property
     def delays(self) -> tuple[sp.Expr, ...]:
-        """The delays (s) that are in the equations, each once."""
+        """Distinct delays (s) in the equations."""
         return tuple(dict.fromkeys(delay for _, delay in self.late.values()))
 
     @property
     def imposed(self) -> bool:
-        """Whether some normal stress is prescribed in time."""
+        """True if a normal stress is prescribed in time."""
         return any(contact.imposed != 0 for contact in self.contacts)
 
     @cached_property
     def memory(self) -> tuple[Variable, ...]:
-        """The memory variables of all contacts."""
+        """Memory variables of all contacts."""
         return tuple(item for item in self.variables if item.kind == "memory")
 
     @cached_property
     def states(self) -> tuple[Variable, ...]:
-        """The states of all contact laws."""
+        """States of all contact laws."""
         return tuple(item for item in self.variables if item.kind == "state")
 
     @cached_property
     def integrals(self) -> tuple[Variable, ...]:
-        """What controllers integrate."""
+        """Integral variables of controllers."""
         return tuple(item for item in self.variables if item.kind == "integral")
 
     @property
     def held(self) -> tuple[sp.Symbol, ...]:
-        """The variable that keeps the force of a drive which is let go; none of others."""
+        """Variable `LettingGo.held` as a tuple; empty if the drive is not released."""
         return () if self.letting_go is None else (self.letting_go.held,)
 
     @property
     def arguments(self) -> tuple[sp.Symbol, ...]:
-        """What numbers stand for at an operating point: the parameters, then σss of every contact, then `carried`."""
+        """Symbols with values at an operating point: parameters, σss of every contact, symbols of `carried`."""
         carried = () if self.carried is None else self.carried.symbols
         return (*self.parameters.values(), *(contact.sigma_ss for contact in self.contacts), *carried)
 
     def function(self, expressions: Iterable[sp.Expr], *further: sp.Symbol) -> ArrayFunction:
-        """Expressions as an array function of `arguments` and of further symbols; an operating point calls it."""
+        """Array function of `arguments` and further symbols; `OperatingPoint.evaluate` calls it."""
         return ArrayFunction([*self.arguments, *further], [sp.sympify(e) for e in expressions])
 
     @property
     def rate_of(self) -> dict[sp.Symbol, sp.Expr]:
-        """Time derivatives by variable."""
+        """Time derivatives by the symbol of the variable."""
         return {item.symbol: rate for item, rate in zip(self.variables, self.rates, strict=True)}
 
     def inlined(self, expression: sp.Expr, definitions: dict[sp.Symbol, sp.Expr] | None = None) -> sp.Expr:
-        """An expression with T, τ and σ replaced by what they are, or by the same in other variables."""
+        """Expression with T, τ and σ replaced by their definitions."""
         for symbol, definition in reversed((definitions or self.definitions).items()):
             expression = replaced(expression, {symbol: definition})
         return expression
 
     def at_steady(self, expression: sp.Expr) -> sp.Expr:
-        """An expression in steady sliding, where terms that cancel do so exactly and |v| has a derivative."""
+        """Steady value of an expression; derivatives of sign and |v| are evaluated, which exist for v > 0."""
         found = expression.xreplace({s: self.steady[s] for s in expression.free_symbols & self.steady.keys()})
         return found.doit() if found.has(sp.sign, sp.Derivative, sp.Abs, sp.DiracDelta) else found
 
     def with_role(self, kind: str) -> tuple[str, ...]:
-        """Dotted names of the parameters whose laws declare them to be of a `kind`."""
+        """Dotted names of the parameters with a `kind` of `PARAMETER_KINDS`."""
         return tuple(name for name in self.parameters if self.roles[name].kind == kind)
 
-    # -- words
+    # -- display
 
     def written(self, expression: sp.Basic) -> sp.Basic:
-        """An expression as people know it: with plain SymPy symbols, called by their `letters`.
+        """Expression for display, with plain SymPy symbols named by their `letters`.
 
-        The symbols of the equations are called by their places, whatever names users give, and equal no others.
+        Internal symbols are named by position and differ from all others (`steadyslip.core.symbols`).
         """
         return expression.xreplace(
             {
@@ -383,7 +381,7 @@ class Model(Keeper, Displayed):
         )
 
     def equations(self) -> list[sp.Eq]:
-        """The model as SymPy equations in its letters, ready for LaTeX."""
+        """Equations of the Model as `sympy.Eq` with display letters, ready for LaTeX."""
         return list(map(self.written, self._equations()))
 
     def _equations(self) -> list[sp.Eq]:

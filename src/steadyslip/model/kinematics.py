@@ -1,8 +1,8 @@
-"""Which velocities of a Model are variables of their own, and how all others follow from them.
+"""Choice of the velocity variables of a Model, and all other velocities as functions of them.
 
-Every contact wants a velocity variable w, because its friction law is smooth in that and not in its velocity. It takes
-the place of the velocity of one coordinate that moves with it; where all of these are taken (a body on two contacts),
-its velocity follows from those of others.
+Each contact has a preferred velocity variable w, such as ln v, in which its friction law is smooth. It replaces the
+velocity of one coordinate that contributes to the slip. If all of these are already replaced (a body on two
+contacts), the slip rate is a function of the other variables.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _FIRST = ("logarithm", "asinh", "linear")
 
 @dataclass(frozen=True, eq=False)
 class VelocityVariable:
-    """What is integrated in place of a contact's velocity.
+    """Variable that is integrated in place of a contact's slip rate.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class VelocityVariable:
         ``logarithm``, ``asinh`` or ``linear``.
     w : sympy.Symbol
     of_w : sympy.Expr
-        The velocity from w and the memory.
+        Slip rate as a function of w and the memory variables.
     w_of_v : sympy.Expr
-        The other way round.
+        w as a function of the slip rate and the memory variables.
     scale : sympy.Expr
-        Velocity in steady sliding.
+        Slip rate in steady sliding, m/s.
     regularised : sympy.Expr or None
-        The regularised law's primitive, of kind ``asinh``.
+        The `asinh_exp` term of the regularised law, for kind ``asinh``.
     """
 
     kind: str
@@ -51,17 +51,16 @@ class VelocityVariable:
 
 @dataclass(frozen=True, eq=False)
 class Kinematics:
-    """Velocities of contacts and coordinates.
+    """Velocity variables, and all other velocities as functions of them.
 
     Attributes
     ----------
     variables : tuple of VelocityVariable or None
-        Of each contact; None where its velocity follows from others.
+        One per contact; None if the slip rate is a function of other velocities.
     coordinates : tuple of Coordinate or None
-        Whose velocity each contact's takes the place of.
+        The coordinate whose velocity the contact's variable replaces; None if there is none.
     speeds : dict of sympy.Symbol to sympy.Expr
-        Velocities that are no variables, of coordinates and contacts: in terms of those of contacts and coordinates
-        that are, and of the load point.
+        Dependent velocities of coordinates and contacts, as functions of the independent ones and of the load point's.
     """
 
     variables: tuple[VelocityVariable | None, ...]
@@ -69,7 +68,7 @@ class Kinematics:
     speeds: Mapping[sp.Symbol, sp.Expr]
 
     def contact_at(self, coordinate: Coordinate) -> int | None:
-        """The contact whose velocity stands for that of a coordinate."""
+        """Index of the contact whose variable replaces the velocity of a coordinate; None if there is none."""
         return next((i for i, one in enumerate(self.coordinates) if one is coordinate), None)
 
 
@@ -98,7 +97,7 @@ def kinematics(model: Model) -> Kinematics:
 
 
 def _variable(model: Model, index: int) -> VelocityVariable:
-    """The kind of w of a contact, v as a function of it, and the other way round."""
+    """Preferred velocity variable of a contact: logarithm, asinh or linear."""
     contact = model.contacts[index]
     w = W if len(model.contacts) == 1 else inner_symbol(f"w_{index}", real=True)
     v, scale = contact.velocity, sp.sympify(model.steady[contact.velocity])
@@ -120,12 +119,12 @@ def _variable(model: Model, index: int) -> VelocityVariable:
 
 
 def at_steady_stress(exponent: sp.Expr, contact: Contact, model: Model) -> sp.Expr:
-    """The exponent of the regularised law with memory as it is, stresses as in steady sliding."""
+    """Exponent of the regularised law with τ and σ at their steady values."""
     return exponent.xreplace({stress: model.steady[stress] for stress in (contact.friction, contact.normal)})
 
 
 def _singular_at_rest(expression: sp.Expr, v: sp.Symbol) -> bool:
-    """Whether an expression has ln v or a negative or fractional power of v in it."""
+    """True if an expression contains ln v, or a negative or fractional power of v."""
     for logarithm in expression.atoms(sp.log):
         if logarithm.has(v) and logarithm.args[0].xreplace({v: sp.Integer(0)}) == 0:
             return True
@@ -137,7 +136,7 @@ def _singular_at_rest(expression: sp.Expr, v: sp.Symbol) -> bool:
 
 
 def in_variables(expression: sp.Expr, found: Kinematics, model: Model) -> sp.Expr:
-    """Write an expression in the velocity variables, so that ln v and the regularised law become linear in them."""
+    """Express in the velocity variables, in which ln v and the argument of the regularised law become linear."""
     expression = expression.xreplace(dict(found.speeds))
     for variable, contact in zip(found.variables, model.contacts, strict=True):
         if variable is not None:
@@ -171,29 +170,32 @@ def _in_w(expression: sp.Expr, variable: VelocityVariable, contact: Contact, mod
 
 
 def _is_product_with_sum(expression: sp.Expr, w: sp.Symbol) -> bool:
-    """Whether this is a plain factor times (w + constant), which has to be spread for terms to cancel."""
+    """True for a factor times (w + constant), which must be expanded for terms to cancel."""
     if not expression.is_Mul or sum(factor.is_Add for factor in expression.args) != 1:
         return False
     return any(factor.is_Add and w in factor.args for factor in expression.args)
 
 
-def solved_for(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
-    """The unknown, if the residual is linear in it and depends on it."""
+def solve_linear(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
+    """Solve a residual for an unknown; None if it is not linear in it or does not depend on it."""
     slope = derivative(residual, unknown)
     if slope.has(unknown) or slope == 0:
         return None
     return -residual.xreplace({unknown: sp.Integer(0)}) / slope
 
 
-def solved_in_turn(
+def solve_sequentially(
     equations: Iterable[tuple[sp.Expr, sp.Symbol]],
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[tuple[sp.Expr, sp.Symbol]]]:
-    """Unknowns of linear equations, each from its own with those before put in; and equations that are not linear."""
+    """Solve pairs of (residual, unknown) one after the other by substitution.
+
+    Returns the solutions, and the pairs whose residual is not linear in its unknown, with all solutions substituted.
+    """
     found: dict[sp.Symbol, sp.Expr] = {}
     left: list[tuple[sp.Expr, sp.Symbol]] = []
     for residual, unknown in equations:
         here = replaced(residual, found)
-        solution = solved_for(here, unknown)
+        solution = solve_linear(here, unknown)
         if solution is None:
             left.append((here, unknown))
             continue
@@ -201,14 +203,14 @@ def solved_in_turn(
     return found, [(replaced(residual, found), unknown) for residual, unknown in left]
 
 
-def solved_together(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Unknowns of linear equations; each equation is solved for the first unknown that is left in it."""
+def solve_jointly(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
+    """Solve linear equations; each one for the first remaining unknown that it contains."""
     found: dict[sp.Symbol, sp.Expr] = {}
     left = list(unknowns)
     for residual in equations:
         here = replaced(residual, found)
         unknown = next((one for one in left if derivative(here, one) != 0), None)
-        solution = None if unknown is None else solved_for(here, unknown)
+        solution = None if unknown is None else solve_linear(here, unknown)
         if unknown is None or solution is None:
             raise InternalError("as many independent linear equations as unknowns")
         left.remove(unknown)
@@ -216,8 +218,8 @@ def solved_together(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol])
     return found
 
 
-def only(variables: Iterable[VelocityVariable | None]) -> VelocityVariable:
-    """The velocity variable of a single contact."""
+def single_variable(variables: Iterable[VelocityVariable | None]) -> VelocityVariable:
+    """The velocity variable of a slider's only contact."""
     (one,) = variables
     if one is None:
         raise InternalError("a single contact has its own velocity variable")

@@ -1,9 +1,8 @@
-"""Small perturbations of steady sliding, symbolically from the Model.
+"""Symbolic linearisation of a Model at steady sliding, and its characteristic polynomial.
 
-The balances of forces, one for each contact, and the rates of the memory variables are differentiated once; the
-intermediate stresses T, τ, σ are eliminated by the chain rule, so every entry is in terms of the parameters and the
-steady normal stress. From the entries come the characteristic polynomial (any number of states), with delays a sum
-of several, its split p(s) + k q(s), and state-space matrices.
+Balances and rates are differentiated; the intermediate stresses T, τ, σ are eliminated by the chain rule, so every
+entry is a function of the parameters and the steady normal stresses. The characteristic polynomial (with delays a sum
+of several), its split p(s) + k q(s) and state-space matrices follow.
 """
 
 from __future__ import annotations
@@ -16,16 +15,16 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
-from steadyslip.model.determinant import Polynomial, TooLong, determinant, expanded, machine_determinant
+from steadyslip.model.determinant import Polynomial, TooManyTerms, determinant, machine_determinant, sum_of_terms
 from steadyslip.model.equations import Model
-from steadyslip.model.stand_ins import StandIns
+from steadyslip.model.placeholders import Placeholders
 
 Gradient = dict[sp.Symbol, sp.Expr]
 
 
 @dataclass(frozen=True)
 class Term:
-    """A polynomial in s times exp(−s `delay`): its coefficients, lowest power first."""
+    """Polynomial in s times exp(−s `delay`); coefficients with the lowest power first."""
 
     delay: sp.Expr
     coefficients: tuple[sp.Expr, ...]
@@ -38,10 +37,10 @@ class Linearisation:
     Attributes
     ----------
     columns : tuple of sympy.Symbol
-        Displacements, velocities, memory variables, integral, frictions that are unknowns.
+        Displacements, velocities, memory variables, integral, unknown friction stresses.
     rows : dict
-        For each column the gradient, in columns, accelerations, late symbols and inputs, of its rate; for a velocity
-        that of the balance of forces, for a friction that of its law less friction.
+        For each column the gradient of its rate, with respect to columns, accelerations, delayed symbols and inputs;
+        for a velocity that of the balance of forces, for a friction stress that of its law minus friction.
     outputs : dict
         Gradients of the observables.
     """
@@ -54,10 +53,10 @@ class Linearisation:
 
 @question
 def linearise(model: Model) -> Linearisation:
-    """Differentiate a model at steady sliding."""
+    """Differentiate a Model at steady sliding."""
     velocities = {one.displacement: one.velocity for one in model.coordinates}
     columns: dict[sp.Symbol, None] = {}
-    for item in model.variables:  # a body without inertia has its velocity beside its slip all the same
+    for item in model.variables:  # velocities of massless bodies are columns too, though they are no variables
         columns |= {item.symbol: None} | ({velocities[item.symbol]: None} if item.symbol in velocities else {})
     columns |= dict.fromkeys(contact.friction for contact in model.contacts if contact.unknown is contact.friction)
     inputs = [s for name, s in model.inputs.items() if name != "time"]
@@ -90,13 +89,13 @@ def linearise(model: Model) -> Linearisation:
 def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     """Coefficients of the characteristic polynomial in s, lowest power first (theory 3: a0, a1, ...).
 
-    The highest is m + f1 B0 times a positive factor where there is inertia; it may vanish for m = 0. What the structure
-    alone makes cancel, of stiffnesses and inertias of several bodies, has cancelled exactly.
+    With inertia the highest is m + f1 B0 times a positive factor; it may vanish for m = 0. Terms that cancel for all
+    values of stiffnesses and inertias of several bodies have cancelled exactly.
 
     Raises
     ------
     NotAvailable
-        If there are delays: then it is none, but a sum of `characteristic_terms`; or if it is not `is_written_out`.
+        If there are delays (use `characteristic_terms`), or if `is_written_out` is False.
     """
     if model.delays:
         raise NotAvailable("this is not offered with a delay, whose characteristic equation is no polynomial")
@@ -105,14 +104,14 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
 
 @question
 def characteristic_terms(model: Model) -> tuple[Term, ...]:
-    """The characteristic equation as a sum of polynomials in s times exp(−s delay), that without delay first.
+    """Terms of the characteristic equation: polynomials in s times exp(−s delay), the one without delay first.
 
-    Each delay enters once as a factor at most, for what a controller or a contact does is one force.
+    Each delay occurs at most once as a factor, because a delayed controller or contact exerts a single force.
 
     Raises
     ------
     NotAvailable
-        If it is not `is_written_out`.
+        If `is_written_out` is False.
     """
     found = _determinant(model)
     if found is None:
@@ -134,50 +133,50 @@ def characteristic_terms(model: Model) -> tuple[Term, ...]:
 
 @question
 def _determinant(model: Model) -> Polynomial | None:
-    """The characteristic determinant; None where it would fill pages."""
+    """Characteristic determinant; None if it has too many terms."""
     if model.is_single:
         return _single_determinant(model)
     try:
         return machine_determinant(model, characteristic_rows(model))
-    except TooLong:
+    except TooManyTerms:
         return None
 
 
 def is_written_out(model: Model) -> bool:
-    """Whether there are `characteristic_terms`; of large machines only numbers (`steadyslip.model.eigenvalues`)."""
+    """True if symbolic `characteristic_terms` exist; large machines have numbers only (`model.eigenvalues`)."""
     return _determinant(model) is not None
 
 
 def delays_of_terms(model: Model) -> tuple[sp.Expr, ...]:
-    """The delay of each of the `characteristic_terms`, zero first."""
+    """Delays (s) of the terms of the characteristic equation, zero first."""
     if is_written_out(model):
         return tuple(term.delay for term in characteristic_terms(model))
     return tuple(sp.Add(*late) for late in sets_of_delays(model))
 
 
 def sets_of_delays(model: Model) -> list[tuple[sp.Expr, ...]]:
-    """All sets of delays that may act together, none first."""
+    """All subsets of the delays, the empty one first."""
     return [late for count in range(len(model.delays) + 1) for late in combinations(model.delays, count)]
 
 
 def _single_determinant(model: Model) -> Polynomial:
-    stand_ins = StandIns()
+    placeholders = Placeholders()
     rows = characteristic_rows(model)
-    body = model.coordinates[0].velocity
+    own, body = placeholders.symbol_for, model.coordinates[0].velocity
     matrix = [
-        [{power: stand_ins.whole(e) if name == body else -stand_ins.whole(-e) for power, e in entry.items()}
-         for entry in row] for name, row in rows.items()
+        [{power: own(e) if name == body else -own(-e) for power, e in entry.items()} for entry in row]
+        for name, row in rows.items()
     ]  # fmt: skip
     names, found = determinant(matrix)
-    return {powers: stand_ins.back(expanded(terms, names)) for powers, terms in found.items()}
+    return {powers: placeholders.restored(sum_of_terms(terms, names)) for powers, terms in found.items()}
 
 
 @question
 def characteristic_rows(model: Model) -> dict[sp.Symbol, list[Polynomial]]:
-    """The characteristic matrix: of every entry the coefficients, by powers of s and of exp(−s delay) of each delay.
+    """Characteristic matrix; each entry has coefficients by exponents of s and of exp(−s delay) of each delay.
 
-    Columns are displacements, memory variables, integral, unknown frictions; rows the balances of forces, the rates
-    less s times their variables, the frictions less their laws, named as the rows of `Linearisation`.
+    Columns are displacements, memory variables, integral, unknown friction stresses. Rows, named as in `Linearisation`,
+    are balances of forces, s times variables minus their rates, and friction stresses minus their laws.
     """
     linear = linearise(model)
     bodies = {one.displacement: one for one in model.coordinates}
@@ -193,7 +192,7 @@ def characteristic_rows(model: Model) -> dict[sp.Symbol, list[Polynomial]]:
     for column in columns:
         row_symbol = bodies[column].velocity if column in bodies else column
         row = linear.rows[row_symbol]
-        # forces stand as inertia less force; friction as itself less its law; variables as s times them less their rate
+        # signs: inertia minus forces, friction stress minus its law, s times a variable minus its rate
         sign = 1 if column in bodies and (bodies[column].balance is not None or model.is_single) else -1
         entries = []
         for other in columns:
@@ -212,10 +211,10 @@ def characteristic_rows(model: Model) -> dict[sp.Symbol, list[Polynomial]]:
 
 @question
 def stiffness_split(model: Model, name: str = "slider.stiffness") -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
-    """The characteristic polynomial as p(s) + k q(s), coefficients lowest first.
+    """Split the characteristic polynomial into p(s) + k q(s); coefficients of p and q, lowest power first.
 
-    Exact because k enters through one rank-one term; `name` may be another parameter that enters
-    linearly (a controller's gain).
+    Exact, because k enters by a rank-one term; `name` may be another parameter that enters linearly (a controller's
+    gain).
     """
     symbol = model.parameters[name]
     coefficients = characteristic_coefficients(model)

@@ -1,4 +1,4 @@
-"""Names in results: those that the equations bring themselves, and those of laws beside them."""
+"""Names of results: reserved ones of the equations, and checks of those that laws add."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 
-OWN = {
+RESERVED_NAMES = {
     "t": "the time", "time": "the time", "x": "how far a block is ahead of steady sliding", "v": "the velocity",
     "acceleration": "the acceleration", "displacement": "the way of a body", "slip": "the slip",
     "slip_rate": "the velocity of slip", "load_velocity": "the velocity of the load point",
@@ -21,25 +21,25 @@ OWN = {
     "spring_stress": "the stress of the spring", "friction_force": "the friction force",
     "normal_force": "the normal force", "force": "the force of a link",
 }  # fmt: skip
-"""What results call quantities of every rig, each with what it is."""
-EVENTS = "event_"  # before the columns of events in files of runs
+"""Names that results of every rig use, with their meanings; laws cannot use them."""
+EVENTS = "event_"  # prefix of the columns of events in files of runs
 
 Observables = Mapping[str, tuple[sp.Expr, str]]
 
 
 def check_names(place: str, law: FrictionLaw | ContactLaw, names: Iterable[str]) -> None:
-    """Refuse names of memories, states and observables of a law that results have for something else.
+    """Check names of memory variables, states and observables of a law against reserved names and duplicates.
 
     Raises
     ------
     ParameterError
-        Naming all of them.
+        Listing all invalid names.
     """
     owner, problems = type(law).name or type(law).__name__, []
     given = list(names)
     for name in dict.fromkeys(given):
-        if name in OWN or name.startswith(EVENTS):
-            what = OWN.get(name, "what is known of events")
+        if name in RESERVED_NAMES or name.startswith(EVENTS):
+            what = RESERVED_NAMES.get(name, "what is known of events")
             problems.append(f"law {owner!r} calls a memory, state or observable {name!r}, as results call {what}")
         elif given.count(name) > 1:
             problems.append(f"law {owner!r} calls two memories or states {name!r}")
@@ -49,13 +49,13 @@ def check_names(place: str, law: FrictionLaw | ContactLaw, names: Iterable[str])
         raise ParameterError([Problem(place, f"{one}; rename it in the law") for one in problems])
 
 
-def joined(tables: Iterable[tuple[str, Observables]]) -> dict[str, tuple[sp.Expr, str]]:
-    """One table of observables from those of several owners; the same under the same name counts once.
+def merge_observables(tables: Iterable[tuple[str, Observables]]) -> dict[str, tuple[sp.Expr, str]]:
+    """Merge tables of observables of several owners; equal observables of one name are kept once.
 
     Raises
     ------
     ParameterError
-        If a name has two meanings.
+        If two observables that differ have the same name.
     """
     found: dict[str, tuple[sp.Expr, str]] = {}
     owners: dict[str, str] = {}

@@ -1,6 +1,6 @@
-"""An operating point: numbers for a Model's parameters, some of them varied as arrays, and steady sliding there.
+"""Operating points: a Model with values of its parameters, some varied as arrays, and the steady state there.
 
-This is the one place where arrays of a rig's numbers are broadcast and checked.
+Arrays of a rig's numbers are checked and broadcast here only.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ Vary = Mapping[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoint(Keeper):
-    """A model, the values of its parameters, and what follows for steady sliding.
+    """A Model with values of its parameters, and its steady state.
 
     Attributes
     ----------
     model : Model
     arguments : tuple of float or ndarray
-        In the order of ``model.parameters``; mutually broadcastable.
+        Values in the order of ``model.parameters``, in SI units; mutually broadcastable.
     shape : tuple of int
         Broadcast shape.
     wrap : callable
-        Turns a result array with leading axes `shape` into what the user passed in (ndarray or
-        xarray.DataArray): ``wrap(array, name, unit, extra_dims)``.
+        Function ``wrap(array, name, unit, extra_dims)`` that converts a result with leading axes `shape` to the
+        user's type of array (ndarray or xarray.DataArray).
     branch : int
-        Which steady sliding is meant where there are several, by rising normal stress.
+        Index of the steady state, by rising normal stress, if there are several.
     valid : bool or ndarray of bool
-        Where the values obey the conditions that several obey together; false somewhere only for a scan.
+        True where conditions between several parameters hold; only scans contain False.
     """
 
     model: Model
@@ -58,30 +58,30 @@ class OperatingPoint(Keeper):
         return math.prod(self.shape)
 
     def named(self) -> dict[str, Any]:
-        """Values by dotted name."""
+        """Values of the parameters by dotted name."""
         return dict(zip(self.model.parameters, self.arguments, strict=True))
 
     @cached_property
     def drive(self) -> Any:
-        """Velocity of the load point in steady sliding, m/s."""
+        """Velocity of the drive in steady sliding (m/s or rad/s)."""
         return self.named()["drive.velocity"]
 
     @cached_property
     def sigmas(self) -> tuple[Any, ...]:
-        """σss (Pa) of every contact over the varied parameters, NaN where steady sliding does not exist.
+        """Steady normal stress σss (Pa) of every contact, each over the varied parameters; NaN without steady sliding.
 
-        Where there are several solutions, the one of `branch`.
+        If there are several solutions, the one with index `branch`.
         """
         return steady_stresses(self.model, self.arguments, self.branch)
 
     @cached_property
     def steady(self) -> tuple[Any, ...]:
-        """What steady sliding makes of the parameters: `sigmas`, and what links carry where that is no formula."""
+        """Values of `sigmas` and of `Model.carried`, in the order of `Model.arguments`."""
         return (*self.sigmas, *carried_forces(self.model, self.arguments, self.sigmas))
 
     @property
     def exists(self) -> Any:
-        """Whether steady sliding does, over the varied parameters."""
+        """True where steady sliding exists, over the varied parameters."""
         found = np.isfinite(self.sigmas[0])
         for sigma in self.sigmas[1:]:
             found = found & np.isfinite(sigma)
@@ -89,44 +89,44 @@ class OperatingPoint(Keeper):
 
     @property
     def sigma(self) -> Any:
-        """That of the contact of a model that has one; see `Model.contact`."""
+        """Steady normal stress σss (Pa) of a slider."""
         return self.sigmas[self.model.contacts.index(self.model.contact)]
 
     @property
     def axial_share(self) -> Any:
-        """k over the axial stiffness, where that is given."""
+        """Ratio of k to the axial stiffness, if that is given."""
         return _axial_share(self.model)(self.named())
 
     @property
     def gain(self) -> Any:
-        """Stiffness that a controller adds, Pa/m."""
+        """Stiffness (Pa/m) that a controller adds."""
         return _gain(self.model)(*self.arguments)[0]
 
     @property
     def stresses(self) -> np.ndarray:
-        """`sigma` as a flat array, with one entry at least."""
+        """Steady normal stress of a slider (Pa) as an array with at least one axis."""
         return np.atleast_1d(np.asarray(self.sigma, dtype=float))
 
     def all_stresses(self) -> list[float]:
-        """All positive σss of a single rig, rising."""
+        """All positive σss (Pa) of a single slider, rising."""
         return steady_roots(self.model, self.arguments)
 
     @cached_property
     def single(self) -> bool:
-        """Whether all values are numbers: one rig."""
+        """True if all values are numbers (one rig)."""
         return not any(map(np.ndim, self.arguments))
 
     @cached_property
     def _numbers(self) -> tuple[Any, ...]:
-        """`arguments` and `steady` as NumPy's numbers and arrays."""
+        """Values of `arguments` and `steady` as NumPy floats and arrays."""
         return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, *self.steady))
 
     def evaluate(self, function: ArrayFunction, *further: Any) -> list[Any]:
-        """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
+        """Values of a ``model.function`` at this point; overflow and invalid operations give inf and NaN."""
         return function(*self._numbers, *further)
 
     def rows(self, function: ArrayFunction, *further: Any) -> np.ndarray:
-        """The same as an array (rigs, expressions): of a single rig one row."""
+        """Values of a ``model.function`` as an array (rigs, expressions); one row for a single rig."""
         values = (*self._numbers, *further)
         table = np.empty((max(self.size, 1), len(values)))
         for i, value in enumerate(values):
@@ -134,7 +134,7 @@ class OperatingPoint(Keeper):
         return function.rows(table)
 
     def pieces(self, most: int) -> Iterator[OperatingPoint]:
-        """The same rigs, flattened, at most `most` at a time; itself if it is no larger."""
+        """Yield flat points with at most `most` rigs each; the point itself if it is not larger."""
         if self.size <= most:
             yield self
             return
@@ -144,7 +144,7 @@ class OperatingPoint(Keeper):
             yield OperatingPoint(self.model, part, (min(most, self.size - start),), self.wrap, self.branch)
 
     def part(self, rows: slice | np.ndarray) -> OperatingPoint:
-        """Some rigs of a flat point; single numbers are for all of them."""
+        """Point with some of the rigs of a flat point; steady states are not solved for again."""
         if self.single:
             return self
         cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, *self.steady)]
@@ -154,12 +154,12 @@ class OperatingPoint(Keeper):
         return found
 
     def with_arguments(self, arguments: Iterable[Any], shape: tuple[int, ...] | None = None) -> OperatingPoint:
-        """The same model with other numbers, which are not checked."""
+        """Copy with other values, which are not checked."""
         return replace(self, arguments=tuple(arguments), shape=self.shape if shape is None else shape)
 
 
 def stacked(parts: list[Any], point: OperatingPoint) -> np.ndarray:
-    """Numbers of each rig along a last axis; NaN without steady sliding."""
+    """Stack values along a last axis, (..., parts), at the shape of the point; NaN without steady sliding."""
     out = np.empty((*point.shape, len(parts)))
     for i, part in enumerate(parts):
         out[..., i] = part
@@ -172,7 +172,7 @@ def operating_point(
     rig: Rig, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False,
     drive: str = MOVED,
 ) -> OperatingPoint:  # fmt: skip
-    """The model of a rig and its parameters' values.
+    """Make the operating point of a rig, with some parameters varied.
 
     Parameters
     ----------
@@ -183,12 +183,12 @@ def operating_point(
     present : iterable of str, optional
         Parameters that are zero but kept in the equations, as for `build_model`.
     branch : int, optional
-        Which steady sliding is meant where there are several, by rising normal stress.
+        Index of the steady state, by rising normal stress, if there are several.
     scan : bool, optional
-        Whether values are steps of a search, which goes beyond the conditions that numbers obey together (a rod
-        shorter than its crank): these are marked in `OperatingPoint.valid` instead of refused.
+        True for the values of a search: those that violate conditions between several parameters (a rod shorter than
+        its crank) are marked in `OperatingPoint.valid` instead of refused.
     drive : str, optional
-        What it does: `steadyslip.model.equations.MOVED`, ``PULLED`` or ``EITHER``.
+        Mode of the drive: `steadyslip.model.equations.MOVED`, ``PULLED`` or ``EITHER``.
 
     Raises
     ------
@@ -197,21 +197,21 @@ def operating_point(
         broadcast; all problems are listed.
     """
     if not (vary or present or scan or drive != MOVED):
-        return _own_point(rig, branch)
-    together = _varied(rig, vary or {})
-    varied = together.values
+        return _cached_point(rig, branch)
+    arrays = _checked_arrays(rig, vary or {})
+    varied = arrays.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
-    return _placed(model_of(rig, [*structural, *present], drive), rig, together, branch, scan)
+    return _make_point(model_of(rig, [*structural, *present], drive), rig, arrays, branch, scan)
 
 
 @lru_cache(maxsize=256)
-def _own_point(rig: Rig, branch: int) -> OperatingPoint:
-    """Of a rig as it is, with the answers that were asked of it before."""
-    return _placed(model_of(rig), rig, _varied(rig, {}), branch, False)
+def _cached_point(rig: Rig, branch: int) -> OperatingPoint:
+    """Cached point of a rig without varied parameters, with the cached results of earlier calls."""
+    return _make_point(model_of(rig), rig, _checked_arrays(rig, {}), branch, False)
 
 
-def _placed(model: Model, rig: Rig, together: BroadcastArrays, branch: int, scan: bool) -> OperatingPoint:
-    varied, valid = together.values, True
+def _make_point(model: Model, rig: Rig, arrays: BroadcastArrays, branch: int, scan: bool) -> OperatingPoint:
+    varied, valid = arrays.values, True
     if varied and scan:
         valid = valid_together(rig, "", varied)
     elif varied:
@@ -222,7 +222,7 @@ def _placed(model: Model, rig: Rig, together: BroadcastArrays, branch: int, scan
             values[other] = values[name] * _axial_share(model)(values)
     values |= {name: 0.0 for name in rig.always_symbols if values[name] is None}  # a controller alone
     arguments = tuple(values[name] for name in model.parameters)
-    return OperatingPoint(model, arguments, together.shape, together.wrap, branch, valid)
+    return OperatingPoint(model, arguments, arrays.shape, arrays.wrap, branch, valid)
 
 
 @question
@@ -232,15 +232,15 @@ def _gain(model: Model) -> ArrayFunction:
 
 @question
 def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
-    """k over the axial stiffness, as a function of numbers by dotted name."""
+    """Function of values by dotted name that returns the ratio of k to the axial stiffness."""
     share = sp.sympify(model.axial_share)
     names = [name for name, symbol in model.parameters.items() if share.has(symbol)]
     function = ArrayFunction([model.parameters[name] for name in names], [share])
     return lambda values: function(*(values[name] for name in names))[0]
 
 
-def _varied(rig: Rig, vary: Vary) -> BroadcastArrays:
-    """Checked values by full name."""
+def _checked_arrays(rig: Rig, vary: Vary) -> BroadcastArrays:
+    """Check and broadcast varied values, by full dotted name."""
     known, problems = rig.parameters(), []
     checked: dict[str, Any] = {}
     for name, value in vary.items():

@@ -1,4 +1,4 @@
-"""Whether motion follows from the equations, and whether rounding leaves it its digits, near steady sliding."""
+"""Checks near steady sliding: well-posedness of the motion, and its sensitivity to rounding."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from steadyslip.model.kinematics import kinematics
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import arrays_of, slip_rates, weights
 
-MOST_NOISE = 1e-2  # in ln v, from which on rounding decides how a block moves
+MOST_NOISE = 1e-2  # change of ln v by rounding of forces, above which it affects the motion; chosen by trial
 
 
 @question
-def posed(point: OperatingPoint) -> np.ndarray:
-    """Whether the balances of forces rise with their unknowns (velocities, or accelerations) in steady sliding.
+def well_posed(point: OperatingPoint) -> np.ndarray:
+    """True where the motion near steady sliding is well-posed, (rigs,).
 
-    If not, the least lag or mass that was left out decides the motion. Of several balances the eigenvalues must be
-    positive.
+    The balances of forces must increase with their unknowns (velocities or accelerations); for several balances the
+    eigenvalues of the Jacobian must have positive real part. Otherwise arbitrarily small neglected lags or masses would
+    determine the motion.
     """
     if point.model.is_single:
         return np.atleast_1d(weights(point).by_unknown > 0)
@@ -34,12 +35,12 @@ def posed(point: OperatingPoint) -> np.ndarray:
     return np.asarray(rises & good)
 
 
-def rising(model: Model) -> list[list[sp.Expr]]:
-    """Derivatives of the balances of coordinates in accelerations, or without inertia in velocities of contacts."""
+def balance_jacobian(model: Model) -> list[list[sp.Expr]]:
+    """Jacobian of the balances of forces with respect to accelerations, or velocities of massless coordinates."""
     moving = kinematics(model)
     places = [one for one in model.coordinates if one.inertial or moving.contact_at(one) is not None]
     slopes = {}
-    for contact in model.contacts:  # friction follows what moves
+    for contact in model.contacts:  # friction stresses are eliminated
         balance = model.inlined(contact.balance)
         slopes[contact.friction] = {
             s: -derivative(balance, s) / derivative(balance, contact.friction)
@@ -62,16 +63,16 @@ def rising(model: Model) -> list[list[sp.Expr]]:
 
 @question
 def _rising(model: Model) -> tuple[ArrayFunction, int]:
-    rows = rising(model)
+    rows = balance_jacobian(model)
     return model.function(e for row in rows for e in row), len(rows)
 
 
 @question
 def _force_function(model: Model, index: int) -> ArrayFunction:
-    """Forces that keep each other in balance in steady sliding, at a contact.
+    """Array function of the sizes of stresses (Pa) at a contact in steady sliding.
 
-    The force of a dashpot per change of ln v; what pull and friction do to the normal stress; then what adds up to
-    nothing: pull and friction, and the shares of normal stress and memory in it.
+    Change of the pull by dashpots per e-fold of v; changes of σ by pull and friction; then stresses that cancel: pull,
+    friction, and the contributions of normal stress and memory to friction.
     """
     contact = model.contacts[index]
     inner = [contact.normal, *(item.symbol for item in contact.memory)]
@@ -86,17 +87,17 @@ def _force_function(model: Model, index: int) -> ArrayFunction:
 
 @question
 def resolved(point: OperatingPoint) -> np.ndarray:
-    """Whether rounding of the forces leaves the velocity of steady sliding its digits.
+    """True where rounding of the forces changes the velocity of steady sliding insignificantly, (rigs,).
 
-    What rounding adds to the balance changes ln v by that over the slope of the balance in ln v; with inertia over the
-    direct effect and over what it takes to change velocity while the block slips a natural length. The rounding of
-    velocity changes the force of a dashpot, and that of forces the normal stress, by little beside what there is. Where
-    motion is ill-posed, that is the matter instead.
+    Rounding of the balance changes ln v by the error over the slope of the balance in ln v; with inertia, over the
+    direct effect plus the inertia needed to change the velocity within a natural slip distance. Rounding of velocities
+    must change the force of dashpots, and rounding of forces the normal stress, by little as well. Also True where the
+    motion is ill-posed, which is reported instead.
     """
     apart = np.ones(1, dtype=bool)
     for index in range(len(point.model.contacts)):
         apart = apart & _resolved(point, index)
-    return np.asarray(apart | ~posed(point))
+    return np.asarray(apart | ~well_posed(point))
 
 
 def _resolved(point: OperatingPoint, index: int) -> np.ndarray:

@@ -1,7 +1,7 @@
-"""Whether the numbers of a rig stay within floating point: the one question that every stage asks before it answers.
+"""Range check: values and slopes of the equations in steady sliding must be finite in floating point.
 
-Values and slopes of the equations in steady sliding must be numbers. The slopes meet in the characteristic
-polynomial: a slope that is none makes a coefficient that is none, and so does a product that leaves the range.
+The slopes enter the characteristic polynomial, so its coefficients are checked: an infinite slope, or a product that
+overflows, makes a coefficient infinite or NaN. All stages check the range before they compute.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
 from steadyslip.core.expressions import ArrayFunction, occurrences
 from steadyslip.core.questions import question
-from steadyslip.model.eigenvalues import by_eigenvalues
+from steadyslip.model.eigenvalues import coefficients_from_eigenvalues
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import (
     characteristic_coefficients,
@@ -27,25 +27,25 @@ from steadyslip.model.linearisation import (
     is_written_out,
 )
 from steadyslip.model.point import OperatingPoint, stacked
-from steadyslip.model.steady import beyond_floats
+from steadyslip.model.steady import out_of_range
 
 ORDINARY = 1e20
-"""Sizes up to which, and down to whose inverse, no product of a dozen numbers leaves the range."""
-_NEARER = (0.75, 0.5, 0.25, 0.0)
-"""Shares of its decades that a number keeps when it is asked whether it is to blame."""
+"""Largest size of ordinary numbers, whose inverse is the smallest: products of a dozen stay below 1e308."""
+_REDUCED_DECADES = (0.75, 0.5, 0.25, 0.0)
+"""Factors on the decimal exponent of a parameter by which its influence on the range is tested; chosen by trial."""
 
 
 @question
 def characteristic(point: OperatingPoint) -> Array:
-    """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
+    """Coefficients of the characteristic polynomial, (..., n+1), lowest power first; NaN without steady sliding."""
     if not is_written_out(point.model):
-        return by_eigenvalues(point)[0]
+        return coefficients_from_eigenvalues(point)[0]
     return stacked(point.evaluate(_coefficient_function(point.model)), point)
 
 
 @question
-def quasi(point: OperatingPoint) -> tuple[Array, Array]:
-    """The characteristic equation with delays, a sum of polynomials in s times exp(−s delay), that without delay first.
+def quasipolynomial(point: OperatingPoint) -> tuple[Array, Array]:
+    """Characteristic quasipolynomial: polynomials in s times exp(−s delay), the one without delay first.
 
     Returns
     -------
@@ -59,14 +59,14 @@ def quasi(point: OperatingPoint) -> tuple[Array, Array]:
     late = point.evaluate(point.model.function(delays_of_terms(point.model)))
     delays = np.stack([np.broadcast_to(one, point.shape) for one in late], axis=-1)
     if not is_written_out(point.model):
-        return np.stack(by_eigenvalues(point), axis=-2), np.asarray(delays, dtype=float)
+        return np.stack(coefficients_from_eigenvalues(point), axis=-2), np.asarray(delays, dtype=float)
     width, function = _term_functions(point.model)
     c = stacked(point.evaluate(function), point)
     return c.reshape(*c.shape[:-1], -1, width), np.asarray(delays, dtype=float)
 
 
 def delays_of(point: OperatingPoint) -> Array:
-    """The delays in the equations, (..., d), s."""
+    """Delays in the equations (s), (..., d)."""
     if not point.model.delays:
         return np.zeros((*point.shape, 0))
     found = point.evaluate(point.model.function(point.model.delays))
@@ -86,34 +86,34 @@ def _coefficient_function(model: Model) -> ArrayFunction:
 
 @question
 def _steady_function(model: Model) -> ArrayFunction:
-    """Stresses and memory in steady sliding."""
+    """Array function of the steady friction stresses, memory variables and states."""
     frictions = [model.steady[contact.friction] for contact in model.contacts]
     return model.function([*frictions, *(model.steady[item.symbol] for item in (*model.memory, *model.states))])
 
 
 @question
 def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Whether values and slopes of the equations are numbers in steady sliding, for each rig of a point.
+    """True for each rig whose values and slopes of the equations in steady sliding are finite, shape of the point.
 
-    Where there is no steady sliding: whether that can be said.
+    Without steady sliding: True if the equation for the normal stress is finite, so that its absence is certain.
     """
     with np.errstate(all="ignore"):
-        c, _ = quasi(point)
+        c, _ = quasipolynomial(point)
         main = c[..., 0, :]
         top = np.where(main[..., -1] == 0, main[..., -2], main[..., -1])[..., None, None]
         slopes = np.all(np.isfinite(c) & np.isfinite(c / np.where(top == 0, 1.0, top)), axis=(-2, -1))
         values = np.ones(point.shape, dtype=bool)
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
-        known = ~beyond_floats(point.model, point.arguments, point.shape)
+        known = ~out_of_range(point.model, point.arguments, point.shape)
         return np.asarray(known & (~point.exists | (slopes & values)))
 
 
 def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
-    """Whether no rig of a point can leave the range, which is quicker to tell than whether one does.
+    """Quick sufficient test that no rig of a point leaves the range of floating point.
 
-    That is so where all numbers have sizes of which `ORDINARY` speaks. Powers and exponentials of such may leave it;
-    then no number comes of them, so that it matters whether all answers are numbers (`complete`).
+    True if all parameters have ordinary sizes (`ORDINARY`) and the equations are rational. Otherwise powers and
+    exponentials may overflow to inf or NaN, so True only if all results are finite (`complete`).
     """
     for value in point.arguments:
         size = np.abs(value) if np.ndim(value) else abs(value)
@@ -125,25 +125,25 @@ def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
 
 @question
 def _is_rational(model: Model) -> bool:
-    """Whether the slopes are made of sums, products and whole powers only."""
+    """True if the slopes consist of sums, products and integer powers only."""
     nodes = occurrences(e for row in characteristic_rows(model).values() for entry in row for e in entry.values())
     return all(node.is_Atom or node.is_Add or node.is_Mul or (node.is_Pow and node.exp.is_Integer) for node in nodes)
 
 
 def require_range(point: OperatingPoint) -> None:
-    """Refuse a single rig whose numbers leave the range of floating point.
+    """Raise NotAvailable if the numbers of a single rig leave the range of floating point.
 
     Raises
     ------
     NotAvailable
-        Naming the parameters that do it, where some do.
+        Naming the parameters that cause it, if they can be found.
     """
     if not in_range(point):
-        raise beyond_range(point)
+        raise out_of_range_error(point)
 
 
 def warn_of_range(count: int, size: int) -> None:
-    """Say to the caller of a public function how many rigs of an array have no answer."""
+    """Warn the caller of a public function that `count` of `size` rigs have no result."""
     message = (
         f"{count} of {size} rigs have no answer (NaN): their numbers leave the range of floating point; "
         "steadyslip.stability tells which"
@@ -151,15 +151,15 @@ def warn_of_range(count: int, size: int) -> None:
     warnings.warn(message, OutOfRangeWarning, stacklevel=6)
 
 
-def beyond_range(point: OperatingPoint) -> NotAvailable:
-    """The exception that says so of a single rig."""
-    return NotAvailable(_message(point))
+def out_of_range_error(point: OperatingPoint) -> NotAvailable:
+    """Make the NotAvailable error for one rig whose numbers leave the range of floating point."""
+    return NotAvailable(_out_of_range_message(point))
 
 
-def _message(point: OperatingPoint) -> str:
+def _out_of_range_message(point: OperatingPoint) -> str:
     beyond = "the values of the equations, or their slopes, leave the range of floating point (1e-308 to 1e308)"
     named = point.named()
-    guilty = list(_guilty(point))
+    guilty = list(_blamed_parameters(point))
     words = []
     for name in guilty:
         shown = "slider.axial_stiffness" if name == "slider.stiffness" and point.model.axial_share is not None else name
@@ -175,25 +175,25 @@ def _message(point: OperatingPoint) -> str:
     return f"{beyond}; check the sizes of the rig's parameters"
 
 
-def _guilty(point: OperatingPoint) -> Iterator[str]:
-    """Parameters that bring a single rig back into range as they come nearer to one: each alone, or all huge ones."""
+def _blamed_parameters(point: OperatingPoint) -> Iterator[str]:
+    """Yield the parameters that bring a rig into range if moved towards 1: singly, or all extreme ones together."""
     names = list(point.model.parameters)
     numbers = np.array([float(value) for value in point.arguments])
     with np.errstate(all="ignore"):
         decades = np.where(numbers == 0, 0.0, np.log10(np.abs(numbers)))
     huge = np.abs(decades) > np.log10(ORDINARY)
-    blamed = [i for i in range(len(names)) if decades[i] and _mended(point, numbers, decades, [i])]
+    blamed = [i for i in range(len(names)) if decades[i] and _in_range_if_moderate(point, numbers, decades, [i])]
     if any(huge[i] for i in blamed):
         blamed = [i for i in blamed if huge[i]]
-    if not blamed and huge.any() and _mended(point, numbers, decades, list(np.flatnonzero(huge))):
+    if not blamed and huge.any() and _in_range_if_moderate(point, numbers, decades, list(np.flatnonzero(huge))):
         blamed = list(np.flatnonzero(huge))
     for i in blamed:
         yield names[i]
 
 
-def _mended(point: OperatingPoint, numbers: Array, decades: Array, which: list[int]) -> bool:
-    """Whether a rig is in range with some of its numbers nearer to one."""
+def _in_range_if_moderate(point: OperatingPoint, numbers: Array, decades: Array, which: list[int]) -> bool:
+    """True if a rig is in range with the parameters `which` moved towards 1."""
     arguments: list[Any] = list(numbers)
     for i in which:
-        arguments[i] = np.sign(numbers[i]) * 10.0 ** (decades[i] * np.array(_NEARER))
-    return bool(np.any(in_range(point.with_arguments(arguments, (len(_NEARER),)))))
+        arguments[i] = np.sign(numbers[i]) * 10.0 ** (decades[i] * np.array(_REDUCED_DECADES))
+    return bool(np.any(in_range(point.with_arguments(arguments, (len(_REDUCED_DECADES),)))))

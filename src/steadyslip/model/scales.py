@@ -1,4 +1,4 @@
-"""The sizes that matter at an operating point: scales of variables and of what is solved for."""
+"""Natural scales of state variables and unknowns at an operating point."""
 
 from __future__ import annotations
 
@@ -13,45 +13,45 @@ from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import SPEED, Reduction
-from steadyslip.model.weights import Weights, slip_rates, weighed, weights
+from steadyslip.model.weights import Weights, slip_rates, weight_expressions, weights
 
-_FELT = 1e-7  # least share of the normal stress of a direct effect that sets sizes
+_LEAST_DIRECT_SHARE = 1e-7  # lower bound of the direct effect in scales, relative to normal stress; chosen by trial
 
 
 @question
 def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], tuple[Any, ...]]:
-    """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance.
+    """Typical size of each state variable, by name, and of each unknown of `Reduction.searched` (at least one value).
 
-    By name; and the sizes of what is left to solve for, `Reduction.searched`, which has no name there; one at least.
+    The size is the change that goes with one e-fold of velocity, or a slip distance; SI units, arrays over the point.
     """
     speeds = [np.asarray(speed, dtype=float) for speed in slip_rates(point)]
     with np.errstate(all="ignore"):
         each = [
-            sizes(weights(point, i), speed, reduction, np.where, i) for i, speed in enumerate(speeds)
+            contact_scales(weights(point, i), speed, reduction, np.where, i) for i, speed in enumerate(speeds)
         ]  # fmt: skip
         if point.model.contacts[0].name:
-            return _together(point, reduction, speeds, each)
+            return _machine_scales_of(point, reduction, speeds, each)
         scales, unknown = each[0]
         return scales, (unknown,)
 
 
 @question
-def _few(model: Model) -> ArrayFunction:
-    """Slip rate and weights at the only contact."""
-    return model.function([model.steady[model.contact.velocity], *weighed(model)])
+def _single_function(model: Model) -> ArrayFunction:
+    """Array function of a slider's slip rate and weights."""
+    return model.function([model.steady[model.contact.velocity], *weight_expressions(model)])
 
 
 def scale_rows(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
-    """`natural_scales` as arrays: (rigs, `Reduction.names`), and (rigs,) of the first unknown."""
+    """Natural scales of state variables, shape (rigs, len(`Reduction.names`)), and of the first unknown, (rigs,)."""
     names = reduction.names
     if point.size <= FEW and not point.model.contacts[0].name:
         try:
             each = [
-                sizes(Weights.of(own), drive, reduction, _either)
-                for drive, *own in point.rows(_few(point.model)).tolist()
+                contact_scales(Weights.of(own), drive, reduction, _choose)
+                for drive, *own in point.rows(_single_function(point.model)).tolist()
             ]
             return np.array([[own[name] for name in names] for own, _ in each]), np.array([one for _, one in each])
-        except ArithmeticError:  # something is not felt at all
+        except ArithmeticError:  # division by a weight of zero
             pass
     scales, (unknown, *_) = natural_scales(point, reduction)
     size = max(point.size, 1)
@@ -59,12 +59,14 @@ def scale_rows(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarray,
     return table, np.array(np.broadcast_to(unknown, size))
 
 
-def _either(condition: Any, value: Any, other: Any) -> Any:
+def _choose(condition: Any, value: Any, other: Any) -> Any:
     return value if condition else other
 
 
-def moving_parts(model: Model) -> list[sp.Expr]:
-    """Speed of every coordinate in steady sliding, its share in the slip of every contact, stiffness; areas."""
+def scale_expressions(model: Model) -> list[sp.Expr]:
+    """Expressions that set the scales of a machine: steady speeds of coordinates, their shares in the slip of every
+    contact, their stiffnesses; areas of contacts.
+    """
     wanted = [one.speed for one in model.coordinates]
     for contact in model.contacts:
         slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
@@ -76,20 +78,20 @@ def moving_parts(model: Model) -> list[sp.Expr]:
 
 @question
 def _moving_function(model: Model) -> ArrayFunction:
-    return model.function(moving_parts(model))
+    return model.function(scale_expressions(model))
 
 
-def _together(
+def _machine_scales_of(
     point: OperatingPoint, reduction: Reduction, speeds: list[Any], each: list[tuple[dict[str, Any], Any]]
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
-    """Scales of a machine, from those at its contacts."""
+    """Natural scales of a machine from those at its contacts."""
     numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_moving_function(point.model))]
     directs = [direct_effect_scale(weights(point, i), np.where) for i in range(len(point.model.contacts))]
-    scales, searched = joined_sizes(reduction, numbers, speeds, point.sigmas, directs, each, np.where)
+    scales, searched = machine_scales(reduction, numbers, speeds, point.sigmas, directs, each, np.where)
     return scales, searched or (np.ones(1),)
 
 
-def joined_sizes(
+def machine_scales(
     reduction: Reduction,
     numbers: Sequence[Any],
     speeds: Sequence[Any],
@@ -98,17 +100,17 @@ def joined_sizes(
     each: Sequence[tuple[dict[str, Any], Any]],
     choose: Choose,
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
-    """`natural_scales` of a machine in plain arithmetic, of arrays or of the nodes of a program.
+    """Natural scales of a machine in plain arithmetic, for arrays or nodes of a program.
 
-    A coordinate matters by what it slips at its contacts, or else by how far it moves in the shortest time that matters
-    at any of them; one that stands still by how far the largest friction stretches what holds it.
+    The scale of a displacement is the smallest that gives a natural slip distance at a contact; without contact, the
+    motion within the shortest natural time; at rest, the stretch of its springs by the largest friction force.
 
     Parameters
     ----------
     numbers : sequence
-        What `moving_parts` lists.
+        Values of `scale_expressions`.
     speeds, stresses, directs, each : sequence
-        Of every contact: slip rate and normal stress in steady sliding, size of the direct effect, its own `sizes`.
+        For every contact: steady slip rate and normal stress, direct effect, results of `contact_scales`.
     """
 
     def least(values: Sequence[Any]) -> Any:
@@ -128,15 +130,15 @@ def joined_sizes(
         x: Any = np.inf
         for i in range(count):
             share = abs(rest[n * i + k])
-            way = choose(share > 0, slips[i] / choose(share > 0, share, 1.0), np.inf)
-            x = choose(way < x, way, x)
+            displacement = choose(share > 0, slips[i] / choose(share > 0, share, 1.0), np.inf)
+            x = choose(displacement < x, displacement, x)
         x = choose(x < np.inf, x, abs(own[k]) * time)
         held = force / abs(stiff[k])
         x = choose(x > 0, x, choose((held > 0) & (held < np.inf), held, least(slips)))
         scales[f"{one.name}.x"] = x
         scales[f"{one.name}.v"] = choose(abs(own[k]) > 0, abs(own[k]), x / time)
     for contact, stress, direct in zip(model.contacts, stresses, directs, strict=True):
-        # a pressure matters where friction feels it
+        # pressures change friction by about their own size
         scales |= {item.name: choose(direct > 0, direct, abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.{SPEED}": found[SPEED]}
@@ -147,7 +149,7 @@ def joined_sizes(
             scales[item.name] = time * least(sensed)
 
     def searched(symbol: sp.Symbol) -> Any:
-        """The size of an unknown: of a velocity variable, a friction or an acceleration."""
+        """Scale of an unknown: velocity variable, friction stress or acceleration."""
         for i, (one, (found, _)) in enumerate(zip(reduction.slidings, each, strict=True)):
             if one.variable is not None and symbol is one.variable.w:
                 return found[SPEED]
@@ -159,7 +161,7 @@ def joined_sizes(
 
 
 def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
-    """The shortest time that matters in a machine, s."""
+    """Smallest ratio of displacement and velocity scales of a machine (s)."""
     own = [name.removesuffix(".x") for name in scales if name.endswith(".x")]
     found: Any = np.inf
     for name in own:
@@ -169,25 +171,25 @@ def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
 
 
 def direct_effect_scale(found: Weights, choose: Choose) -> Any:
-    """The size of the direct effect as far as it sets scales, Pa; zero where there is none."""
-    direct, least = abs(found.direct), _FELT * abs(found.stress)
+    """Direct effect used for scaling (Pa): bounded below relative to the normal stress, 0 if there is none."""
+    direct, least = abs(found.direct), _LEAST_DIRECT_SHARE * abs(found.stress)
     return choose(direct > 0, choose(direct > least, direct, least), 0.0)
 
 
-def sizes(
+def contact_scales(
     found: Weights, drive: Any, reduction: Reduction, choose: Choose, index: int = 0
 ) -> tuple[dict[str, Any], Any]:
-    """`natural_scales` at one contact in plain arithmetic, of arrays or of the nodes of a program.
+    """Natural scales of the variables of one contact, and of its unknown, in plain arithmetic.
 
-    An acceleration matters where its force is worth an e-fold of velocity: of a light block smaller ones are lost in
-    the rounding of the forces.
+    For arrays or nodes of a program. The scale of an acceleration is at least that whose inertial force equals the
+    effect of one e-fold of velocity: smaller ones of a light block are lost in the rounding of the forces.
 
     Parameters
     ----------
     choose : callable
-        ``choose(condition, value, other)``: `numpy.where` for arrays.
+        Function ``choose(condition, value, other)``: `numpy.where` for arrays.
     index : int, optional
-        The contact.
+        Index of the contact.
     """
     direct, by_slip = direct_effect_scale(found, choose), abs(found.by_slip)
     x: Any = np.inf
@@ -200,7 +202,7 @@ def sizes(
     for item, weight, value in zip(contact.memory, found.by_memory, found.memory, strict=True):
         own, scale = abs(value), direct / abs(weight)
         scale = choose((scale > 0) & (scale < np.inf), scale, choose(own > 0, own, 1.0))
-        most = choose(own > 1e-3 * scale, own, 1e-3 * scale)
+        most = choose(own > 1e-3 * scale, own, 1e-3 * scale)  # the steady value if smaller, within 1e-3; by trial
         scales[item.name] = choose((own > 0) & (most < scale), most, scale)
     scales |= {item.name: choose(direct > 0, direct, by_slip * x) for item in contact.own_states}
     scales |= {item.name: x * x / drive for item in reduction.model.integrals}

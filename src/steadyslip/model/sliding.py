@@ -1,4 +1,4 @@
-"""Steady sliding in words and numbers: each state of it, or why there is none."""
+"""States of steady sliding as results, and the error if there is none."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ ABSENT = {
     "lifted": "lift-off{at}. Its normal force would be {left}, must be > 0",
     "at": " at contact {name}",
 }
-"""Why there is no steady sliding; pages say it in the same words."""
+"""Message templates for missing steady sliding, also used by browser pages."""
 
 
 @dataclass(frozen=True)
 class SteadySliding(Displayed):
-    """One state of steady sliding.
+    """A state of steady sliding of a slider.
 
     Attributes
     ----------
@@ -49,9 +49,9 @@ class SteadySliding(Displayed):
     normal_stress, shear_stress, spring_stress : float
         Pa; the spring also carries the damping to the ground.
     friction : float
-        Shear over normal stress.
+        Ratio of shear to normal stress.
     states : dict of str to float
-        What the friction law calls its states (Θ, θ in s, z in m, ...).
+        States of the friction law (Θ, θ in s, z in m, ...).
     """
 
     velocity: float
@@ -87,7 +87,7 @@ class SteadyContact(Displayed):
     normal_force, friction_force : float
         N.
     friction : float
-        The one over the other.
+        Ratio of friction to normal force.
     states : dict of str to float
     """
 
@@ -100,17 +100,17 @@ class SteadyContact(Displayed):
 
 @dataclass(frozen=True)
 class SteadyMachine(Displayed):
-    """The steady sliding of a machine: everything moves rigidly.
+    """Steady sliding of a machine: all bodies move at constant speeds.
 
     Attributes
     ----------
     velocity : float
-        Of the drive, m/s or rad/s.
+        Velocity of the drive, m/s or rad/s.
     speeds : dict of str to float
-        Of every body, m/s or rad/s.
+        Speeds of the bodies, m/s or rad/s.
     contacts : dict of str to SteadyContact
     links : dict of str to float
-        Force with which the first end of every link pulls the second, N along the slide or the link; N m in a shaft.
+        Force with which the first end of each link pulls the second, N along the slide or the link; N m in a shaft.
     """
 
     velocity: float
@@ -144,7 +144,7 @@ def steady_state(rig: Machine) -> SteadyMachine: ...
 
 @checked()
 def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
-    """The steady sliding of a rig.
+    """Steady sliding of a rig.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
     Raises
     ------
     NoSteadySliding
-        Saying which condition fails (lock-up, lift-off) and by how much.
+        With the condition that fails (lock-up, lift-off) and its shortfall.
     NotAvailable
         If numbers leave the range of floating point.
     """
@@ -162,7 +162,7 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
 
 
 def steady_machine(rig: Machine) -> SteadyMachine:
-    """The steady sliding of a machine.
+    """Steady sliding of a machine.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def steady_states(rig: Machine) -> tuple[SteadyMachine, ...]: ...
 
 @checked()
 def steady_states(rig: Slider | Machine) -> tuple[SteadySliding, ...] | tuple[SteadyMachine, ...]:
-    """All states of steady sliding, by rising normal stress; of a machine the one that it has.
+    """All states of steady sliding of a slider, by rising normal stress; the only one of a machine.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def steady_states(rig: Slider | Machine) -> tuple[SteadySliding, ...] | tuple[St
 
 
 def observed_in_steady_sliding(model: Model) -> tuple[list[str], list[sp.Expr]]:
-    """Names and steady values of all observables but x, v and the normal stress."""
+    """Names and steady expressions of all observables except x, v and the normal stress."""
     names = [name for name in model.observables if name not in ("x", "v", "normal_stress")]
     return names, [model.observables[name][0].xreplace(model.steady) for name in names]
 
@@ -245,9 +245,9 @@ def _observable_function(model: Model) -> tuple[list[str], ArrayFunction]:
 
 
 def steady_contact_at(rig: Machine, contact: str, velocities: np.ndarray) -> dict[str, np.ndarray]:
-    """What is seen of a contact of a machine in steady sliding, its slip rate too, at velocities of its drive (k,).
+    """Steady observables and slip rate of a machine's contact at drive velocities (k,), by name; each (k,).
 
-    NaN where there is no steady sliding.
+    NaN without steady sliding.
     """
     point = operating_point(rig, {"drive.velocity": velocities})
     names, function = _observable_function(point.model)
@@ -260,7 +260,7 @@ def steady_contact_at(rig: Machine, contact: str, velocities: np.ndarray) -> dic
 
 
 def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
-    """The exception that says why a rig has no steady sliding, of a machine which contact locks up or lifts off.
+    """Make the NoSteadySliding error of a rig, with condition, shortfall and contact.
 
     Raises
     ------
@@ -279,7 +279,7 @@ def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
 
 
 def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | None) -> NoSteadySliding:
-    """Why a contact that depends on no other has no steady normal stress."""
+    """Error for a contact whose steady normal stress does not depend on other contacts."""
     equation = steady_equation(point.model, place)
     name = point.model.contacts[place].name
     at = _at(name)
@@ -308,7 +308,7 @@ def _absence(kind: str, contact: str, words: str, margin: float = math.nan) -> N
 
 
 def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySliding:
-    """Why contacts that press on each other have no steady normal stresses."""
+    """Error for contacts with coupled steady normal stresses."""
     contacts = point.model.contacts
     matrix, _ = joint.arrays(point.arguments)
     sigma, gain = joint.solve(point.arguments)
@@ -331,7 +331,7 @@ def _friction_function(model: Model, place: int) -> ArrayFunction:
 
 
 def _friction_coefficient(point: OperatingPoint, place: int) -> float:
-    """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact where τ is proportional to σ)."""
+    """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact if τ is proportional to σ)."""
     stresses = (1e6 for _ in point.model.contacts)
     value = float(_friction_function(point.model, place)(*point.arguments, *stresses)[0])
     return value if math.isfinite(value) else float("nan")

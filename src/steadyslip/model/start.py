@@ -1,4 +1,4 @@
-"""Where a motion starts: steady sliding, or what is given in its place, in the variables that jumps leave alone."""
+"""Initial values of a motion: steady sliding or given values, in the variables that jumps leave unchanged."""
 
 from __future__ import annotations
 
@@ -24,36 +24,36 @@ def _steady_memory(model: Model) -> ArrayFunction:
 
 @question
 def _continuous_names(reduction: Reduction) -> tuple[str, ...]:
-    """Names of what a jump leaves alone; ``w`` and the number of the contact is a velocity variable."""
+    """Names of `Reduction.continuous`; velocity variables are ``w`` and the index of the contact."""
     by_symbol = {item.symbol: item.name for item in reduction.model.variables}
     by_symbol |= {one.variable.w: f"w {i}" for i, one in enumerate(reduction.slidings) if one.variable is not None}
     return tuple(by_symbol[symbol] for symbol in reduction.continuous)
 
 
 @question
-def _own_memory(point: OperatingPoint) -> list[Any]:
-    """The memory in steady sliding."""
+def _steady_memory_values(point: OperatingPoint) -> list[Any]:
+    """Steady values of the memory variables, cached per point."""
     return point.evaluate(_steady_memory(point.model))
 
 
 def _number(value: Any) -> Any:
-    """A float or an array of them; NumPy is quicker with the former than with arrays without axes."""
+    """Convert to a NumPy float or array; NumPy is faster with floats than with 0-d arrays."""
     return np.asarray(value, dtype=float)[()]
 
 
 @question
 def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
-    """The velocity variable of a contact from its velocity and the memory of all."""
+    """Array function of a contact's velocity variable from its slip rate and all memory variables."""
     model, variable = reduction.model, reduction.slidings[index].variable
     if variable is None:
-        raise InternalError("variable is not None")
+        raise InternalError("a contact with a velocity variable")
     memory = (item.symbol for item in model.memory)
     return model.function([variable.w_of_v], model.contacts[index].velocity, *memory)
 
 
 @question
 def _slip_rates(model: Model) -> ArrayFunction:
-    """Velocities of the contacts from those of the coordinates, with the load point at that of steady sliding."""
+    """Array function of slip rates from velocities of the coordinates, with the load point at its steady velocity."""
     steady = {model.inputs["load_velocity"]: model.steady[model.inputs["load_velocity"]]}
     slips = (model.definitions.get(contact.velocity, contact.velocity) for contact in model.contacts)
     return model.function([e.xreplace(steady) for e in slips], *(one.velocity for one in model.coordinates))
@@ -61,7 +61,7 @@ def _slip_rates(model: Model) -> ArrayFunction:
 
 @question
 def _steady_states(model: Model) -> ArrayFunction:
-    """The states of contact laws."""
+    """Array function of the steady states of contact laws."""
     return model.function(model.steady[item.symbol] for item in model.states)
 
 
@@ -71,8 +71,8 @@ def _steady_speeds(model: Model) -> ArrayFunction:
 
 
 @question
-def _driven(model: Model) -> ArrayFunction:
-    """Force that the motion of the drive makes, less that of steady sliding, before the protocol begins."""
+def _drive_force(model: Model) -> ArrayFunction:
+    """Array function of the drive's force caused by its motion, minus that of steady sliding, before the protocol."""
     own, moves = model.letting_go, model.inputs["load_velocity"]
     force = sp.Integer(0) if own is None else own.driven.xreplace({moves: model.steady[moves]})
     given = (*(one.displacement for one in model.coordinates), *(one.velocity for one in model.coordinates))
@@ -81,9 +81,7 @@ def _driven(model: Model) -> ArrayFunction:
 
 @question
 def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
-    """The balance of a massless model before the protocol begins, its slope in one memory variable; whether that
-    is the same wherever that variable is.
-    """
+    """Balance of a massless slider before the protocol and its slope in one memory variable; True if it is linear."""
     model = reduction.model
     memory = [item.symbol for item in model.memory]
     ((w, balance),) = reduction.restarts
@@ -99,20 +97,20 @@ def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
 def initial_values(
     reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any], free: Any = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Continuous variables at the start and the velocity there.
+    """Initial values of the continuous variables, (rigs, variables), and slip rate of the first contact, (rigs,).
 
-    Steady sliding, unless a variable is given. Without mass, a given velocity needs a memory that goes with
-    it: the first memory variable that is not given itself follows from the balance of forces.
+    Steady sliding for all variables that are not given. Without mass a velocity can be given only if a memory variable
+    is not: the first such variable follows from the balance of forces.
 
     Parameters
     ----------
     free : float or ndarray, optional
-        1 where the motion begins with a drive that is let go, which pulls then as it did before; else 0.
+        1 where the motion begins with a released drive, whose force is then continuous; else 0.
 
     Raises
     ------
     ParameterError
-        Listing what is given and cannot be.
+        Listing the given values that are not allowed.
     """
     if given:
         return _initial_values(reduction, point, given, free)
@@ -122,7 +120,7 @@ def initial_values(
 
 @question
 def _steady_start(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
-    """That of steady sliding."""
+    """Initial values for steady sliding, cached per point."""
     return _initial_values(reduction, point, {})
 
 
@@ -132,7 +130,7 @@ def _initial_values(
     model = reduction.model
     names = [item.name for item in model.memory]
     start = _checked_initial(given, model)
-    memory = [_number(start.get(name, value)) for name, value in zip(names, _own_memory(point), strict=True)]
+    memory = [_number(start.get(name, value)) for name, value in zip(names, _steady_memory_values(point), strict=True)]
     own = [(item.name.removesuffix("x"), item) for item in model.variables if item.kind == "slip"]
     places = [_number(start.get(item.name, 0.0)) for _, item in own]
     alone = f"{own[0][0]}v"
@@ -160,7 +158,7 @@ def _initial_values(
         values[item.name] = _number(start.get(item.name, value))
     if model.letting_go is not None:
         integrals = (values[item.name] for item in model.integrals)
-        values[HELD] = free * point.evaluate(_driven(model), *places, *speeds, *integrals)[0]
+        values[HELD] = free * point.evaluate(_drive_force(model), *places, *speeds, *integrals)[0]
     order = _continuous_names(reduction)
     for i in range(len(slips)):
         if f"w {i}" in order:
@@ -175,7 +173,7 @@ def _initial_values(
 
 def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.ndarray]:
     moving = [item.name for item in model.variables if item.kind in ("slip", "velocity")]
-    if model.is_single:  # without inertia the memory makes up for a velocity that is given
+    if model.is_single:  # without inertia a memory variable is adjusted to a given velocity
         moving = [moving[0], f"{moving[0].removesuffix('x')}v"]
     known = [*moving, *(item.name for item in (*model.memory, *model.states, *model.integrals))]
     problems, found = [], {}
@@ -196,21 +194,21 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
 
 
 def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any, memory: list[Any], index: int) -> Any:
-    """The memory variable that balances forces at a given velocity, by Newton's method (one step where linear)."""
+    """Memory variable that balances the forces at a given velocity, by Newton's method (one step if linear)."""
     function, linear = _balance(reduction, index)
     current = list(memory)
-    for _ in range(1 if linear else 60):
+    for _ in range(1 if linear else 60):  # Newton converges in far fewer steps; chosen by trial
         with np.errstate(all="ignore"):
             residual, slope = point.evaluate(function, x, v, *current)
             change = residual / slope
         current[index] = current[index] - change
-        if not np.any(np.abs(change) > 1e-15 * (1 + np.abs(current[index]))):
+        if not np.any(np.abs(change) > 1e-15 * (1 + np.abs(current[index]))):  # some roundings
             break
     return current[index]
 
 
 def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, velocity: Any) -> list[Any]:
-    """Where the search starts for what is left to solve for: unknowns, and velocity variables that balances fix."""
+    """Initial guesses of `Reduction.searched`: unknowns, and velocity variables determined by balances."""
     model, found = reduction.model, []
     memory = [initial[:, reduction.continuous.index(item.symbol)] for item in model.memory]
     own = {one.variable.w: i for i, one in enumerate(reduction.slidings) if one.variable is not None}
@@ -225,11 +223,11 @@ def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, ve
 
 @question
 def _steady_unknowns(reduction: Reduction) -> ArrayFunction:
-    """What is searched for, in steady sliding; zero for velocity variables, which follow from velocities."""
+    """Array function of steady values of `Reduction.searched`; zero for velocity variables."""
     return reduction.model.function(reduction.model.steady.get(s, sp.Integer(0)) for s in reduction.searched)
 
 
 @question
 def restored_of(reduction: Reduction) -> ArrayFunction:
-    """What a jump leaves unchanged, from the state: for starting a kernel anywhere."""
+    """Array function of the continuous variables from state and inputs, to start a kernel at any state."""
     return reduction.model.function(reduction.restored, *reduction.state, *reduction.inputs)

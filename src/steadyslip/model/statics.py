@@ -1,12 +1,11 @@
-"""The forces of steady sliding: what every spring carries, and how far surfaces that give are pressed together.
+"""Statics of steady sliding: forces of springs, and displacements of compliant contacts.
 
-Friction and normal stresses are taken as known; the balance of forces of every coordinate, with everything moving at
-its steady speed, is then linear in the displacements. It is solved exactly, so that what the structure alone decides
-(the pull on a single block, the force in a chain of links) has no stiffness left in it.
+With given friction and normal stresses, the balances of forces at steady speeds are linear in the displacements. They
+are solved exactly, so that stiffnesses cancel in forces that do not depend on them (the pull on a single block, the
+force in a chain of links).
 
-Where bodies are held in several ways at once, as in the plane, the exact solution soon fills pages. Forces and
-displacements are symbols of their own then, `Carried`, and their equations are solved in numbers at every operating
-point.
+If bodies are supported in several ways, as in the plane, the exact solution soon fills pages. Forces and displacements
+are then symbols, `Carried`, and their equations are solved numerically at every operating point.
 """
 
 from __future__ import annotations
@@ -24,21 +23,21 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
-from steadyslip.model.determinant import TooLong, determinant
+from steadyslip.model.determinant import TooManyTerms, determinant
 from steadyslip.model.equations import Carried, Entries
-from steadyslip.model.stand_ins import StandIns
+from steadyslip.model.placeholders import Placeholders
 
 LONGEST = 8
-"""Terms that the determinant of a balance of forces may have for its exact solution to be worth having."""
+"""Largest number of terms of the determinant for which the statics are solved symbolically; chosen by trial."""
 UNHELD = "nothing holds some body of this machine in its place; give every body a link"
-Lettered = Callable[..., sp.Symbol]
+SymbolFactory = Callable[..., sp.Symbol]
 
 
 @dataclass(frozen=True)
 class Statics:
-    """Displacements from where springs are slack, and the integral of the controller, in steady sliding.
+    """Displacements from the unstressed state of springs, and integral of the controller, in steady sliding.
 
-    `tensions` are forces of springs by the `id` of their element, where they are symbols of their own, with `carried`.
+    `tensions` are symbols of spring forces by `id` of the element, if they are symbols with equations `carried`.
     """
 
     displacement: Mapping[str, sp.Expr]
@@ -47,38 +46,41 @@ class Statics:
     carried: Carried | None = None
 
     def tension(self, element: Element) -> sp.Expr:
-        """Force of the spring of an element."""
+        """Force of an element's spring."""
         if id(element) in self.tensions:
             return self.tensions[id(element)]
         return element.stiffness * row_of(element.senses, self.displacement)
 
 
 def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
-    """What a row makes of values of the coordinates, and of the load point where they have one."""
+    """Value of a row for given values of coordinates; coordinates without a value count as zero."""
     return sp.Add(*(sp.sympify(coefficient) * values[name] for name, coefficient in row.items() if name in values))
 
 
 @dataclass(frozen=True)
-class Press:
-    """Normal stress of a contact: `at_contact` where surfaces just touch, and its `slope` in their distance."""
+class NormalStress:
+    """Normal stress of a contact as a linear function of the distance: value at first touch, and slope (Pa/m)."""
 
     at_contact: sp.Expr
     slope: sp.Expr
 
 
 def statics(
-    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], lettered: Lettered
+    mechanism: Mechanism,
+    friction: Mapping[str, sp.Expr],
+    normal: Mapping[str, NormalStress],
+    make_symbol: SymbolFactory,
 ) -> Statics:
-    """Solve the balance of forces.
+    """Solve the balances of forces in steady sliding.
 
     Parameters
     ----------
     mechanism : Mechanism
     friction : dict of str to sympy.Symbol
-        Steady friction stress of every contact.
+        Steady friction stress of each contact.
     normal : dict of str to Press
     lettered : callable
-        A symbol called by the first word, with an unused letter for the dotted name that is the second.
+        Function of a symbol's name and a dotted name, from which its letter is made; see `Letters.symbol`.
     """
     names = [one.name for one in mechanism.coordinates]
     places = {name: inner_symbol(f"place.{i}") for i, name in enumerate(names)}
@@ -87,17 +89,17 @@ def statics(
     unknowns = [*places.values(), *([held] if integral is not None else [])]
     stretched = {id(one): one.stiffness * row_of(one.senses, places) for one in mechanism.elements}
     equations = _balances(mechanism, friction, normal, places, held, stretched)
-    found = _solved(equations, unknowns)
+    found = _solve(equations, unknowns)
     if found is None:
-        return _carried(mechanism, friction, normal, lettered)
+        return _with_symbolic_forces(mechanism, friction, normal, make_symbol)
     return Statics(dict(zip(names, found, strict=False)), found[-1] if integral is not None else sp.Integer(0))
 
 
 def _balances(
-    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press],
+    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, NormalStress],
     places: Mapping[str, sp.Expr], held: sp.Expr, tensions: Mapping[int, sp.Expr],
 ) -> list[sp.Expr]:  # fmt: skip
-    """What has to vanish: the error of the controller, where it is integrated, and the forces on every coordinate."""
+    """Residuals of the statics: integrated controller error, if any, and force on every coordinate."""
     integral = mechanism.integral
     speeds = {one.name: sp.sympify(one.speed) for one in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
     equations = [] if integral is None else [row_of(integral.senses, places)]
@@ -117,23 +119,26 @@ def _balances(
     return equations
 
 
-def _carried(
-    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], lettered: Lettered
+def _with_symbolic_forces(
+    mechanism: Mechanism,
+    friction: Mapping[str, sp.Expr],
+    normal: Mapping[str, NormalStress],
+    make_symbol: SymbolFactory,
 ) -> Statics:
-    """The same, with symbols for what is displaced and carried.
+    """Statics with symbols for displacements and spring forces, and their linear equations.
 
-    The force of a stiff spring would be lost in the difference of the places of its ends, so that it is an unknown.
+    Spring forces are unknowns because the force of a stiff spring would be lost in the difference of displacements.
     """
     places = {
-        one.name: lettered(f"displaced_{i:03d}", f"{one.name}.place", real=True)
+        one.name: make_symbol(f"displaced_{i:03d}", f"{one.name}.place", real=True)
         for i, one in enumerate(mechanism.coordinates)
     }
     springs = [one for one in mechanism.elements if one.stiffness != 0]
     tensions = {
-        id(one): lettered(f"carried_{i:03d}", f"{one.name or 'controller'}.carried", real=True)
+        id(one): make_symbol(f"carried_{i:03d}", f"{one.name or 'controller'}.carried", real=True)
         for i, one in enumerate(springs)
     }
-    held = lettered("carried_integral", "controller.integral", real=True)
+    held = make_symbol("carried_integral", "controller.integral", real=True)
     every = {id(one): sp.Integer(0) for one in mechanism.elements} | tensions
     equations = _balances(mechanism, friction, normal, places, held, every)
     equations += [row_of(one.senses, places) - tensions[id(one)] / one.stiffness for one in springs]
@@ -154,17 +159,17 @@ def _carried(
     return Statics(places, held if mechanism.integral is not None else sp.Integer(0), every, carried)
 
 
-def _solved(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr] | None:
-    """The solution of linear equations, in lowest terms; None where it is too long to be written."""
-    stand_ins = StandIns()
+def _solve(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr] | None:
+    """Exact solution of linear equations in lowest terms; None if it is too long."""
+    placeholders = Placeholders()
     nothing = dict.fromkeys(unknowns, sp.Integer(0))
-    matrix = [[stand_ins.polynomial(derivative(sp.expand(e), u)) for u in unknowns] for e in equations]
-    right = [[stand_ins.polynomial(-e.xreplace(nothing))] for e in equations]
+    matrix = [[placeholders.polynomial(derivative(sp.expand(e), u)) for u in unknowns] for e in equations]
+    right = [[placeholders.polynomial(-e.xreplace(nothing))] for e in equations]
     try:
         determinant([[{(0,): one} if one != 0 else {} for one in row] for row in matrix], LONGEST)
-    except TooLong:
+    except TooManyTerms:
         return None
-    symbols = sorted(_symbols(entry for row in (*matrix, *right) for entry in row), key=str)
+    symbols = sorted(_free_symbols(entry for row in (*matrix, *right) for entry in row), key=str)
     field = QQ.frac_field(*symbols) if symbols else QQ
     try:
         table, known = (
@@ -174,8 +179,8 @@ def _solved(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr
         found = table.lu_solve(known).to_Matrix()
     except (DMNonInvertibleMatrixError, ZeroDivisionError):
         raise NotAvailable(UNHELD) from None
-    return [stand_ins.back(found[i, 0]) for i in range(len(unknowns))]
+    return [placeholders.restored(found[i, 0]) for i in range(len(unknowns))]
 
 
-def _symbols(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
+def _free_symbols(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
     return {symbol for e in expressions for symbol in e.free_symbols}

@@ -1,8 +1,8 @@
-"""Steady sliding: the normal stress that the contact and the friction agree on, and what follows.
+"""Solution for the steady normal stresses.
 
-σss solves σ = contact(x = 0, v = v0, v̇ = 0, T = τss + ηv0, τ = τss(v0, σ)) and must be positive (theory 3).
-Where the contact is linear in the stresses it is σss = (σ0 + g0)/(1 − g1), with g0 + g1 σ the coupling in
-steady sliding: g1 >= 1 is lock-up (friction grows faster than the spring can pull), σ0 + g0 <= 0 lift-off.
+σss solves σ = contact(x = 0, v = v0, v̇ = 0, T = τss + ηv0, τ = τss(v0, σ)) and must be positive (theory 3). If the
+contact is linear in the stresses, σss = (σ0 + g0)/(1 − g1), with g0 + g1 σ the coupling in steady sliding: g1 >= 1 is
+lock-up (friction grows faster than the spring can pull), σ0 + g0 <= 0 lift-off.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from steadyslip.core.questions import question
 from steadyslip.model.equations import Carried, Entries, Model
 
 Arguments = tuple[Any, ...]
-GRID = np.geomspace(1e-12, 1e18, 6001)  # stresses between whose neighbours a root is looked for, Pa
-SOLVED = 1e-6  # misfit of a root as a share of its stress: a pole changes sign too
-_NEARLY_REAL = 1e-9  # relative imaginary part of what is real but for rounding
-_TOGETHER = 64  # rigs that are searched at once, so that arrays stay in the processor's cache
-_HALVINGS = 48  # of a cell of the grid, a hundredth of its stress wide, to rounding
+GRID = np.geomspace(1e-12, 1e18, 6001)  # Pa; grid for sign changes, 200 points per decade; chosen by trial
+ROOT_TOLERANCE = 1e-6  # residual over stress, above which a change of sign is a pole and not a root
+_NEARLY_REAL = 1e-9  # relative imaginary part of an eigenvalue that counts as rounding; chosen by trial
+_BATCH = 64  # rigs searched at once, so that arrays stay in the processor's cache
+_HALVINGS = 48  # bisections: a cell is 0.012 of its stress wide, and 0.012 / 2**48 is below rounding
 
 
 @dataclass(frozen=True)
 class SteadyEquation:
-    """The steady normal stress as arrays: closed form where the contact is linear in the stresses.
+    """Equation of the steady normal stress of one contact; in closed form if the contact is linear in the stresses.
 
-    ``parts(*arguments)`` gives (load, g0, g1), the load being σss itself where that is `given`; `sigma` and
-    `slope` are σss and g1 in symbols. Without a closed form only `residual` is there.
+    ``parts(*arguments)`` returns (load, g0, g1), where load is σss itself if that is `given`; `sigma` and `slope` are
+    the expressions of σss and g1. Without a closed form there is only the function `residual`.
     """
 
     affine: bool
@@ -46,13 +46,12 @@ class SteadyEquation:
 
 @question
 def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
-    """How a model determines the steady normal stress of a contact, by its place, or of the one it has.
+    """Equation of the steady normal stress of a contact, by its index, or of a slider's contact.
 
     Raises
     ------
     NotAvailable
-        If it depends on that of another contact (see `joint_equation`). Or if no place is named and there are several
-        contacts.
+        If it depends on that of another contact (see `joint_equation`), or if `place` is None for a machine.
     """
     contact = model.contact if place is None else model.contacts[place]
     sigma = contact.sigma_ss
@@ -61,25 +60,25 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
         raise NotAvailable("this contact is pressed by others; all steady normal stresses follow together")
     slope = derivative(contact.steady_coupling, sigma)
     given = contact.steady_load is None
-    # where σss is given, the contact hands back that parameter and sigma_ss does not occur
+    # if σss is given, the contact law returns that parameter and sigma_ss does not occur
     load = contact.steady_stress if contact.steady_load is None else contact.steady_load
     arguments = list(model.parameters.values())
     affine = sigma not in slope.free_symbols and sigma not in load.free_symbols
     residual = ArrayFunction([*arguments, sigma], [contact.steady_stress - sigma])
     if not affine:
         return SteadyEquation(False, given, residual)
-    # others are in it only where the stress is given, and the coupling counts from its steady value
+    # other contacts' stresses occur only if steady_normal_stress is given, and cancel then: set them to 0
     offset = contact.steady_coupling.xreplace(dict.fromkeys({sigma, *others}, sp.Integer(0)))
     parts = ArrayFunction(arguments, [load, offset, slope])
-    solved = load if given else (load + offset) / (1 - slope)
-    return SteadyEquation(True, given, residual, parts, solved, slope)
+    sigma_ss = load if given else (load + offset) / (1 - slope)
+    return SteadyEquation(True, given, residual, parts, sigma_ss, slope)
 
 
 @dataclass(frozen=True)
 class JointEquation:
-    """The steady normal stresses of contacts that press on each other: σ = A σ + b.
+    """Equations of coupled steady normal stresses: σ = A σ + b.
 
-    ``parts(*arguments)`` gives A, row by row, and b; `matrix` and `rest` are the same in symbols.
+    ``parts(*arguments)`` returns A row by row, then b; `matrix` and `rest` are the expressions of A and b.
     """
 
     size: int
@@ -88,34 +87,34 @@ class JointEquation:
     rest: tuple[sp.Expr, ...]
 
     def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
-        """A (..., n, n) and b (..., n)."""
+        """Values of A, (..., n, n), and b, (..., n)."""
         count = self.size**2
-        found = numbers_of(self.parts, arguments)
+        found = stacked_values(self.parts, arguments)
         return found[..., :count].reshape(*found.shape[:-1], self.size, self.size), found[..., count:]
 
     def solve(self, arguments: Arguments) -> tuple[Array, Array]:
-        """σ (..., n), and the largest real eigenvalue of A, −inf where none is real: at one and above it is lock-up."""
+        """Solution σ (..., n) in Pa, and largest real eigenvalue of A (−inf if none is real); >= 1 is lock-up."""
         matrix, right = self.arrays(arguments)
         good = np.all(np.isfinite(matrix), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1)
         matrix = np.where(good[..., None, None], matrix, 0.0)
         gains = np.linalg.eigvals(matrix)
         largest = np.max(np.where(np.abs(gains.imag) <= _NEARLY_REAL * np.abs(gains), gains.real, -np.inf), axis=-1)
-        return solved(np.eye(self.size) - matrix, np.where(good[..., None], right, np.nan)), largest
+        return solve_or_nan(np.eye(self.size) - matrix, np.where(good[..., None], right, np.nan)), largest
 
 
 @dataclass(frozen=True)
 class CarriedEquation(JointEquation):
-    """The same where what links carry is no formula: with M z = r + F τ + G σ, and laws linear in z, τ and σ.
+    """Equations of coupled steady normal stresses and link forces z: M z = r + F τ + G σ, with linear laws.
 
-    ``parts(*arguments)`` gives what is not zero of M, r, F, G, of stresses by z and by σ, of friction by σ, and of both
-    the rest; `places` says where it belongs.
+    ``parts(*arguments)`` returns the nonzero entries of nine blocks: M, r, F, G, derivatives of σ by z and by σ, of τ
+    by σ, and the constants of σ and τ; `places` has their rows and columns by block.
     """
 
     places: tuple[tuple[tuple[int, int], ...], ...] = ()
     count: int = 0
 
     def _blocks(self, arguments: Arguments) -> list[Array]:
-        found, start = numbers_of(self.parts, arguments), 0
+        found, start = stacked_values(self.parts, arguments), 0
         many, few = self.count, self.size
         shapes = [(many, many), (many, 1), (many, few), (many, few), (few, many), (few, few), (few, few), (few, 1),
                   (few, 1)]  # fmt: skip
@@ -129,10 +128,10 @@ class CarriedEquation(JointEquation):
         return blocks
 
     def _by_stress(self, blocks: list[Array]) -> tuple[Array, Array]:
-        """z = Z σ + z0: both."""
+        """Matrix Z and vector z0 of z = Z σ + z0."""
         matrix, rest, by_friction, by_normal, _, _, friction, _, offset = blocks
         right = np.concatenate([by_friction @ friction + by_normal, rest + by_friction @ offset], axis=-1)
-        z = solved_all(matrix, right)
+        z = solve_all_or_nan(matrix, right)
         return z[..., :-1], z[..., -1:]
 
     def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
@@ -142,26 +141,26 @@ class CarriedEquation(JointEquation):
         return direct + by_carried @ by_stress, (load + by_carried @ alone)[..., 0]
 
     def carried(self, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
-        """z at these normal stresses."""
+        """Link forces and displacements z at given normal stresses (Pa)."""
         by_stress, alone = self._by_stress(self._blocks(arguments))
         sigma = np.stack(np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in sigmas)), axis=-1)
         found = (by_stress @ sigma[..., None] + alone)[..., 0]
         return tuple(found[..., i][()] for i in range(self.count))
 
 
-def numbers_of(function: Callable[..., Any], arguments: Arguments) -> Array:
-    """What an array function gives, along a last axis."""
+def stacked_values(function: Callable[..., Any], arguments: Arguments) -> Array:
+    """Values of an array function stacked along a last axis."""
     with np.errstate(all="ignore"):
         return np.stack(np.broadcast_arrays(*(np.asarray(e, dtype=float) for e in function(*arguments))), axis=-1)
 
 
-def solved(matrix: Array, right: Array) -> Array:
-    """The solution of linear equations (..., n), NaN where there is none."""
-    return solved_all(matrix, right[..., None])[..., 0]
+def solve_or_nan(matrix: Array, right: Array) -> Array:
+    """Solution of linear equations, (..., n); NaN if singular or not finite."""
+    return solve_all_or_nan(matrix, right[..., None])[..., 0]
 
 
-def solved_all(matrix: Array, right: Array) -> Array:
-    """Solutions for several right sides (..., n, m), NaN where there are none."""
+def solve_all_or_nan(matrix: Array, right: Array) -> Array:
+    """Solutions of linear equations for several right sides, (..., n, m), with equilibration; NaN if singular."""
     with np.errstate(all="ignore"):
         rows = np.max(np.abs(matrix), axis=-1, keepdims=True)
         even = matrix / np.where(rows > 0, rows, 1.0)
@@ -178,12 +177,12 @@ def solved_all(matrix: Array, right: Array) -> Array:
 
 @question
 def joint_equation(model: Model) -> JointEquation | None:
-    """How contacts that press on each other determine their steady normal stresses; None where none does.
+    """Equations of coupled steady normal stresses; None if no contact depends on another.
 
     Raises
     ------
     NotAvailable
-        If some contact is not linear in the stresses.
+        If a contact is not linear in the stresses.
     """
     sigmas = [contact.sigma_ss for contact in model.contacts]
     slopes = tuple(tuple(derivative(contact.steady_stress, one) for one in sigmas) for contact in model.contacts)
@@ -226,13 +225,13 @@ def _carried_equation(model: Model, carried: Carried, nothing: dict[sp.Symbol, s
 
 
 def carried_forces(model: Model, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
-    """Numbers of what links carry in steady sliding, where these are symbols of the model; none elsewhere."""
+    """Values of `Model.carried` in steady sliding; empty if the Model has none."""
     joint = joint_equation(model) if model.carried is not None else None
     return joint.carried(arguments, sigmas) if isinstance(joint, CarriedEquation) else ()
 
 
 def steady_stresses(model: Model, arguments: Arguments, branch: int) -> tuple[Any, ...]:
-    """σss (Pa) of every contact as arrays over the varied parameters, NaN where steady sliding does not exist."""
+    """Steady normal stress σss (Pa) of every contact, each over the varied parameters; NaN without steady sliding."""
     joint = joint_equation(model)
     if joint is None:
         return tuple(steady_stress(model, arguments, branch, place) for place in range(len(model.contacts)))
@@ -242,9 +241,9 @@ def steady_stresses(model: Model, arguments: Arguments, branch: int) -> tuple[An
 
 
 def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -> Any:
-    """σss (Pa) of a contact as an array over the varied parameters, NaN where steady sliding does not exist.
+    """Steady normal stress σss (Pa) of one contact over the varied parameters; NaN without steady sliding.
 
-    Where there are several solutions, the one of number `branch`.
+    If there are several solutions, the one with index `branch`.
     """
     equation = steady_equation(model, place)
     if equation.parts is None:
@@ -254,8 +253,8 @@ def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -
     return np.where((slope < 1) & (np.asarray(sigma) > 0), sigma, np.nan)[()]
 
 
-def beyond_floats(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
-    """Where an equation for σss leaves the range of floating point, so that nothing can be said."""
+def out_of_range(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
+    """True where the equations of σss overflow, so that existence of steady sliding is unknown; `shape`."""
     found = np.zeros(shape, dtype=bool)
     joint = joint_equation(model)
     if joint is not None:
@@ -268,7 +267,7 @@ def beyond_floats(model: Model, arguments: Arguments, shape: tuple[int, ...]) ->
 
 
 def steady_roots(model: Model, arguments: Arguments) -> list[float]:
-    """All positive σss of a single rig with one contact, rising."""
+    """All positive σss (Pa) of a single slider, rising."""
     equation = steady_equation(model)
     if equation.affine:
         sigma = float(steady_stress(model, arguments, 0, model.contacts.index(model.contact)))
@@ -280,17 +279,17 @@ def _by_search(equation: SteadyEquation, arguments: Arguments, branch: int) -> A
     arrays = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in arguments))
     flat = [one.reshape(-1) for one in arrays]
     result = np.full(flat[0].shape, np.nan)
-    for start in range(0, len(result), _TOGETHER):
-        found = _search(equation.residual, [one[start : start + _TOGETHER] for one in flat])
+    for start in range(0, len(result), _BATCH):
+        found = _search(equation.residual, [one[start : start + _BATCH] for one in flat])
         for i, roots in enumerate(found, start=start):
             result[i] = roots[branch] if len(roots) > branch else np.nan
     return result.reshape(arrays[0].shape)[()]
 
 
 def _search(residual: Callable[..., Any], arguments: list[Array]) -> list[list[float]]:
-    """Of each rig the roots of the residual over thirty decades of stress, rising, each bracketed by a change of sign.
+    """Roots of the residual (Pa) of each rig over thirty decades of stress, rising.
 
-    All brackets are halved at once, until no number is between their ends.
+    Brackets are sign changes on `GRID`; all are bisected at once to rounding.
     """
     with np.errstate(all="ignore"):
         shape = (len(arguments[0]), len(GRID))
@@ -308,6 +307,6 @@ def _search(residual: Callable[..., Any], arguments: list[Array]) -> list[list[f
         nearer = (apart[1] < apart[0]).astype(int)
         roots, apart = (np.take_along_axis(one, nearer[None], axis=0)[0] for one in (ends, apart))
     found: list[list[float]] = [[float(one) for one in GRID[good[i] & (value[i] == 0)]] for i in range(shape[0])]
-    for i in np.flatnonzero(apart <= SOLVED * roots):
+    for i in np.flatnonzero(apart <= ROOT_TOLERANCE * roots):
         found[rows[i]].append(float(roots[i]))
     return [sorted(one) for one in found]

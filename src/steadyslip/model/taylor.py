@@ -1,8 +1,8 @@
-"""Second and third derivatives of a Model at steady sliding, exact and symbolic.
+"""Derivatives of a Model at steady sliding up to third order, symbolic.
 
-The Model is taken as it stands: variables, unknowns of contacts and coordinates, velocities of slip and the stresses
-T, τ, σ are all unknowns of one system M Y' = F(Y), whose last rows (balances and definitions) have no derivative. Every
-equation then stays short and so do its derivatives; nothing has to be solved for first, bodies without mass included.
+Variables, unknowns of contacts and coordinates, slip rates and the stresses T, τ, σ are the unknowns of one
+differential-algebraic system M Y' = F(Y), whose last rows (balances and definitions) have no time derivative. Nothing
+is eliminated, so equations and their derivatives stay short, with massless bodies too.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 
 Index = tuple[int, ...]
-"""(equation, variable, ...), variables in rising order."""
+"""Indices (equation, variable, ...) of a derivative, variables in rising order."""
 Entry = tuple[Index, Array, Array]
-"""A derivative: where it stands, its values (m,) and their errors (m,)."""
+"""Derivative: its indices, values (m,) and their rounding errors (m,)."""
 EPS = float(np.finfo(float).eps)
-PATTERNS = 4
-"""Signs with which all numbers of a rig are moved by one rounding, to see how far derivatives move."""
-OPERATIONS = 4
-"""In a row that an entry takes on the average: each rounds by half of `EPS` at most."""
+ROUNDING_PATTERNS = 4
+"""Number of random sign patterns with which all numbers of a rig are perturbed by one rounding, to estimate errors."""
+OPERATIONS_PER_ENTRY = 4
+"""Assumed number of consecutive operations of a derivative; each rounds by half of `EPS` at most. Chosen by trial."""
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The equations of a Model with everything that appears in them as unknowns.
+    """Equations of a Model as a differential-algebraic system, with its derivatives.
 
     Attributes
     ----------
     unknowns : tuple of sympy.Symbol
-        Variables, then the algebraic unknowns of contacts and coordinates, velocities of slip, T, τ and σ.
+        Variables, then the algebraic unknowns of contacts and coordinates, slip rates, T, τ and σ.
     dynamic : int
-        How many of them have a time derivative (the first ones).
+        Number of unknowns with a time derivative (the first ones).
     entries : tuple of (Index, ...)
-        For orders one, two and three: where derivatives do not vanish.
+        Indices of the nonzero derivatives of orders one, two and three.
     expressions : tuple of sympy.Expr
-        These derivatives in steady sliding, in order.
+        These derivatives in steady sliding, in the same order.
     function : ArrayFunction
-        Of them.
+        Array function of the expressions.
     """
 
     model: Model
@@ -58,13 +58,13 @@ class System:
     function: ArrayFunction
 
     def place(self, symbol: sp.Symbol) -> int:
-        """Index of one of the unknowns."""
+        """Index of an unknown."""
         return self.unknowns.index(symbol)
 
 
 @question
 def system(model: Model) -> System:
-    """Differentiate a model three times at steady sliding.
+    """Differentiate a Model three times at steady sliding.
 
     Raises
     ------
@@ -105,12 +105,12 @@ def system(model: Model) -> System:
 
 @dataclass(frozen=True, eq=False)
 class Taylor:
-    """Derivatives of F in numbers, for one rig or `m` of them.
+    """Values of the derivatives of F for `m` rigs.
 
     Attributes
     ----------
     gradient, gradient_error : ndarray (m, n, n)
-        Errors are what rounding makes of all numbers, those of the rig included.
+        Errors include rounding of the rig's own numbers.
     second, third : list of Entry
     mass : ndarray (n,)
         Ones for equations with a time derivative, zeros for the others.
@@ -124,12 +124,12 @@ class Taylor:
     mass: Array
 
     def sizes(self) -> Taylor:
-        """The same with the absolute values of higher derivatives."""
+        """Copy with absolute values of the second and third derivatives, for bounds."""
         second, third = ([(at, np.abs(e), error) for at, e, error in part] for part in (self.second, self.third))
         return replace(self, second=second, third=third)
 
     def errors(self) -> Taylor:
-        """The same with the errors of higher derivatives in their place."""
+        """Copy with errors in place of the second and third derivatives, for bounds."""
         second, third = ([(at, error, error) for at, _, error in part] for part in (self.second, self.third))
         return replace(self, second=second, third=third)
 
@@ -151,22 +151,22 @@ class Taylor:
 
 @lru_cache(maxsize=1024)
 def arrangements(*index: int) -> tuple[Index, ...]:
-    """Every order of some variables, once."""
+    """Distinct permutations of variable indices."""
     return tuple(set(permutations(index)))
 
 
 def taylor(point: OperatingPoint) -> Taylor:
-    """Derivatives of every rig of an operating point (flat arrays) in its steady sliding."""
+    """Evaluate the derivatives in steady sliding for every rig of a flat operating point."""
     found = system(point.model)
     arguments = [np.atleast_1d(np.asarray(one, dtype=float)) for one in (*point.arguments, *point.steady)]
-    signs = np.random.default_rng(0).choice((-1.0, 1.0), (PATTERNS, len(arguments)))
+    signs = np.random.default_rng(0).choice((-1.0, 1.0), (ROUNDING_PATTERNS, len(arguments)))
     moved = 1.0 + EPS * np.concatenate([np.zeros((1, len(arguments))), signs])
     numbers = found.function(*(factor[:, None] * one for factor, one in zip(moved.T, arguments, strict=True)))
-    shape = np.broadcast_shapes((PATTERNS + 1, 1), *(np.shape(one) for one in numbers))
+    shape = np.broadcast_shapes((ROUNDING_PATTERNS + 1, 1), *(np.shape(one) for one in numbers))
     entries: list[Entry] = []
     for place, number in zip((place for part in found.entries for place in part), numbers, strict=True):
         whole = np.broadcast_to(np.asarray(number, dtype=float), shape)
-        error = np.max(np.abs(whole[1:] - whole[0]), axis=0) + OPERATIONS * EPS * np.abs(whole[0])
+        error = np.max(np.abs(whole[1:] - whole[0]), axis=0) + OPERATIONS_PER_ENTRY * EPS * np.abs(whole[0])
         entries.append((place, whole[0], error))
     n, first, second = len(found.unknowns), *(len(part) for part in found.entries[:2])
     gradient = np.zeros((2, shape[1], n, n))

@@ -1,4 +1,4 @@
-"""Unknowns that equations fix together at every moment, and how they follow what the equations depend on."""
+"""Implicit differentiation of unknowns that are determined together by equations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steadyslip.core.expressions import derivative
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """As many unknowns as residuals, which are zero in motion.
+    """Unknowns and as many residuals, which are zero in motion.
 
     Attributes
     ----------
@@ -27,26 +27,26 @@ class Unknowns:
 
     @cached_property
     def matrix(self) -> list[list[sp.Expr]]:
-        """Derivative of each residual in each unknown."""
+        """Jacobian of the residuals with respect to the unknowns, rows of expressions."""
         return [[derivative(residual, symbol) for symbol in self.symbols] for residual in self.residuals]
 
-    def followed(self, expression: sp.Expr, pushed: Sequence[sp.Expr]) -> sp.Expr:
-        """How an expression changes through the unknowns, when the residuals are pushed away from zero by so much."""
+    def followed(self, expression: sp.Expr, perturbation: Sequence[sp.Expr]) -> sp.Expr:
+        """First-order change of an expression through the unknowns for a `perturbation` of the residuals."""
         own = [(k, derivative(expression, symbol)) for k, symbol in enumerate(self.symbols) if expression.has(symbol)]
         if not own:
             return sp.Integer(0)
-        changes = self.changes(pushed)
+        changes = self.changes(perturbation)
         return sp.Add(*(slope * changes[k] for k, slope in own))
 
     def along(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-        """Derivative of an expression in a variable, the unknowns following so that the residuals stay zero."""
+        """Total derivative with respect to a variable, with the unknowns following so that the residuals stay zero."""
         own = [derivative(residual, variable) for residual in self.residuals]
         return derivative(expression, variable) + self.followed(expression, own)
 
-    def changes(self, pushed: Sequence[sp.Expr]) -> list[sp.Expr]:
-        """What the unknowns change by: −M⁻¹ `pushed`, M the `matrix`, by elimination without multiplying out."""
+    def changes(self, perturbation: Sequence[sp.Expr]) -> list[sp.Expr]:
+        """First-order changes −M⁻¹ `perturbation` of the unknowns, M the `matrix`, by elimination without expansion."""
         rows, factors = self._factors
-        right = [-one for one in pushed]
+        right = [-one for one in perturbation]
         for i, k, factor in factors:
             right[i] -= factor * right[k]
         found: dict[int, sp.Expr] = {}
@@ -58,7 +58,7 @@ class Unknowns:
 
     @cached_property
     def _factors(self) -> tuple[list[tuple[int, list[sp.Expr]]], list[tuple[int, int, sp.Expr]]]:
-        """Upper triangle, each row with the number of its equation; which multiple of k equation i loses, in turn."""
+        """LU factors: rows of the upper triangle with their equation; steps (i, k, f), equation i minus f times k."""
         rows, factors = list(enumerate(map(list, self.matrix))), []
         for k in range(len(rows)):
             pivot = next((i for i in range(k, len(rows)) if rows[i][1][k] != 0), None)

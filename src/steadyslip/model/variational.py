@@ -1,8 +1,8 @@
-"""A reduced Model together with its linearisation along the motion.
+"""Variational equations: a Reduction extended by sensitivities along the motion.
 
-Beside the state y, further columns are integrated: S = ∂y(t)/∂y(0), S' = J(y) S, and for constants c(ε) that change
-in some direction, D = ∂y(t)/∂ε, D' = J(y) D + (∂f/∂c) c'. The result is a Reduction like any other, so that the
-same kernels, methods and step control serve cycles, their Floquet multipliers and continuation, and fits.
+In addition to the state y, S = ∂y(t)/∂y(0) with S' = J(y) S, and D = ∂y(t)/∂ε with D' = J(y) D + (∂f/∂c) c'
+for constants c(ε), are integrated. The result is a Reduction, so the same kernels, methods and step control serve
+cycles, Floquet multipliers, continuation and fits.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Column = tuple[sp.Symbol, ...]
 
 @question
 def with_sensitivities(reduction: Reduction) -> Reduction:
-    """The reduction whose state is y, then S column by column, then D in one direction."""
+    """Reduction whose state is y, then S column by column, then D in one direction."""
     n = len(reduction.state)
     columns = tuple(_column(f"S_{k}", n) for k in range(n))
     return _extended(reduction, columns, (_column("D", n),))
@@ -28,7 +28,7 @@ def with_sensitivities(reduction: Reduction) -> Reduction:
 
 @question
 def with_directions(reduction: Reduction, count: int) -> Reduction:
-    """The reduction whose state is y, then D in each of several directions."""
+    """Reduction whose state is y, then D in each of `count` directions."""
     return _extended(reduction, (), tuple(_column(f"D_{k}", len(reduction.state)) for k in range(count)))
 
 
@@ -37,7 +37,7 @@ def _column(name: str, size: int) -> Column:
 
 
 def _extended(reduction: Reduction, free: tuple[Column, ...], driven: tuple[Column, ...]) -> Reduction:
-    """Add columns that follow the linearised equations, freely or driven by changing constants."""
+    """Add columns with the linearised equations: `free` ones, and ones `driven` by changes of constants."""
     jacobian = reduction.jacobian()
     columns = free + driven
     rates = tuple(

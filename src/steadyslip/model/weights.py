@@ -1,4 +1,4 @@
-"""How steep friction and its balance are in steady sliding, and which memory variable may be left out for that."""
+"""Derivatives of friction and its balance in steady sliding, and the choice of the eliminated memory variable."""
 
 from __future__ import annotations
 
@@ -17,29 +17,30 @@ from steadyslip.model.kinematics import kinematics
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import can_eliminate
 
-LEAST_WEIGHT = 1e-5  # in that of ln v, below which a memory variable is not eliminated: its inverse amplifies rounding
+LEAST_WEIGHT = 1e-5  # least weight in friction, relative to ln v's, to eliminate a memory variable: its inverse
+# amplifies rounding, here by 1e5; chosen by trial
 
 
 @dataclass(frozen=True)
 class Weights(ReadOnly):
-    """Derivatives in steady sliding, as arrays or as nodes of a program.
+    """Derivatives at a contact in steady sliding, as arrays or nodes of a program.
 
     Attributes
     ----------
     direct : ndarray
-        Of friction in ln v, Pa.
+        Derivative of friction with respect to ln v, Pa.
     by_slip : ndarray
-        Of the balance in x, Pa/m.
+        Derivative of the balance with respect to x, Pa/m.
     by_memory : tuple of ndarray
-        Of friction in each memory variable.
+        Derivative of friction with respect to each memory variable.
     decay : tuple of ndarray
-        Of each memory variable's rate in itself, 1/s.
+        Derivative of each memory variable's rate with respect to itself, 1/s.
     memory : tuple of ndarray
-        The memory variables themselves.
+        Steady values of the memory variables.
     by_unknown : ndarray
-        Of the balance in its unknown.
+        Derivative of the balance with respect to its unknown.
     stress : ndarray
-        The normal stress itself, Pa.
+        Normal stress, Pa.
     """
 
     direct: Any
@@ -52,25 +53,25 @@ class Weights(ReadOnly):
 
     @classmethod
     def of(cls, values: Sequence[Any]) -> Weights:
-        """From the values of what `weighed` lists."""
+        """Make `Weights` from the values of `weight_expressions`."""
         direct, by_slip, by_unknown, stress, *rest = values
         count = len(rest) // 3
         by_memory, decay, memory = (tuple(rest[i : i + count]) for i in (0, count, 2 * count))
         return cls(direct, by_slip, by_memory, decay, memory, by_unknown, stress)
 
 
-def weighed(model: Model, index: int = 0) -> list[sp.Expr]:
-    """What `Weights` holds: direct, by slip, by unknown, stress, then of each memory its weight, its decay, itself."""
+def weight_expressions(model: Model, index: int = 0) -> list[sp.Expr]:
+    """Expressions of `Weights`: direct, by slip, by unknown, stress; weights, decays and values of the memory."""
     contact = model.contacts[index]
     v, memory = contact.velocity, [item.symbol for item in contact.memory]
-    wanted = [v * derivative(contact.balance, v), *_held(model, index), contact.sigma_ss]
+    wanted = [v * derivative(contact.balance, v), *_balance_slopes(model, index), contact.sigma_ss]
     wanted += [derivative(contact.balance, m) for m in memory]
     wanted += [derivative(model.rate_of[m], m) for m in memory]
     return [model.at_steady(e.doit()) for e in (*wanted, *memory)]
 
 
-def _held(model: Model, index: int) -> list[sp.Expr]:
-    """Derivatives of a contact's balance of forces in slip and in what it fixes; per area of that contact."""
+def _balance_slopes(model: Model, index: int) -> list[sp.Expr]:
+    """Derivatives of a contact's balance of forces (per area) with respect to slip and to its unknown."""
     contact, place = model.contacts[index], kinematics(model).coordinates[index]
     inlined = model.inlined(contact.balance)
     if contact.friction in model.definitions:
@@ -86,24 +87,24 @@ def _held(model: Model, index: int) -> list[sp.Expr]:
 
 @question
 def _weights_function(model: Model, index: int) -> ArrayFunction:
-    return model.function(weighed(model, index))
+    return model.function(weight_expressions(model, index))
 
 
 @question
 def weights(point: OperatingPoint, index: int = 0) -> Weights:
-    """Derivatives in steady sliding of all rigs of a point, at one of their contacts."""
+    """Derivatives in steady sliding at contact `index`, for all rigs of a point."""
     found = _weights_function(point.model, index)(*arrays_of(point))
     return Weights.of([np.asarray(x, dtype=float) for x in found])
 
 
 def arrays_of(point: OperatingPoint) -> list[np.ndarray]:
-    """Parameters and normal stresses of a point, as arrays."""
+    """Parameters and steady values of a point, as arrays."""
     return [*map(np.asarray, point.arguments), *map(np.atleast_1d, point.steady)]
 
 
 @question
 def slip_rates(point: OperatingPoint) -> tuple[Any, ...]:
-    """Velocity of every contact in steady sliding, m/s."""
+    """Slip rate of every contact in steady sliding (m/s)."""
     model = point.model
     return tuple(point.evaluate(_slip_rates(model)))
 
@@ -115,9 +116,9 @@ def _slip_rates(model: Model) -> ArrayFunction:
 
 @question
 def eliminable(point: OperatingPoint) -> int | tuple[int | None, ...] | None:
-    """The memory variable to leave out: of those that allow it, the one with most weight in friction.
+    """Index of the memory variable to eliminate: the one with the largest weight in friction that can be.
 
-    None where there is none, or where in some rig it has no weight to speak of. One for each contact of a machine.
+    None if there is none, or if its weight is too small in some rig. A tuple with one for each contact of a machine.
     """
     model = point.model
     if model.is_single:

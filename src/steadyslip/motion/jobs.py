@@ -23,7 +23,7 @@ from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import EITHER, PULLED, Model
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.posed import posed, resolved
+from steadyslip.model.posed import resolved, well_posed
 from steadyslip.model.range import in_range, require_range
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import Reduction
@@ -129,9 +129,9 @@ class Jobs:
 
     @property
     def posed(self) -> np.ndarray:
-        """True where the equations determine the motion near steady sliding; see `steadyslip.model.posed.posed`."""
-        found = posed(self.point)
-        return found if self.let_go is None else found & posed(self.let_go)
+        """True where the equations determine the motion near steady sliding; see `model.posed.well_posed`."""
+        found = well_posed(self.point)
+        return found if self.let_go is None else found & well_posed(self.let_go)
 
     @property
     def in_range(self) -> np.ndarray:

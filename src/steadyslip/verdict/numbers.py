@@ -13,7 +13,7 @@ from steadyslip.linear.quasi import INFINITE
 from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic, quasi, require_range
+from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import shares_of_errors
 
 
@@ -32,7 +32,7 @@ def _of_polynomial(values: OperatingPoint) -> dict[str, Any]:
 
 def _of_sum(values: OperatingPoint) -> dict[str, Any]:
     """With delays: no polynomial, but a sum of some."""
-    c, h = quasi(values)
+    c, h = quasipolynomial(values)
     count = int(unstable_roots(values))
     return {
         "stable": bool(is_stable(values)),

@@ -16,7 +16,7 @@ from steadyslip.core.results import ReadOnly
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
-from steadyslip.model.range import beyond_range
+from steadyslip.model.range import out_of_range_error
 from steadyslip.model.scales import natural_scales
 from steadyslip.model.sliding import steady_states
 from steadyslip.motion import History, simulate
@@ -158,7 +158,7 @@ def basin(
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
     rest = rest_of(own, np.atleast_1d(np.asarray(own.point.drive, dtype=float)), np.zeros(1))
     if not rest.exists[0]:
-        raise beyond_range(own.point)
+        raise out_of_range_error(own.point)
     if not (rest.stable[0] or rest.neutral[0]):
         raise NotAvailable(
             "no basin: steady sliding of this rig is unstable, so that no starting point returns to it; "

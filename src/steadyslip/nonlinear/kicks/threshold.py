@@ -15,7 +15,7 @@ from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.range import beyond_range
+from steadyslip.model.range import out_of_range_error
 from steadyslip.model.sliding import steady_state, steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.spans import (
@@ -232,7 +232,7 @@ def threshold(
     require_steady(rig)
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol, at)
     if not kicked.exists[0]:
-        raise beyond_range(kicked.jobs.point)
+        raise out_of_range_error(kicked.jobs.point)
     if not kicked.stable[0]:
         nothing = float(kicked.amount(0.0)[0])
         return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), nothing, kicked.unit_name, "unstable", kicked.highest,

@@ -1,4 +1,4 @@
-"""Symbols in place of what exact arithmetic of polynomials cannot take."""
+"""Placeholder symbols for subexpressions, so that the rest can be treated as polynomials."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import sympy as sp
 from steadyslip.core.symbols import inner_symbol
 
 
-class StandIns:
-    """Symbols in place of whatever is no polynomial, so that exact arithmetic can be done with what is left."""
+class Placeholders:
+    """Placeholder symbols of subexpressions that are not polynomials, for exact polynomial arithmetic with the rest."""
 
     def __init__(self) -> None:
         self.names: dict[sp.Symbol, sp.Expr] = {}
         self._known: dict[sp.Expr, sp.Symbol] = {}
 
-    def whole(self, expression: sp.Expr) -> sp.Expr:
-        """A symbol for an expression; numbers stay."""
+    def symbol_for(self, expression: sp.Expr) -> sp.Expr:
+        """New placeholder of an expression; numbers are returned unchanged."""
         if expression.is_Number:
             return expression
         symbol = inner_symbol(f"e{len(self.names)}")
@@ -23,7 +23,7 @@ class StandIns:
         return symbol
 
     def polynomial(self, expression: sp.Expr) -> sp.Expr:
-        """A polynomial in parameters and in symbols for its other parts, the same for the same."""
+        """Polynomial with non-polynomial parts replaced by placeholders; equal parts have equal placeholders."""
         e = sp.sympify(expression)
         if e.is_Symbol or e.is_Rational:
             return e
@@ -32,9 +32,9 @@ class StandIns:
         if e.is_Pow and e.exp.is_Integer and e.exp.is_positive:
             return self.polynomial(e.base) ** e.exp
         if e not in self._known:
-            self._known[e] = self.whole(e)
+            self._known[e] = self.symbol_for(e)
         return self._known[e]
 
-    def back(self, expression: sp.Expr) -> sp.Expr:
-        """The expression that a result stands for."""
+    def restored(self, expression: sp.Expr) -> sp.Expr:
+        """Expression with placeholders replaced by the original subexpressions."""
         return expression.xreplace(self.names)

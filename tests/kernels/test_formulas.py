@@ -9,8 +9,8 @@ from expressions_at_random import LANES, MODERATE, VARIABLES, by_programs, diffe
 from friction_laws import LAWS
 from rigs_of_theory import CONTACTS
 from steadyslip.core.expressions import ArrayFunction, asinh_exp, derivative
-from steadyslip.testing.contact import ContactStatement
-from steadyslip.testing.precise import in_symbols
+from steadyslip.testing.contact import SymbolicContactLaw
+from steadyslip.testing.precise import symbolic_copy
 
 U, V, W = VARIABLES
 
@@ -132,7 +132,7 @@ def test_random_expressions_are_those_of_numpy(seed):
 def _laws():
     """Laws of every kind: what they state in symbols of any sign, and their numbers in steady sliding."""
     for law in LAWS:
-        copy, numbers = in_symbols(law)
+        copy, numbers = symbolic_copy(law)
         v, sigma, tau = (sp.Dummy(name, real=True) for name in ("v", "sigma", "tau"))
         memory = tuple(sp.Dummy(name, real=True) for name in law.memory())
         stated = [copy.strength(v, sigma, memory, tau), *copy.rates(v, sigma, memory, tau)]
@@ -140,7 +140,7 @@ def _laws():
         middle = {v: 1e-6, sigma: 5e6, tau: float(law.strength(1e-6, 5e6, steady, 3e6))}
         yield law, stated, middle | dict(zip(memory, steady, strict=True)), numbers
     for law in CONTACTS:
-        said = ContactStatement(law)
+        said = SymbolicContactLaw(law)
         stated = [said.stress, *said.copy.rates(said.motion)]
         yield law, stated, dict.fromkeys(said.inputs, 1e-6) | {said.inputs[3]: 4e6, said.inputs[5]: 3e6}, said.numbers
 

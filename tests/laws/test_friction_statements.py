@@ -10,7 +10,7 @@ import steadyslip as ss
 from friction_laws import BRISTLE, EVOLUTIONS, LAWS, ONE, ROCK, TWO, modest
 from steadyslip.core.expressions import asinh_exp, numpy_asinh_exp
 from steadyslip.laws.friction.bristle import StribeckCurve
-from steadyslip.testing.statement import statement
+from steadyslip.testing.symbolic import symbolic_law
 
 
 @modest
@@ -161,6 +161,6 @@ def test_stribeck_exponent_can_flip_a_verdict(exponent, stable):
 def test_statement_of_a_law_is_symbolic_throughout():
     """No number of a law enters its equations: the contract and the Model see parameters."""
     for law in LAWS:
-        said = statement(law)
+        said = symbolic_law(law)
         floats = [n for e in (said.strength, *said.rates) for n in e.atoms(sp.Float)]
         assert not floats, law

@@ -1,13 +1,13 @@
-"""The public contract suite: tells the author of a law whether the law is right.
+"""Public checks of the contract that friction and contact laws keep, for authors of laws.
 
 ::
 
     from steadyslip.testing import check_friction_law
     check_friction_law(MyLaw(a=0.01, ...))
 
-Each promise is one function, listed in `FRICTION_CHECKS` and `CONTACT_CHECKS`, so that a test can be
-parametrised over them. A broken promise raises `ContractViolation`, an AssertionError that says what came,
-what must be, and what to do. Knows no documents and no commands; nothing below needs it.
+Each rule of the contract is checked by one function, listed in `FRICTION_CHECKS` or `CONTACT_CHECKS`, so that a test
+can be parametrised over them. A law that breaks a rule raises `ContractViolation`, an AssertionError with the value
+found, the value required, and what to do.
 """
 
 from __future__ import annotations
@@ -25,11 +25,7 @@ from steadyslip.testing.contact import (
     check_linearisation,
     check_steady_stress,
 )
-from steadyslip.testing.contact_states import (
-    check_contact_routes,
-    check_contact_senses,
-    check_contact_states,
-)
+from steadyslip.testing.contact_states import check_contact_routes, check_contact_senses, check_contact_states
 from steadyslip.testing.friction import (
     check_derivatives,
     check_names,
@@ -42,7 +38,7 @@ from steadyslip.testing.jumps import check_jumps
 from steadyslip.testing.precise import ContractViolation
 from steadyslip.testing.renaming import check_contact_renaming, check_renaming, under_random_names
 from steadyslip.testing.routes import check_friction_round_trip, check_two_routes
-from steadyslip.testing.statement import Conditions
+from steadyslip.testing.symbolic import Conditions
 
 FRICTION_CHECKS: tuple[Callable[[FrictionLaw, Conditions], None], ...] = (
     check_names,
@@ -79,22 +75,22 @@ def check_friction_law(
     stress_decades: float = 1.0,
     instant_weakening: bool = False,
 ) -> None:
-    """Check everything that a friction law promises, and once more with other names of its parameters and memory.
+    """Check a friction law against all rules of the contract, also with its parameters and memory renamed.
 
     Parameters
     ----------
     law : FrictionLaw
     velocity, normal_stress : float
-        Steady sliding in the middle of the range checked (m/s, Pa).
+        Centre of the range of steady sliding that is checked (m/s, Pa).
     velocity_decades, stress_decades : float
-        How far to each side, in powers of ten; less for a law that holds in a narrower range.
+        Powers of ten to each side; give less for a law that holds in a narrower range.
     instant_weakening : bool
         Allow friction that falls at once when the velocity rises (LuGre, Coulomb–Stribeck).
 
     Raises
     ------
     ContractViolation
-        Naming the first promise that is broken.
+        On the first rule that the law breaks.
     """
     conditions = Conditions(velocity, normal_stress, velocity_decades, stress_decades, instant_weakening)
     for check in FRICTION_CHECKS:
@@ -105,19 +101,18 @@ def check_friction_law(
 
 
 def check_contact_law(contact: ContactLaw, surroundings: Surroundings | None = None) -> None:
-    """Check everything that a contact law promises, and once more with other names of its parameters and states.
+    """Check a contact law against all rules of the contract, also with its parameters and states renamed.
 
     Parameters
     ----------
     contact : ContactLaw
     surroundings : Surroundings, optional
-        Friction law, drive velocity, stiffness, mass and dampings of the rig around it, and what presses surfaces that
-        give.
+        Friction law, drive velocity, stiffness, mass, dampings and load of the rig in which the law is checked.
 
     Raises
     ------
     ContractViolation
-        Naming the first promise that is broken.
+        On the first rule that the law breaks.
     """
     place = surroundings or Surroundings()
     for check in CONTACT_CHECKS:

@@ -1,4 +1,4 @@
-"""The contract of contact laws: one function for each promise that a law makes."""
+"""Checks of contact laws: one function for each rule of the contract."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from steadyslip.testing.precise import (
     DIGITS,
     TOLERANCE,
     ContractViolation,
+    call_with_symbols,
     disagreement,
-    in_symbols,
+    format_number,
     precise_function,
     require,
     require_known_symbols,
-    shown,
-    stated,
+    symbolic_copy,
 )
 from steadyslip.testing.routes import round_trip
 
@@ -41,9 +41,10 @@ def _rock() -> FrictionLaw:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The rig in which a contact law is checked; every term is there so that none goes unnoticed.
+    """Rig in which a contact law is checked, with all terms non-zero so that each one is tested.
 
-    Under a law for surfaces that give it is a machine: a body that `press`, a normal stress, holds on them.
+    For compliant surfaces it is a machine: a body held on the surface by the normal stress `press` (Pa). Units: m/s,
+    Pa/m, kg/m², and Pa s/m for the dampings.
     """
 
     friction: FrictionLaw = field(default_factory=_rock)
@@ -55,7 +56,7 @@ class Surroundings:
     press: float = 5e6
 
     def rig(self, contact: ContactLaw) -> Slider | Machine:
-        """The slider, or machine, in steady sliding with a contact law."""
+        """Slider with the given contact law, or machine if the surfaces are compliant."""
         if contact.is_compliant():
             return self._machine(contact)
         return Slider(
@@ -81,7 +82,7 @@ class Surroundings:
         )
 
     def steady_stress(self, contact: ContactLaw) -> float:
-        """σss of the rig; the highest where there are several is as good as any."""
+        """Steady normal stress of the rig (Pa), the last if there are several steady states."""
         rig = self.rig(contact)
         try:
             if isinstance(rig, Machine):
@@ -93,7 +94,7 @@ class Surroundings:
             ) from error
 
     def steady_motion(self, contact: ContactLaw, sigma: float, velocity: float | None = None) -> Motion:
-        """Steady sliding at normal stress `sigma`, as numbers; at the drive's velocity unless one is given."""
+        """Motion in steady sliding at normal stress `sigma` (Pa) and a velocity (m/s), by default that of the drive."""
         v = self.velocity if velocity is None else velocity
         tau = float(self.friction.steady_strength(v, sigma))
         spring = tau + self.radiation_damping * v
@@ -101,31 +102,30 @@ class Surroundings:
         motion = Motion(0.0, v, 0.0, spring, spring, tau, tau, self.stiffness, v, memory=memory, steady_memory=memory)
         if not contact.is_compliant():
             return motion
-        # pressed into each other by as much as the stress takes, which falls as the surfaces part
 
-        def missing(u: float) -> float:
+        def excess_stress(u: float) -> float:
             return float(contact.normal_stress(replace(motion, separation=u, steady_separation=u))) - sigma
 
         from scipy.optimize import brentq  # slow to import
 
-        deep = -1e-12
-        while missing(deep) < 0:
-            deep *= 10
-            if deep < -1e12:
+        closed = -1e-12  # separation in m, lowered until the stress is at least `sigma`: stress falls as surfaces part
+        while excess_stress(closed) < 0:
+            closed *= 10
+            if closed < -1e12:
                 raise ContractViolation(f"{contact!r}: no distance of the surfaces makes a stress of {sigma!r} Pa")
-        apart = float(brentq(missing, deep, 0.0, xtol=1e-300, rtol=1e-15))
+        apart = float(brentq(excess_stress, closed, 0.0, xtol=1e-300, rtol=1e-15))
         return replace(motion, separation=apart, steady_separation=apart)
 
 
-PRESS = Surroundings()
+DEFAULT_SURROUNDINGS = Surroundings()
 
 
-class ContactStatement:
-    """A contact law's normal stress in symbols."""
+class SymbolicContactLaw:
+    """Normal stress of a contact law as a SymPy expression of its `inputs`."""
 
     def __init__(self, contact: ContactLaw) -> None:
         self.contact = contact
-        self.copy, self.numbers = in_symbols(contact)
+        self.copy, self.numbers = symbolic_copy(contact)
         x, acceleration, spring, steady_spring, tau, steady_tau = sp.symbols("x a T T_ss tau tau_ss", real=True)
         v, v0 = sp.symbols("v v_0", positive=True)
         k = sp.Symbol("k", nonnegative=True)
@@ -136,25 +136,25 @@ class ContactStatement:
         steady = tuple(sp.Symbol(f"m_ss_{i}", real=True) for i in range(len(contact.memory())))
         self.inputs = (*plain, outside, *memory, *steady)
         self.motion = replace(Motion(*plain), outside=outside, memory=memory, steady_memory=steady)
-        self.stress = stated(contact, "normal_stress", self.copy.normal_stress, self.motion)
+        self.stress = call_with_symbols(contact, "normal_stress", self.copy.normal_stress, self.motion)
         require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
 
     def at(self, motion: Motion) -> Any:
-        """σ at a motion given as numbers, to fifty digits."""
+        """Normal stress (Pa) to fifty digits, for a Motion of numbers."""
         function = precise_function(self.contact, [*self.inputs, *self.numbers], [self.stress])
-        return function(*values_of(motion), *self.numbers.values())[0]
+        return function(*motion_values(motion), *self.numbers.values())[0]
 
 
-def values_of(motion: Motion) -> list[Any]:
-    """What a motion's numbers are, in the order of a statement's `inputs`."""
+def motion_values(motion: Motion) -> list[Any]:
+    """Numbers of a Motion, in the order of `SymbolicContactLaw.inputs`."""
     plain = [getattr(motion, name) for name in Motion.__dataclass_fields__ if not name.endswith("memory")]
     return [*plain, *motion.memory, *motion.steady_memory]
 
 
-def check_contact_names(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """The law is registered, and gives either a load or a steady normal stress, which is positive.
+def check_contact_names(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check that the law is registered and gives either a load or a steady normal stress, positive.
 
-    Surfaces that give carry what presses them together, and may have no load of their own.
+    Compliant surfaces may have zero load, as they carry what the machine presses on them.
     """
     name = type(contact).name
     require(
@@ -164,34 +164,32 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = PRESS)
     )
     load, steady = contact.load(), contact.steady_stress()
     require(
-        (load is None) != (steady is None),
-        contact,
-        "load() and steady_stress(): give exactly one, None for the other",
+        (load is None) != (steady is None), contact, "load() and steady_stress(): give exactly one, None for the other"
     )
     given = float(load if load is not None else steady)  # type: ignore[arg-type]  # one of them is given
     unloaded = contact.is_compliant() and given == 0
     require(given > 0 or unloaded, contact, f"the load is {given!r} Pa, must be > 0 (compression is positive)")
 
 
-def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """Called with plain floats, the normal stress is that of the symbols, away from steady sliding too."""
-    said = ContactStatement(contact)
+def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check that the normal stress called with floats equals that in symbols, in and near steady sliding."""
+    symbolic = SymbolicContactLaw(contact)
     sigma = surroundings.steady_stress(contact)
     for factor in (1.0, 1.01, 0.99):
         away = factor - 1
-        motion = _moved(surroundings, contact, sigma, away * 1e-7, surroundings.velocity * factor, away * 1e-6)
-        by_hand, exact = float(contact.normal_stress(motion)), said.at(motion)
+        motion = _displaced(surroundings, contact, sigma, away * 1e-7, surroundings.velocity * factor, away * 1e-6)
+        by_hand, exact = float(contact.normal_stress(motion)), symbolic.at(motion)
         require(
             abs(by_hand - exact) <= TOLERANCE * abs(exact),
             contact,
-            f"normal_stress() called with floats is {by_hand!r} Pa, in symbols {shown(exact)} Pa; a law's method must "
-            "be one expression for numbers and symbols",
+            f"normal_stress() called with floats is {by_hand!r} Pa, in symbols {format_number(exact)} Pa; a law's "
+            "method must be one expression for numbers and symbols",
         )
 
 
-def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """Steady sliding is positive and consistent: what the law makes of it is the normal stress it started from."""
-    said = ContactStatement(contact)
+def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check that the steady normal stress is positive, and equals the normal stress of the law in steady sliding."""
+    symbolic = SymbolicContactLaw(contact)
     sigma = surroundings.steady_stress(contact)
     require(sigma > 0, contact, f"the steady normal stress is {sigma!r} Pa, must be > 0")
     given = contact.steady_stress()
@@ -200,24 +198,24 @@ def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS)
         contact,
         f"the steady normal stress is {sigma!r} Pa, but steady_stress() says {given!r} Pa",
     )
-    found = said.at(surroundings.steady_motion(contact, sigma))
+    found = symbolic.at(surroundings.steady_motion(contact, sigma))
     require(
         abs(found - sigma) <= TOLERANCE * sigma,
         contact,
-        f"normal_stress() of steady sliding at {sigma!r} Pa is {shown(found)} Pa; they must agree",
+        f"normal_stress() of steady sliding at {sigma!r} Pa is {format_number(found)} Pa; they must agree",
     )
 
 
-def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """B0...B3 (eq. 12) agree with central differences of the normal stress, at two stiffnesses.
+def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check B0...B3 (eq. 12) against central differences of the normal stress, at two stiffnesses.
 
-    With states of its own, or on surfaces that give, the law has no such coefficients: `check_contact_routes`.
+    Laws with states or compliant surfaces have no such coefficients: see `check_contact_routes`.
     """
     from steadyslip.linear.response import contact_coefficients
 
     if contact.memory() or contact.is_compliant():
         return
-    said = ContactStatement(contact)
+    symbolic = SymbolicContactLaw(contact)
     for place in (surroundings, replace(surroundings, stiffness=2 * surroundings.stiffness)):
         sigma = place.steady_stress(contact)
         values = operating_point(place.rig(contact))
@@ -234,23 +232,23 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS)
             def along(x: Any, index: int = index, place: Surroundings = place, sigma: float = sigma) -> Any:
                 moved = [0, place.velocity, 0]
                 moved[index] = x
-                return said.at(_moved(place, contact, sigma, *moved))
+                return symbolic.at(_displaced(place, contact, sigma, *moved))
 
             scale = (1e-7, place.velocity, place.velocity)[index]
             found, excess = disagreement(along, coefficient, (0, place.velocity, 0)[index], scale)
             with mpmath.workdps(DIGITS):
-                # the coefficient itself was evaluated in ordinary floats
+                # floats, not fifty digits, in the coefficients: allow rounding of the terms
                 allowed = TOLERANCE * (terms + sigma * 1e-6 / scale)
             require(
                 excess <= allowed,
                 contact,
-                f"∂σ/∂({what}) is {coefficient:.9g} by differentiation and {shown(found)} by central differences, at "
-                f"k = {place.stiffness:g} Pa/m; check kinks and functions of your own",
+                f"∂σ/∂({what}) is {coefficient:.9g} by differentiation and {format_number(found)} by central "
+                f"differences, at k = {place.stiffness:g} Pa/m; check kinks and functions of your own",
             )
 
 
-def _moved(place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: Any, acceleration: Any) -> Motion:
-    """Steady sliding displaced by x, at velocity v and with an acceleration; forces follow from the balance."""
+def _displaced(place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: Any, acceleration: Any) -> Motion:
+    """Motion displaced from steady sliding by x (m), at velocity v and an acceleration; forces from the balance."""
     rest = place.steady_motion(contact, sigma)
     with mpmath.workdps(DIGITS):
         spring = rest.spring - mpmath.mpf(place.stiffness) * x - place.damping * (v - mpmath.mpf(place.velocity))
@@ -258,8 +256,8 @@ def _moved(place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: An
         return replace(rest, slip=x, velocity=v, acceleration=acceleration, spring=spring, friction=tau)
 
 
-def check_axis(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """Where the contact has an axis, the stiffness along the slide is a fixed share, at most 1, of the axial one."""
+def check_axis(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check, for laws with an axis, that the sliding stiffness is a constant share, at most 1, of the axial one."""
     if not contact.has_axis():
         return
     share, tenfold = (float(contact.sliding_stiffness(k)) for k in (1.0, 10.0))
@@ -271,6 +269,6 @@ def check_axis(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
     )
 
 
-def check_contact_round_trip(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """A rig with this contact survives being written to a rig file and read back."""
+def check_contact_round_trip(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check that a rig with this contact is unchanged after writing it to a rig file and reading it back."""
     round_trip(contact, surroundings.rig(contact))

@@ -1,4 +1,4 @@
-"""The contract of friction laws: one function for each promise that a law makes."""
+"""Checks of friction laws: one function for each rule of the contract."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from steadyslip.testing.precise import (
     TOLERANCE,
     disagreement,
     eigenvalues,
+    format_number,
     require,
     require_known_symbols,
-    shown,
 )
-from steadyslip.testing.statement import MIDDLE, Conditions, statement
+from steadyslip.testing.symbolic import DEFAULT_CONDITIONS, Conditions, symbolic_law
 
 
-def _where(v: Any, sigma: Any) -> str:
-    return f"at v = {shown(v)} m/s, σ = {shown(sigma)} Pa"
+def _location(v: Any, sigma: Any) -> str:
+    return f"at v = {format_number(v)} m/s, σ = {format_number(sigma)} Pa"
 
 
-def check_names(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Names, units, rates and steady memory agree in number; units exist; the law is registered."""
+def check_names(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that the law is registered, and that names, units, rates and steady memory agree in number."""
     name = type(law).name
     require(
         name and FrictionLaw.registry.get(name) is type(law),
@@ -39,10 +39,12 @@ def check_names(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     require(len(set(names)) == len(names), law, f"memory() repeats a name: {names}")
     require(all(n.isidentifier() for n in names), law, f"memory() gives {names}; names must be letters, digits and _")
     require(len(units) == len(names), law, f"memory_units() has {len(units)} units for {len(names)} memory variables")
-    said = statement(law)
-    for what, found in (("rates", said.rates), ("steady_memory", said.steady_memory)):
+    symbolic = symbolic_law(law)
+    for what, found in (("rates", symbolic.rates), ("steady_memory", symbolic.steady_memory)):
         require(len(found) == len(names), law, f"{what}() has {len(found)} values for {len(names)} memory variables")
-    shown_units = {n: u for n, (_, u) in law.observables(said.v, said.sigma, said.memory, said.tau).items()}
+    shown_units = {
+        n: u for n, (_, u) in law.observables(symbolic.v, symbolic.sigma, symbolic.memory, symbolic.tau).items()
+    }
     for variable, text in [*zip(names, units, strict=True), *shown_units.items()]:
         try:
             unit(text)
@@ -52,22 +54,22 @@ def check_names(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     require(not strange, law, f"meanings() tells of {', '.join(strange)}, which observables() does not give")
 
 
-def check_symbols(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Equations depend on their arguments only, and no name of the law collides with one of the Model's."""
+def check_symbols(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that equations depend on their arguments only, and that no symbol of the law collides with the Model's."""
     from steadyslip.laws.contact import Constant
     from steadyslip.machine.drive import Steady
     from steadyslip.machine.slider import Slider
     from steadyslip.model import build_model
 
-    said = statement(law)
-    own = list(said.numbers)
-    for what, expression in [("strength", said.strength), *(("rates", rate) for rate in said.rates)]:
-        require_known_symbols(law, what, expression, [*said.inputs, *own])
+    symbolic = symbolic_law(law)
+    own = list(symbolic.numbers)
+    for what, expression in [("strength", symbolic.strength), *(("rates", rate) for rate in symbolic.rates)]:
+        require_known_symbols(law, what, expression, [*symbolic.inputs, *own])
     for what, expression in [
-        ("steady_strength", said.steady_strength),
-        *(("steady_memory", y) for y in said.steady_memory),
+        ("steady_strength", symbolic.steady_strength),
+        *(("steady_memory", y) for y in symbolic.steady_memory),
     ]:
-        require_known_symbols(law, what, expression, [said.v, said.sigma, *own])
+        require_known_symbols(law, what, expression, [symbolic.v, symbolic.sigma, *own])
     press = Constant(steady_normal_stress=conditions.normal_stress)
     rig = Slider(friction=law, contact=press, stiffness=1.0, drive=Steady(conditions.velocity))
     model = build_model(rig, present=["slider.mass", "slider.damping", "slider.radiation_damping"])
@@ -85,86 +87,93 @@ def check_symbols(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
             require(one != two, law, f"{name} and {other} share the symbol {one} in the equations; rename the law's")
 
 
-def check_steady_state(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Rates vanish at `steady_memory`, and the strength there is `steady_strength`, over decades of v and σ."""
-    said = statement(law)
-    values = said.function(*said.rates, said.strength)
-    gradients = [said.function(*said.gradient(rate)) for rate in said.rates]
+def check_steady_state(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that rates vanish at `steady_memory` and the strength there is `steady_strength`, over decades of v, σ."""
+    symbolic = symbolic_law(law)
+    values = symbolic.function(*symbolic.rates, symbolic.strength)
+    gradients = [symbolic.function(*symbolic.gradient(rate)) for rate in symbolic.rates]
     for v, sigma in conditions.grid():
         with mpmath.workdps(DIGITS):
-            point = said.steady(v, sigma)
+            point = symbolic.steady(v, sigma)
             *rates, strength = values(*point)
             for name, rate, gradient in zip(law.memory(), rates, gradients, strict=True):
-                # what each input contributes to the rate: the size of the terms that have to cancel
+                # size of the terms that must cancel: contribution of each input to the rate
                 terms = sum(abs(d * x) for d, x in zip(gradient(*point), point, strict=True))
                 require(
                     abs(rate) <= TOLERANCE * terms,
                     law,
-                    f"the steady state is not steady {_where(v, sigma)}: rates() gives {shown(rate)} for {name} at "
-                    f"steady_memory() = {[shown(y) for y in point[2:-1]]}, must be 0; correct one of the two",
+                    f"the steady state is not steady {_location(v, sigma)}: rates() gives {format_number(rate)} for "
+                    f"{name} at steady_memory() = {[format_number(y) for y in point[2:-1]]}, must be 0; correct one "
+                    "of the two",
                 )
             tau = point[-1]
             require(
                 abs(strength - tau) <= TOLERANCE * abs(tau),
                 law,
-                f"strength() at steady_memory() is {shown(strength)} Pa {_where(v, sigma)}, steady_strength() is "
-                f"{shown(tau)} Pa; they must agree (leave steady_strength out to use the former)",
+                f"strength() at steady_memory() is {format_number(strength)} Pa {_location(v, sigma)}, "
+                f"steady_strength() is {format_number(tau)} Pa; they must agree (leave steady_strength out to use the "
+                "former)",
             )
 
 
-def check_signs(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Strength and direct effect are positive, and the memory relaxes, in steady sliding."""
-    said = statement(law)
-    values = said.function(
-        said.strength, derivative(said.strength, said.v).doit(), 1 - derivative(said.strength, said.tau)
+def check_signs(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that strength and direct effect are positive in steady sliding, and that the memory relaxes."""
+    symbolic = symbolic_law(law)
+    values = symbolic.function(
+        symbolic.strength,
+        derivative(symbolic.strength, symbolic.v).doit(),
+        1 - derivative(symbolic.strength, symbolic.tau),
     )
-    relaxation = said.relaxation()
+    relaxation = symbolic.relaxation()
     for v, sigma in conditions.grid():
         with mpmath.workdps(DIGITS):
-            point = said.steady(v, sigma)
+            point = symbolic.steady(v, sigma)
             strength, slope, own = values(*point)
-            where = _where(v, sigma)
+            where = _location(v, sigma)
             require(
                 strength > 0,
                 law,
-                f"the strength is {shown(strength)} Pa {where}, must be > 0; if the law does not hold there, narrow "
-                "velocity_decades or stress_decades",
+                f"the strength is {format_number(strength)} Pa {where}, must be > 0; if the law does not hold there, "
+                "narrow velocity_decades or stress_decades",
             )
             require(
-                own > 0, law, f"strength() rises with tau by {shown(1 - own)} {where}, must be < 1 to have a solution"
+                own > 0,
+                law,
+                f"strength() rises with tau by {format_number(1 - own)} {where}, must be < 1 to have a solution",
             )
             require(
                 slope / own > 0 or (conditions.instant_weakening and mpmath.isfinite(slope)),
                 law,
-                f"the direct effect ∂τ/∂v at fixed memory is {shown(slope / own)} Pa s/m {where}, must be > 0: without "
-                "mass such a rig is ill-posed. If it is meant (LuGre, Stribeck), pass instant_weakening=True",
+                f"the direct effect ∂τ/∂v at fixed memory is {format_number(slope / own)} Pa s/m {where}, must be > "
+                "0: without mass such a rig is ill-posed. If it is meant (LuGre, Stribeck), pass "
+                "instant_weakening=True",
             )
-            if said.memory:
+            if symbolic.memory:
                 growth = max(mpmath.re(root) for root in eigenvalues(relaxation(*point)))
                 require(
                     growth < 0,
                     law,
                     f"the memory {', '.join(law.memory())} does not relax {where}: at fixed velocity and normal stress "
-                    f"a deviation grows at {shown(growth)} 1/s, must decay; check the sign of rates()",
+                    f"a deviation grows at {format_number(growth)} 1/s, must decay; check the sign of rates()",
                 )
 
 
-def check_derivatives(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """SymPy's partial derivatives of strength and rates agree with central differences, away from steady sliding."""
-    said = statement(law)
-    expressions = {"strength": said.strength} | {
-        f"rate of {n}": r for n, r in zip(law.memory(), said.rates, strict=True)
+def check_derivatives(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check SymPy's derivatives of strength and rates against central differences, away from steady sliding."""
+    symbolic = symbolic_law(law)
+    expressions = {"strength": symbolic.strength} | {
+        f"rate of {n}": r for n, r in zip(law.memory(), symbolic.rates, strict=True)
     }
-    size = [max(abs(said.steady(v, s)[i]) for v, s in conditions.grid()) or 1 for i in range(len(said.inputs))]
+    size = [max(abs(symbolic.steady(v, s)[i]) for v, s in conditions.grid()) or 1 for i in range(len(symbolic.inputs))]
     for what, expression in expressions.items():
-        function, gradient = said.function(expression), said.function(*said.gradient(expression))
+        function, gradient = symbolic.function(expression), symbolic.function(*symbolic.gradient(expression))
         for v, sigma in list(conditions.grid())[::5]:
             with mpmath.workdps(DIGITS):
-                point = list(said.steady(v, sigma))
+                point = list(symbolic.steady(v, sigma))
                 point[0], point[1] = point[0] * 1.5, point[1] * 1.25
                 slopes = gradient(*point)
                 terms = sum(abs(slope * x) for slope, x in zip(slopes, point, strict=True))
-                for i, (name, slope) in enumerate(zip(said.inputs, slopes, strict=True)):
+                for i, (name, slope) in enumerate(zip(symbolic.inputs, slopes, strict=True)):
                     scale = abs(point[i]) or size[i]
 
                     def along(x: Any, i: int = i, point: list[Any] = point, f: Any = function) -> Any:
@@ -174,19 +183,19 @@ def check_derivatives(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None
                     require(
                         excess <= 0,
                         law,
-                        f"∂({what})/∂{name.name} is {shown(slope)} by SymPy and {shown(found)} by central differences "
-                        f"{_where(*point[:2])}; check fdiff of your own functions, and kinks",
+                        f"∂({what})/∂{name.name} is {format_number(slope)} by SymPy and {format_number(found)} by "
+                        f"central differences {_location(*point[:2])}; check fdiff of your own functions, and kinks",
                     )
 
 
-def check_numbers(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Methods called with plain floats give what they give in symbols, compiled or not."""
-    said = statement(law)
-    expressions = (said.strength, *said.rates)
-    exact, compiled = said.function(*expressions), said.floats(*expressions)
-    gradients = [said.function(*said.gradient(e)) for e in expressions]
+def check_numbers(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that methods called with floats, and their compiled expressions, equal the symbolic expressions."""
+    symbolic = symbolic_law(law)
+    expressions = (symbolic.strength, *symbolic.rates)
+    exact, compiled = symbolic.function(*expressions), symbolic.floats(*expressions)
+    gradients = [symbolic.function(*symbolic.gradient(e)) for e in expressions]
     for v, sigma in list(conditions.grid())[::4]:
-        point = [float(x) for x in said.steady(v, sigma)]
+        point = [float(x) for x in symbolic.steady(v, sigma)]
         point[0] *= 1.5
         arguments = (point[0], point[1], tuple(point[2:-1]), point[-1])
         by_hand = [float(e) for e in (law.strength(*arguments), *law.rates(*arguments))]
@@ -194,12 +203,12 @@ def check_numbers(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
             ("strength", *law.memory()), exact(*point), gradients, by_hand, compiled(*point), strict=True
         ):
             terms = abs(reference) + sum(abs(d * x) for d, x in zip(slopes(*point), point, strict=True))
-            # a backward-stable evaluation is off by some ten roundings of each input
+            # a backward-stable evaluation is off by some ten roundings of each input: 256 leaves a margin
             allowed = 256 * math.ulp(1.0) * float(terms)
             for how, value in (("called with floats", a), ("compiled", float(b))):
                 require(
                     abs(value - float(reference)) <= allowed,
                     law,
-                    f"{what} {how} is {value!r} {_where(*point[:2])}, in symbols {float(reference)!r}; a law's method "
-                    "must be one expression for numbers and symbols",
+                    f"{what} {how} is {value!r} {_location(*point[:2])}, in symbols {float(reference)!r}; a law's "
+                    "method must be one expression for numbers and symbols",
                 )

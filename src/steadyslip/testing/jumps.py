@@ -1,4 +1,4 @@
-"""The contract of memory variables: they are continuous when velocity or normal stress jump."""
+"""Check of memory variables: they must be continuous when velocity or normal stress jump."""
 
 from __future__ import annotations
 
@@ -9,64 +9,64 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.laws.friction import FrictionLaw
-from steadyslip.testing.precise import ContractViolation, eigenvalues, require, shown
-from steadyslip.testing.statement import MIDDLE, Conditions, Statement, statement
+from steadyslip.testing.precise import ContractViolation, eigenvalues, format_number, require
+from steadyslip.testing.symbolic import DEFAULT_CONDITIONS, Conditions, SymbolicLaw, symbolic_law
 
-_VELOCITY_JUMP, _STRESS_JUMP = 3.0, 1.5
-_SHORT = 1e-3  # duration of the ramp in units of the fastest relaxation
-_HALVES = 0.6  # a change of first order in the duration halves with it; second order may add a little
+_VELOCITY_JUMP, _STRESS_JUMP = 3.0, 1.5  # value after over before: far from small, within the range of most laws
+_RAMP_DURATION = 1e-3  # duration of the ramp over the fastest relaxation time
+_HALVING_RATIO = 0.6  # a change of first order halves with the duration; 0.1 is left for second order
 
 
-def check_jumps(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Memory is continuous across a sudden change of normal stress or of velocity, and strength follows at once.
+def check_jumps(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that memory is continuous when normal stress or velocity jump, and that strength follows at once.
 
     The rates are integrated through a smooth ramp of ever shorter duration: the change of each memory
     variable must vanish with the duration at first order, and the strength at the end must tend to
     strength(v2, σ2, memory before the jump).
     """
-    said = statement(law)
+    symbolic = symbolic_law(law)
     v, sigma = conditions.velocity, conditions.normal_stress
-    start = [float(x) for x in said.steady(v, sigma)]
+    start = [float(x) for x in symbolic.steady(v, sigma)]
     ends = {"normal stress": (v, sigma * _STRESS_JUMP), "velocity": (v * _VELOCITY_JUMP, sigma)}
-    stress = _strength_solver(said)
+    stress = _strength_solver(symbolic)
     for what, (v2, sigma2) in ends.items():
         at_once = stress(v2, sigma2, start[2:-1], start[-1])
         require(np.isfinite(at_once), law, f"strength() has no finite value after a sudden change of {what}")
-        if not said.memory:
+        if not symbolic.memory:
             continue
-        duration = _SHORT / _fastest(said, (start, [v2, sigma2, *start[2:-1], at_once]))
+        duration = _RAMP_DURATION / _fastest_rate(symbolic, (start, [v2, sigma2, *start[2:-1], at_once]))
         memory = np.array(start[2:-1])
-        found = [_through_ramp(said, stress, start, (v2, sigma2), d) for d in (duration, duration / 2)]
+        found = [_memory_after_ramp(symbolic, stress, start, (v2, sigma2), d) for d in (duration, duration / 2)]
         changes = [np.abs(end - memory) for end in found]
         noise = 1e-9 * np.maximum(np.abs(memory), np.abs(changes[0]))
         for i, name in enumerate(law.memory()):
             long, short = changes[0][i], changes[1][i]
             require(
-                short <= _HALVES * long + noise[i],
+                short <= _HALVING_RATIO * long + noise[i],
                 law,
-                f"{name} jumps with the {what}: it changes by {shown(long)} in a ramp of {duration:.3g} s and by "
-                f"{shown(short)} in one half as long; choose a memory variable that stays continuous, such as "
-                "Θ + (α/b) ln σ, and leave the rate of the normal stress out of rates()",
+                f"{name} jumps with the {what}: it changes by {format_number(long)} in a ramp of {duration:.3g} s and "
+                f"by {format_number(short)} in one half as long; choose a memory variable that stays continuous, such "
+                "as Θ + (α/b) ln σ, and leave the rate of the normal stress out of rates()",
             )
         misses = [abs(stress(v2, sigma2, end, at_once) - at_once) for end in found]
         require(
-            misses[1] <= _HALVES * misses[0] + 1e-9 * abs(at_once),
+            misses[1] <= _HALVING_RATIO * misses[0] + 1e-9 * abs(at_once),
             law,
-            f"after a sudden change of {what} the strength tends to {shown(at_once + misses[1])} Pa, not to "
-            f"strength(v2, σ2, memory before) = {shown(at_once)} Pa",
+            f"after a sudden change of {what} the strength tends to {format_number(at_once + misses[1])} Pa, not to "
+            f"strength(v2, σ2, memory before) = {format_number(at_once)} Pa",
         )
 
 
-def _fastest(said: Statement, points: Any) -> float:
-    """Fastest rate in the memory's own equations (1/s), before and just after the jump."""
-    relaxation = said.relaxation()
+def _fastest_rate(symbolic: SymbolicLaw, points: Any) -> float:
+    """Largest eigenvalue magnitude (1/s) of the relaxation of memory, over points before and after the jump."""
+    relaxation = symbolic.relaxation()
     sizes = [abs(root) for point in points for root in eigenvalues(relaxation(*point))]
     return float(max(sizes))
 
 
-def _strength_solver(said: Statement) -> Callable[..., float]:
-    """τ = strength(v, σ, memory, τ) solved for τ, by Newton's method where τ occurs in it."""
-    function = said.floats(said.strength, sp.diff(said.strength, said.tau))
+def _strength_solver(symbolic: SymbolicLaw) -> Callable[..., float]:
+    """Function that solves τ = strength(v, σ, memory, τ) for τ (Pa) by Newton's method."""
+    function = symbolic.floats(symbolic.strength, sp.diff(symbolic.strength, symbolic.tau))
 
     def solve(v: float, sigma: float, memory: Any, guess: float) -> float:
         tau = guess
@@ -75,22 +75,22 @@ def _strength_solver(said: Statement) -> Callable[..., float]:
                 strength, slope = (float(x) for x in function(v, sigma, *memory, tau))
             step = (strength - tau) / (1 - slope)
             tau += step
-            if not abs(step) > 1e-14 * abs(tau):  # NaN returns too, and is reported by the caller
+            if not abs(step) > 1e-14 * abs(tau):  # NaN is returned too: the caller checks
                 return tau
         raise ContractViolation(
-            f"{said.law!r}: strength(v, σ, memory, tau) = tau cannot be solved at v = {v}, σ = {sigma}"
+            f"{symbolic.law!r}: strength(v, σ, memory, tau) = tau cannot be solved at v = {v}, σ = {sigma}"
         )
 
     return solve
 
 
-def _through_ramp(
-    said: Statement, stress: Callable[..., float], start: list[float], end: tuple[float, float], duration: float
+def _memory_after_ramp(
+    symbolic: SymbolicLaw, stress: Callable[..., float], start: list[float], end: tuple[float, float], duration: float
 ) -> Any:
-    """Memory variables at the end of a ramp of velocity and normal stress."""
+    """Memory variables at the end of a smooth ramp of velocity and normal stress; `duration` in s."""
     from scipy.integrate import solve_ivp
 
-    rates = said.floats(*said.rates)
+    rates = symbolic.floats(*symbolic.rates)
     first = np.log(start[:2])
     last = np.log(end)
 
@@ -105,7 +105,7 @@ def _through_ramp(
     )
     if not run.success or not np.all(np.isfinite(run.y[:, -1])):
         raise ContractViolation(
-            f"{said.law!r}: rates() cannot be integrated through a smooth ramp of velocity or normal stress "
+            f"{symbolic.law!r}: rates() cannot be integrated through a smooth ramp of velocity or normal stress "
             f"({run.message}); they must be finite and continuous"
         )
     return run.y[:, -1]

@@ -1,7 +1,7 @@
-"""Laws in symbols, evaluated to fifty digits: what every check of the contract stands on.
+"""Laws in symbols, evaluated to fifty digits, and the comparisons that all checks use.
 
-At fifty digits rounding is out of the way: a correct law misses its steady state by 1e-40 of the terms that
-cancel, a wrong one by a visible part of them, and a tolerance between the two needs no tuning.
+Fifty digits remove rounding: a correct law misses its steady state by 1e-40 of the terms that cancel, a wrong one by a
+visible part of them, so that a tolerance between the two needs no tuning.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TOLERANCE = mpmath.mpf("1e-9")
 
 
 class ContractViolation(SteadyslipError, AssertionError):
-    """A law breaks its contract; the message says which part, with numbers, and what to do."""
+    """A law breaks a rule of the contract; the message names it, with numbers, and what to do."""
 
 
 def require(condition: Any, law: FrozenRecord, message: str) -> None:
@@ -31,8 +31,8 @@ def require(condition: Any, law: FrozenRecord, message: str) -> None:
         raise ContractViolation(f"{law!r}: {message}")
 
 
-def in_symbols(law: FrozenRecord) -> tuple[Any, dict[sp.Symbol, float]]:
-    """A twin of the law that holds symbols, and the number of each symbol; structural zeros stay zero."""
+def symbolic_copy(law: FrozenRecord) -> tuple[Any, dict[sp.Symbol, float]]:
+    """Copy of a law with symbols for its parameters, and the number of each symbol; structural zeros stay zero."""
     values: dict[str, Any] = {}
     numbers: dict[sp.Symbol, float] = {}
     for name, address in parameters(law).items():
@@ -48,8 +48,8 @@ def in_symbols(law: FrozenRecord) -> tuple[Any, dict[sp.Symbol, float]]:
     return with_values(law, values), numbers
 
 
-def stated(law: FrozenRecord, what: str, method: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a law's method with symbols and turn what comes back into SymPy, or say why that fails."""
+def call_with_symbols(law: FrozenRecord, what: str, method: Callable[..., Any], *arguments: Any) -> Any:
+    """SymPy result of a method of a law called with symbols; ContractViolation if it does not accept them."""
     try:
         result = method(*arguments)
     except (TypeError, ValueError, AttributeError, LookupError, sp.SympifyError) as error:
@@ -78,7 +78,7 @@ def require_known_symbols(law: FrozenRecord, what: str, expression: sp.Expr, all
 def precise_function(
     law: FrozenRecord, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]
 ) -> Callable[..., list[mpmath.mpf]]:
-    """A function of numbers that returns the expressions' values to fifty digits, NaN where they are not real."""
+    """Function of numbers that returns the values of the expressions to fifty digits, NaN where not real."""
     names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(arguments)}
     renamed = [sp.sympify(e).xreplace(names) for e in expressions]
     own = {"asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y))}
@@ -102,7 +102,7 @@ def precise_function(
                 raise unusable(error) from error
             except ZeroDivisionError as error:
                 raise ContractViolation(
-                    f"{law!r}: an equation divides by zero at {[shown(n) for n in numbers]}"
+                    f"{law!r}: an equation divides by zero at {[format_number(n) for n in numbers]}"
                 ) from error
             return [mpmath.nan if isinstance(value, mpmath.mpc) else value for value in values]  # log of -1
 
@@ -110,20 +110,19 @@ def precise_function(
 
 
 def _precise(number: Any) -> mpmath.mpf:
-    """A number to compute with; making one of itself takes longer than most equations."""
+    """Number as mpf; an mpf is returned as it is, since copying one takes longer than most equations."""
     return number if type(number) is mpmath.mpf else mpmath.mpf(number)
 
 
 def disagreement(
     function: Callable[[Any], Any], derivative: Any, at: Any, scale: Any, terms: Any = 0
 ) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """A derivative against central differences: the central difference, and by how much the two differ too much.
+    """Central difference of a function at a point, and how far it is off the derivative beyond the allowed error.
 
     The error of a central difference with step h is c h² + O(h⁴); from steps h and h/2 the error of the
-    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed; `terms`
-    is the size of those that may cancel in the function. The
-    bend f(x+h) − 2f(x) + f(x−h) over h must halve with h, else there is a kink, where a symmetric difference
-    may agree by chance.
+    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed; `terms` is
+    the size of terms that may cancel in the function. The bend f(x+h) − 2f(x) + f(x−h) over h must halve with h, else
+    there is a kink, where a symmetric difference may agree by chance.
     """
     with mpmath.workdps(DIGITS):
         step = mpmath.mpf("1e-8") * scale
@@ -140,10 +139,10 @@ def disagreement(
 
 
 def eigenvalues(matrix: Any) -> list[Any]:
-    """Eigenvalues of an mpmath matrix; `mpmath.eig` returns another type for one by one."""
+    """Eigenvalues of an mpmath matrix as a list; `mpmath.eig` returns another type for a 1 by 1 matrix."""
     return [matrix[0]] if matrix.rows == 1 else list(mpmath.eig(matrix, left=False, right=False))
 
 
-def shown(value: Any) -> str:
-    """A number for a message."""
+def format_number(value: Any) -> str:
+    """Text of a number with six significant digits."""
     return str(mpmath.nstr(mpmath.mpmathify(value), 6))

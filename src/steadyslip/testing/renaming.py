@@ -1,4 +1,4 @@
-"""The contract once more under random names: a law is what it says, whatever its parameters and states are called."""
+"""Checks of laws under random names: equations must not depend on how parameters and states are called."""
 
 from __future__ import annotations
 
@@ -15,47 +15,47 @@ from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.testing.contact import PRESS, Surroundings
+from steadyslip.testing.contact import DEFAULT_SURROUNDINGS, Surroundings
 from steadyslip.testing.precise import require
-from steadyslip.testing.statement import MIDDLE, Conditions
+from steadyslip.testing.symbolic import DEFAULT_CONDITIONS, Conditions
 
 L = TypeVar("L", FrictionLaw, ContactLaw)
-WORDS = (
+# names with a meaning in equations, SymPy, printers or JavaScript, but not of any result
+RESERVED_NAMES = (
     "w v_lp_dot q_dot p_dot v_lp q p T tau sigma k m c_0 y0 z0 in0 w_0 e0 D_0 a_x I_x sigma_ss mu_ss k_cr held loading "
     "E I N S pi oo gamma beta Lambda constructor toString arguments function var this eval select define Infinity"
 )
-"""What equations, SymPy, printers and JavaScript have meanings for; no name of a result."""
 
 
 def _new_names(law: FrictionLaw | ContactLaw, seed: int) -> tuple[dict[str, str], dict[str, str]]:
-    """Random names of a law's own parameters, and of its memory or states."""
+    """Random new names by old name, of the parameters of a law and of its memory or states."""
     random = Random(f"{type(law).__name__} {seed}")
     own = [item.name for item in fields(law) if isinstance(role_of(item), Parameter)]
     taken = {*dir(law), *law.memory()}
-    free = [word for word in WORDS.split() if word not in taken]
+    free = [word for word in RESERVED_NAMES.split() if word not in taken]
     random.shuffle(free)
     free += [f"n{random.getrandbits(40):x}" for _ in range(len(own) + len(law.memory()))]
     return dict(zip(own, free, strict=False)), dict(zip(law.memory(), free[len(own) :], strict=False))
 
 
-def _reader(name: str) -> property:
+def _read_property(name: str) -> property:
     return property(lambda self: getattr(self, name))
 
 
-def _built(renamed_fields: Mapping[str, Any]) -> Callable[..., None]:
-    """A constructor that takes the fields under their new names."""
+def _constructor(renamed_fields: Mapping[str, Any]) -> Callable[..., None]:
+    """Function for `__init__` that takes the fields of a record under their new names."""
 
-    def made(self: FrozenRecord, **given: Any) -> None:
+    def construct(self: FrozenRecord, **given: Any) -> None:
         for name, item in renamed_fields.items():
             object.__setattr__(self, name, given.get(name, item.default))
         self.__post_init__()
 
-    return made
+    return construct
 
 
 @contextmanager
 def under_random_names(law: L, seed: int = 1) -> Iterator[L]:
-    """The same law with its own parameters and its memory under other names, registered for as long as this lasts."""
+    """Copy of a law with random names of its parameters and memory, registered within the ``with`` block."""
     kind: Any = type(law)
     numbers, memory = _new_names(law, seed)
     own = {numbers.get(item.name, item.name): copy.copy(item) for item in fields(law)}
@@ -66,7 +66,7 @@ def under_random_names(law: L, seed: int = 1) -> Iterator[L]:
         first, dot, rest = condition.name.partition(".")
         return replace(condition, name=numbers.get(first, first) + dot + rest)
 
-    body: dict[str, Any] = {old: _reader(new) for old, new in numbers.items()}
+    body: dict[str, Any] = {old: _read_property(new) for old, new in numbers.items()}
     body["memory"] = lambda self: tuple(memory.values())
     body["conditions"] = lambda self: map(about, kind.conditions(self))
     if "observables" in dir(kind):
@@ -78,7 +78,7 @@ def under_random_names(law: L, seed: int = 1) -> Iterator[L]:
         body["meanings"] = lambda self: again(kind.meanings(self))
     registry = dict(kind.registry)
     other = type(kind.__name__, (kind,), body | {"__doc__": kind.__doc__}, name=f"{kind.name}-renamed")
-    other.__dataclass_fields__, other.__init__ = own, _built(own)  # type: ignore[attr-defined, misc]
+    other.__dataclass_fields__, other.__init__ = own, _constructor(own)  # type: ignore[attr-defined, misc]
     try:
         yield other(**{numbers.get(item.name, item.name): getattr(law, item.name) for item in fields(law)})
     finally:
@@ -87,7 +87,7 @@ def under_random_names(law: L, seed: int = 1) -> Iterator[L]:
 
 
 def _equations(rig: Slider | Machine) -> list[Any]:
-    """All that is computed with."""
+    """All expressions of the Model of a rig that enter a computation."""
     from steadyslip.model import build_model
 
     model = build_model(rig)
@@ -97,7 +97,7 @@ def _equations(rig: Slider | Machine) -> list[Any]:
     return [model.rates, [*model.definitions.items()], steady, contacts, seen, [*model.parameters.values()]]
 
 
-def _require_the_same(law: L, rig: Callable[[L], Slider | Machine]) -> None:
+def _require_equal_equations(law: L, rig: Callable[[L], Slider | Machine]) -> None:
     with under_random_names(law) as other:
         require(
             _equations(rig(law)) == _equations(rig(other)),
@@ -106,15 +106,15 @@ def _require_the_same(law: L, rig: Callable[[L], Slider | Machine]) -> None:
         )
 
 
-def check_renaming(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """Equations are the same, to the last bit of what is computed with them, under any names."""
+def check_renaming(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that the equations of a rig with this friction law do not depend on its names."""
     from steadyslip.laws.contact import Constant
     from steadyslip.machine.drive import Steady
 
     press, drive = Constant(steady_normal_stress=conditions.normal_stress), Steady(conditions.velocity)
-    _require_the_same(law, lambda one: Slider(friction=one, contact=press, stiffness=1e9, mass=1.0, drive=drive))
+    _require_equal_equations(law, lambda one: Slider(friction=one, contact=press, stiffness=1e9, mass=1.0, drive=drive))
 
 
-def check_contact_renaming(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """As `check_renaming`."""
-    _require_the_same(contact, surroundings.rig)
+def check_contact_renaming(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check that the equations of a rig with this contact law do not depend on its names."""
+    _require_equal_equations(contact, surroundings.rig)

@@ -1,4 +1,4 @@
-"""The contract between a friction law and the rest: two routes to stability, rig files."""
+"""Checks of friction laws in use: two routes to stability, and rig files."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from steadyslip.core.records import FrozenRecord
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.testing.precise import DIGITS, TOLERANCE, precise_function, require, shown
-from steadyslip.testing.statement import MIDDLE, Conditions, statement
+from steadyslip.testing.precise import DIGITS, TOLERANCE, format_number, precise_function, require
+from steadyslip.testing.symbolic import DEFAULT_CONDITIONS, Conditions, symbolic_law
 
 
-def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """For one memory variable: the cubic in closed form is the characteristic polynomial of the Jacobian.
+def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that the closed-form cubic is the characteristic polynomial of the Jacobian, for one memory variable.
 
-    The former takes dτ/dv and dτ/dσ in steady sliding from `steady_strength`, the latter everything from
-    `strength` and `rates`. They agree up to a common positive factor, with mass, dampings and B0...B3.
+    The cubic takes dτ/dv and dτ/dσ in steady sliding from `steady_strength`, the Jacobian everything from `strength`
+    and `rates`. They must agree up to a positive factor, with mass, dampings and B0...B3.
     """
     from steadyslip.laws.contact import Linear
     from steadyslip.linear import cubic
@@ -27,11 +27,11 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
 
     if len(law.memory()) != 1:
         return
-    said = statement(law)
+    symbolic = symbolic_law(law)
     v, sigma = conditions.velocity, conditions.normal_stress
-    point = said.steady(v, sigma)
-    rate = abs(float(said.relaxation()(*point)[0]))
-    size = float(point[-1]) / v  # a damping, of the size of friction over velocity
+    point = symbolic.steady(v, sigma)
+    rate = abs(float(symbolic.relaxation()(*point)[0]))
+    size = float(point[-1]) / v  # damping in Pa s/m of the size of friction over velocity
     linear = Linear(steady_normal_stress=sigma, b0=0.3 * size / rate, b1=0.2 * size, b2=0.4, b3=0.1 * size * rate)
     rig = Slider(
         friction=law,
@@ -51,18 +51,20 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
         numbers = function(*values.arguments, sigma)
         first, second = numbers[:4], numbers[4:]
         factor = second[-1] / first[-1]
-        require(factor > 0, law, f"closed form and Jacobian differ in sign: factor {shown(factor)}, must be > 0")
+        require(
+            factor > 0, law, f"closed form and Jacobian differ in sign: factor {format_number(factor)}, must be > 0"
+        )
         for power, (a, b) in enumerate(zip(first, second, strict=True)):
             require(
                 abs(factor * a - b) <= TOLERANCE * abs(b),
                 law,
-                f"coefficient of s^{power} is {shown(factor * a)} by the closed form, {shown(b)} by the Jacobian; "
-                "steady_strength() and strength() with rates() state different laws",
+                f"coefficient of s^{power} is {format_number(factor * a)} by the closed form, {format_number(b)} by "
+                "the Jacobian; steady_strength() and strength() with rates() state different laws",
             )
 
 
-def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
-    """A rig with this law survives being written to a rig file and read back."""
+def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
+    """Check that a rig with this law is unchanged after writing it to a rig file and reading it back."""
     from steadyslip.laws.contact import Constant
     from steadyslip.machine.drive import Steady
 
@@ -71,7 +73,7 @@ def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE)
 
 
 def round_trip(law: FrozenRecord, rig: Slider | Machine) -> None:
-    """Write `rig` as text, read it back, and compare."""
+    """Require that a rig is unchanged after writing it as text of a rig file and reading it back."""
     from steadyslip.core.errors import SteadyslipError
     from steadyslip.files.specifications import rig_from_text, rig_to_text
 

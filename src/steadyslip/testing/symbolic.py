@@ -1,4 +1,4 @@
-"""A friction law as its contract sees it: what it says in symbols, and where it is checked."""
+"""Friction laws in symbols with their gradients, and the range of velocity and normal stress of the checks."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ import sympy as sp
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import Keeper, question
 from steadyslip.laws.friction import FrictionLaw
-from steadyslip.testing.precise import in_symbols, precise_function, stated
+from steadyslip.testing.precise import call_with_symbols, precise_function, symbolic_copy
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Where a friction law is checked.
+    """Range of velocity and normal stress over which a friction law is checked.
 
     Attributes
     ----------
     velocity, normal_stress : float
-        The middle (m/s, Pa).
+        Centre of the range (m/s, Pa).
     velocity_decades, stress_decades : float
-        How far to each side, in powers of ten.
+        Powers of ten to each side of the centre.
     instant_weakening : bool
-        Whether friction may fall at once when the velocity rises (LuGre, Coulomb–Stribeck): legitimate, but
-        such a rig is ill-posed without mass.
+        Allow friction that falls at once when the velocity rises (LuGre, Coulomb–Stribeck); without mass such a rig
+        is ill-posed.
     """
 
     velocity: float = 1e-6
@@ -39,53 +39,56 @@ class Conditions:
     instant_weakening: bool = False
 
     def grid(self) -> Iterator[tuple[float, float]]:
-        """Velocities and normal stresses, the middle first."""
+        """Pairs of velocity (m/s) and normal stress (Pa): the centre first, then a logarithmic grid of 7 by 3."""
         yield self.velocity, self.normal_stress
         for v in self.velocity * np.logspace(-self.velocity_decades, self.velocity_decades, 7):
             for sigma in self.normal_stress * np.logspace(-self.stress_decades, self.stress_decades, 3):
                 yield float(v), float(sigma)
 
 
-MIDDLE = Conditions()
+DEFAULT_CONDITIONS = Conditions()
 
 
-class Statement(Keeper):
-    """What a law says, in symbols: its expressions, their gradients, and both as numbers to fifty digits."""
+class SymbolicLaw(Keeper):
+    """Equations of a friction law as SymPy expressions, with their gradients and functions that evaluate them.
+
+    The inputs of all expressions are v (m/s), σ (Pa), the memory variables and τ (Pa), in this order.
+    """
 
     def __init__(self, law: FrictionLaw) -> None:
         self.law = law
-        copy, self.numbers = in_symbols(law)
+        copy, self.numbers = symbolic_copy(law)
         self.v, self.sigma = sp.Dummy("v", positive=True), sp.Dummy("sigma", positive=True)
         self.tau = sp.Dummy("tau", real=True)
         self.memory = tuple(sp.Dummy(name, real=True) for name in law.memory())
         present = (self.v, self.sigma, self.memory, self.tau)
-        self.strength = stated(law, "strength", copy.strength, *present)
-        self.rates = stated(law, "rates", copy.rates, *present)
-        self.steady_memory = stated(law, "steady_memory", copy.steady_memory, self.v, self.sigma)
+        self.strength = call_with_symbols(law, "strength", copy.strength, *present)
+        self.rates = call_with_symbols(law, "rates", copy.rates, *present)
+        self.steady_memory = call_with_symbols(law, "steady_memory", copy.steady_memory, self.v, self.sigma)
         self._copy = copy
         self.inputs = (self.v, self.sigma, *self.memory, self.tau)
 
     @cached_property
     def steady_strength(self) -> sp.Expr:
-        """τss(v, σ); stated last, because by default it uses the memory variables stated before."""
-        return stated(self.law, "steady_strength", self._copy.steady_strength, self.v, self.sigma)
+        """Steady strength τss(v, σ), Pa; evaluated late, as by default it needs the steady memory variables."""
+        return call_with_symbols(self.law, "steady_strength", self._copy.steady_strength, self.v, self.sigma)
 
     @question
     def function(self, *expressions: sp.Expr) -> Callable[..., list[mpmath.mpf]]:
-        """The expressions as a function of v, σ, memory variables, τ."""
+        """Function of the inputs that returns the values of the expressions to fifty digits."""
         compiled = precise_function(self.law, [*self.inputs, *self.numbers], expressions)
         own = [mpmath.mpf(number) for number in self.numbers.values()]
         return lambda *numbers: compiled(*numbers, *own)
 
     @question
     def floats(self, *expressions: sp.Expr) -> Callable[..., list[Any]]:
-        """The same in ordinary floats, as the rest of the package evaluates a law."""
+        """Function of the inputs that returns the values of the expressions in floats, compiled as for a Model."""
         compiled = ArrayFunction([*self.inputs, *self.numbers], expressions)
         return lambda *numbers: compiled(*numbers, *self.numbers.values())
 
     @question
     def steady(self, v: float, sigma: float) -> tuple[mpmath.mpf, ...]:
-        """v, σ, memory variables and τ of steady sliding."""
+        """Values of the inputs (v, σ, memory variables, τ) in steady sliding."""
         unused = [0] * (len(self.memory) + 1)
         return (mpmath.mpf(v), mpmath.mpf(sigma), *self._steady(v, sigma, *unused))
 
@@ -95,12 +98,12 @@ class Statement(Keeper):
 
     @question
     def gradient(self, expression: sp.Expr) -> tuple[sp.Expr, ...]:
-        """Partial derivatives with respect to v, σ, memory variables, τ."""
+        """Partial derivatives of an expression by each input."""
         return tuple(derivative(expression, name).doit() for name in self.inputs)
 
     @question
     def relaxation(self) -> Callable[..., Any]:
-        """The matrix of ∂(rates)/∂(memory) at fixed v and σ, τ following the strength, as a function of numbers."""
+        """Function of the inputs that returns the matrix d(rates)/d(memory) at fixed v and σ, with τ = strength."""
         slope = 1 - derivative(self.strength, self.tau)
         function = self.function(
             *(
@@ -114,6 +117,6 @@ class Statement(Keeper):
 
 
 @lru_cache(maxsize=64)
-def statement(law: FrictionLaw) -> Statement:
-    """A law in symbols; raises `ContractViolation` where its methods do not take symbols."""
-    return Statement(law)
+def symbolic_law(law: FrictionLaw) -> SymbolicLaw:
+    """Symbolic equations of a law (cached); raises ContractViolation if its methods do not accept symbols."""
+    return SymbolicLaw(law)

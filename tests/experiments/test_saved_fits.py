@@ -10,9 +10,9 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting import numbers, refit
 from steadyslip.experiments.fitting.identify import Combination
-from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.search import SearchStory
 from steadyslip.experiments.numerics.noise import Noise, white
 
 

@@ -30,9 +30,9 @@ import xarray as xr
 import steadyslip as ss
 from steadyslip.experiments.answers.population import POPULATION, Population
 from steadyslip.experiments.fitting.identify import Combination
-from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.search import SearchStory
 from steadyslip.experiments.fitting.store import FIT
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.experiments.numerics.pooling import Pooled

@@ -14,6 +14,7 @@ import sympy as sp
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.core.domains import nonnegative, positive, real
+from steadyslip.experiments.answers.laws import with_law
 from steadyslip.experiments.spec import spec_from_text
 from steadyslip.linear.state_space import jacobian
 from steadyslip.model import operating_point
@@ -268,7 +269,9 @@ def test_a_file_of_a_fit_may_leave_out_what_the_law_declares():
 
 
 def test_alternatives_include_it():
-    assert {"halfway", "halfway, two states"} <= set(ROCK.friction.alternatives())
+    assert {"halfway", "time-lag"} <= set(ROCK.friction.alternatives())
+    found = with_law(ROCK, "time-lag, halfway, two states").friction
+    assert (found.evolution.name, found.normal_memory.name, len(found.states)) == ("halfway", "time-lag", 2)
 
 
 @CASES

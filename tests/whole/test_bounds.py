@@ -257,8 +257,8 @@ def test_a_used_fit_can_be_copied_and_sent():
     import copy
     import pickle
 
-    from steadyslip.experiments.fitting.numbers import SearchStory
     from steadyslip.experiments.fitting.result import Fit
+    from steadyslip.experiments.fitting.search import SearchStory
 
     numbers = np.array([1.0, 2.0])
     fit = Fit("plan", numbers, 1.0, SearchStory(1, 1, (), 3, True), (), np.eye(2), (), (numbers, numbers), "1")

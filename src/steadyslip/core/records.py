@@ -285,6 +285,14 @@ def role_of(item: Field[Any]) -> Declared:
     return role
 
 
+def stand_in(law: type[R]) -> R | None:
+    """A record with the values that its parameters declare as `standing`; None if others have no default either."""
+    standing = {item.name: getattr(role_of(item), "standing", None) for item in fields(law)}  # type: ignore[arg-type]
+    own = {name: value for name, value in standing.items() if value is not None}
+    lacking = [item for item in fields(law) if is_required(item) and item.name not in own]  # type: ignore[arg-type]
+    return None if lacking else law(**own)
+
+
 def _layout(record: FrozenRecord) -> tuple[tuple[str, str, Declared], ...]:
     """Attribute name, own dotted name and role of every field of a record."""
     kind: Any = type(record)

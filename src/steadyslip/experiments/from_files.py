@@ -49,6 +49,8 @@ def fit_files(
     fit : Fit
         The best, where laws are compared.
     comparison : LawComparison or None
+        Of the laws that the file lists; where the normal stress changes and no file says how friction remembers that,
+        of the memories of it.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def fit_files(
     records = _read(plan, paths, skip_bad_lines)
     with progress_text("searching") as said:
         told = _teller(said)
-        if plan.laws:
+        if plan.compared(records):
             found = plan.compare(records, progress=told)
             return found.fits[found.best], found
         return plan.fit(records, progress=told), None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
+from itertools import product
 from os import PathLike
 from typing import Any
 
@@ -53,6 +54,8 @@ class Spec(Displayed):
         Arguments of `fit`.
     laws : tuple of str
         Laws to compare; none unless asked for.
+    undecided : tuple of str
+        Labels of laws among which records choose where their normal stress changes, as the file does not say.
     windows : bool
         Whether every step of a record is a record of its own.
     v_ref_given : bool
@@ -70,6 +73,7 @@ class Spec(Displayed):
     record: RecordSettings = field(default_factory=RecordSettings)
     options: dict[str, Any] = field(default_factory=dict)
     laws: tuple[str, ...] = ()
+    undecided: tuple[str, ...] = ()
     windows: bool = False
     v_ref_given: bool = False
     contact_given: bool = True
@@ -89,11 +93,15 @@ class Spec(Displayed):
         rig, parts = self._for(records)
         return fit(rig, parts, **self.options, protocol=self.protocol, **changes)
 
+    def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
+        """The laws that the file lists; if none, those among which changes of the normal stress decide."""
+        decides = self.rig.contact.is_imposed() and any(record.stress_changes for record in records)
+        return self.laws or (self.undecided if decides else ())
+
     def compare(self, records: Sequence[Record], **changes: Any) -> LawComparison:
-        """Fit all laws that the file lists."""
+        """Fit all laws of `compared`."""
         rig, parts = self._for(records)
-        options = {k: v for k, v in self.options.items() if k not in ("free", "separate")}
-        return compare_laws(rig, parts, self.laws, **options, protocol=self.protocol, **changes)
+        return compare_laws(rig, parts, self.compared(records), **self.options, protocol=self.protocol, **changes)
 
     def _for(self, records: Sequence[Record]) -> tuple[Slider, tuple[Record, ...]]:
         parts = tuple(w for r in records for w in (r.windows() if self.windows else (r,)))
@@ -172,9 +180,11 @@ def _spec(found: RigFileContents, filled: _Filled) -> Spec:
         if known := [name for name in rig.of_kind("friction level") if name not in missing]:
             options["fixed"] = [*settings.fixed, *known]
     v_ref, contact, drive = (filled.given(kind, found.changed) for kind in _Filled.FROM_RECORDS)
+    choices = [words for name, words in rig.friction.decided_by_stress.items() if name not in filled.friction]
+    undecided = tuple(map(", ".join, product(*choices))) if choices else ()
     return Spec(
         rig, found.protocol, record if isinstance(record, RecordSettings) else RecordSettings(), options,
-        settings.compare, settings.windows, v_ref, contact, drive, members,
+        settings.compare, undecided, settings.windows, v_ref, contact, drive, members,
     )  # fmt: skip
 
 
@@ -229,6 +239,7 @@ class _Filled:
         self.problems: list[Problem] = []
         self.missing: set[str] = set()
         self.standing: dict[str, str] = {}
+        self.friction: set[str] = set()
 
     def given(self, kind: str, changed: set[str]) -> bool:
         """Whether the file, or a change, says what records would say otherwise."""
@@ -243,6 +254,7 @@ class _Filled:
         contact, drive, slider = (tables.setdefault(n, {}) for n in ("contact", "drive", "slider"))
         if any(not isinstance(table, dict) for table in (friction, contact, drive, slider)):
             return
+        self.friction = set(friction)
         law = FrictionLaw.registry.get(str(friction.setdefault("law", friction_laws.USUAL)))
         if law is not None:
             self._law(friction, law, "friction.", states)

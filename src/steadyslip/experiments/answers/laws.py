@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
 from steadyslip.experiments.fitting.fit import fit, started_from
+from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
+
+WIDTH = 100
+FIRST = 0.1  # of the effort: all laws get so much, those that promise to be the best the rest
+HOPELESS = 2.0  # times the least sum of squares: no longer search would make such a law the best
+TELLS = 6.0  # difference of BIC that is called strong (Kass & Raftery 1995)
+TWICE = 2.0  # sums of squares beyond which the ratio is told, not the difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +41,17 @@ class LawComparison(Displayed):
         AIC and BIC, with the same number of independent samples for all.
     left_out : tuple of str
         Models that were not fitted before Ctrl-C.
+    refused : tuple of str
+        Models that cannot follow the records from any start.
     predicted : dict of str to float
-        Root mean square error of predicting samples that were left out, see `cross_validate`; empty unless asked for.
+        Root mean square error of predicting samples that were left out, see `cross_validate`; of models that are not
+        far from the best, and empty unless asked for.
     """
 
     fits: dict[str, Fit]
     criteria: dict[str, tuple[float, float]]
     left_out: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
     predicted: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -46,14 +61,14 @@ class LawComparison(Displayed):
 
     @property
     def best(self) -> str:
-        """Label of the model with the least AIC."""
+        """Label of the model with the least BIC: a parameter more must be worth more than chance makes of it."""
         return next(iter(self.fits))
 
     @property
     def weights(self) -> dict[str, float]:
-        """Akaike weights: relative support of the models."""
-        least = min(aic for aic, _ in self.criteria.values())
-        raw = {label: float(np.exp(-0.5 * (aic - least))) for label, (aic, _) in self.criteria.items()}
+        """Schwarz weights: how probable each model is if all were as probable before."""
+        least = min(bic for _, bic in self.criteria.values())
+        raw = {label: float(np.exp(-0.5 * (bic - least))) for label, (_, bic) in self.criteria.items()}
         return {label: value / sum(raw.values()) for label, value in raw.items()}
 
     def __str__(self) -> str:
@@ -66,11 +81,31 @@ class LawComparison(Displayed):
             lines.append(
                 f"{label:<{wide}}  {len(one.space):>10}  {one.ssq:>14.6g}  {mine[0] - aic:>4.1f}  "
                 f"{mine[1] - bic:>5.1f}  {self.weights[label]:>6.3f}"
-                + (f"  {self.predicted[label]:>22.4g}" if self.predicted else "")
+                + (f"  {self.predicted[label]:>22.4g}" if label in self.predicted else "")
             )
+        lines += textwrap.wrap(self.verdict, WIDTH)
+        if self.refused:
+            lines.append(f"cannot follow the records from any start: {'; '.join(self.refused)}")
         if self.left_out:
             lines.append(f"stopped before these were fitted: {'; '.join(self.left_out)}")
         return "\n".join(lines)
+
+    @property
+    def verdict(self) -> str:
+        """Which model is best, and by how much, in a sentence."""
+        best, *others = self.fits
+        if not others:
+            return ""
+        own, next_best = self.fits[best], self.fits[others[0]]
+        ahead = self.criteria[others[0]][1] - self.criteria[best][1]
+        times = next_best.ssq / own.ssq
+        less = f"{times:.3g} times the sum of squares" if times > TWICE else f"a sum of squares {times - 1:+.2%}"
+        if ahead < TELLS:
+            return (
+                f"The records hardly tell '{best}' from '{others[0]}', which has {less} "
+                f"and is {ahead:.1f} behind in BIC; what both agree on may be relied on."
+            )
+        return f"'{best}' it is: '{others[0]}', the next, has {less} and is {ahead:.1f} behind in BIC."
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the laws by how much worse than the best they are.
@@ -100,6 +135,10 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
     """
     if len(fits) < 2:
         raise ParameterError([Problem("fits", f"got {len(fits)}; allowed: two or more")])
+    return _in_order(fits)
+
+
+def _in_order(fits: Mapping[str, Fit]) -> LawComparison:
     first = next(iter(fits.values()))
     for label, one in fits.items():
         same = len(one.plan.records) == len(first.plan.records) and all(
@@ -109,7 +148,7 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
             raise ParameterError([Problem(label, "is a fit to other records; allowed: the same")])
     best = min(fits.values(), key=lambda f: f.ssq)
     criteria = {label: one.criteria(best.noise) for label, one in fits.items()}
-    order = sorted(fits, key=lambda label: criteria[label][0])
+    order = sorted(fits, key=lambda label: criteria[label][1])
     return LawComparison({label: fits[label] for label in order}, {label: criteria[label] for label in order})
 
 
@@ -121,31 +160,84 @@ def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, *
     ----------
     rig : Slider
         Whose friction law names alternatives: rate-and-state friction every evolution law without parameters of its
-        own, with one state or two. Everything else is kept.
+        own, with one state or two, and every memory of normal stress. Everything else is kept.
     records : Record or sequence of Record
     laws : sequence of str, optional
-        Their labels, such as ``aging`` or ``slip, two states``; a few usual ones unless given.
+        Their labels, such as ``aging``, ``slip, two states``, ``aging, linker-dieterich`` or ``prakash-clifton``; what
+        a label does not say is that of the rig. A few usual ones unless given; of records in which the normal stress
+        changes, with every memory of it.
     **options
-        As for `fit`. Ctrl-C compares the laws that have been fitted, where there are two or more.
+        As for `fit`. What the rig's law has, and one of the others has not, is left out of ``free``, ``fixed`` and
+        ``separate`` there; what it has besides is free. Ctrl-C compares the laws that have been fitted, where there
+        are two or more.
 
     Raises
     ------
     ParameterError
         If a law is unknown or the rig's friction has no alternatives.
+    NotAvailable
+        If none of the laws can follow the records.
     """
+    many = (records,) if isinstance(records, Record) else tuple(records)
+    rigs = {label: with_law(rig, label) for label in (_usual_labels(rig, many) if laws is None else laws)}
+    effort = options.pop("effort", 1.0)
     fits: dict[str, Fit] = {}
-    rigs = {label: with_law(rig, label) for label in (rig.friction.compared if laws is None else laws)}
+    refused: list[str] = []
+    predicted: dict[str, float] = {}
+
+    def fitted(label: str, share: float) -> None:
+        try:
+            fits[label] = fit(rigs[label], many, **_options_of(rig, rigs[label], options), effort=share)
+        except NotAvailable:
+            refused.append(label)
+
     try:
-        for label, one in rigs.items():
-            fits[label] = fit(one, records, **options)
-        fits = {label: started_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
-        predicted = {label: cross_validate(own).rms for label, own in fits.items()}
+        for label in rigs:
+            fitted(label, FIRST * effort)
+        if not fits:
+            raise NotAvailable(f"none of the laws can follow these records from any start: {'; '.join(refused)}")
+        fits |= {label: started_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
+        for label in [label for label in _near(fits) if fits[label].search.cut]:
+            fitted(label, effort)
+        predicted = {label: cross_validate(fits[label]).rms for label in _near(fits)}
     except KeyboardInterrupt:
         if len(fits) < 2:
             raise
-        predicted = {}
-    left_out = tuple(label for label in rigs if label not in fits)
-    return replace(compare(fits), left_out=left_out, predicted=predicted)
+    left_out = tuple(label for label in rigs if label not in (*fits, *refused))
+    return replace(_in_order(fits), left_out=left_out, refused=tuple(refused), predicted=predicted)
+
+
+def _near(fits: Mapping[str, Fit]) -> list[str]:
+    """Fits that a longer search might still make the best."""
+    least = min(one.ssq for one in fits.values())
+    return [label for label, one in fits.items() if one.ssq <= HOPELESS * least]
+
+
+def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
+    """The labels compared by default: with all that changes of the normal stress can decide, where there are any."""
+    law = rig.friction
+    if not (rig.contact.is_imposed() and any(record.stress_changes for record in records)):
+        return law.compared
+    return tuple(map(", ".join, product(law.compared, *law.decided_by_stress.values())))
+
+
+def _options_of(rig: Slider, other: Slider, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of a fit to the rig as they are for one with another law."""
+    before, after = (set(can_be_free(each)) for each in (rig, other))
+    found = dict(options)
+    for key in ("free", "fixed", "separate"):
+        if options.get(key) is not None:
+            found[key] = [name for name in options[key] if _full(name, before) not in before - after]
+    if options.get("free") is not None:
+        found["free"] += sorted(after - before)
+    return found
+
+
+def _full(name: str, known: Iterable[str]) -> str:
+    try:
+        return resolve(name, dict.fromkeys(known))
+    except UnknownNameError:
+        return name
 
 
 def with_law(rig: Slider, label: str) -> Slider:
@@ -155,8 +247,13 @@ def with_law(rig: Slider, label: str) -> Slider:
         raise ParameterError(
             [Problem("rig", f"has {type(rig.friction).__name__} friction, which names no alternatives")]
         )
-    word, _, states = (part.strip() for part in label.partition(","))
-    friction = known.get(f"{word}, {states}" if states else word)
-    if friction is None:
-        raise ParameterError([Problem("laws", f"got {label!r}; allowed: {', '.join(map(repr, known))}")])
+    words = [word.strip() for word in label.replace("+", ",").split(",")]
+    if not set(words) <= set(known):
+        allowed = ", ".join(map(repr, known))
+        raise ParameterError(
+            [Problem("laws", f"got {label!r}; allowed: {allowed}, or several of these with commas between them")]
+        )
+    friction = rig.friction
+    for word, changed in known.items():
+        friction = changed(friction) if word in words else friction
     return replace(rig, friction=friction)

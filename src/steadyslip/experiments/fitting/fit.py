@@ -14,11 +14,10 @@ from steadyslip.experiments.fitting.checks import check_friction
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.identify import combinations, prior_information
-from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import MOST, Found, Told, in_order, searched, standing
+from steadyslip.experiments.fitting.search import MOST, Found, SearchStory, Told, in_order, searched, standing
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record

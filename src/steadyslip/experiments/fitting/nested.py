@@ -78,7 +78,9 @@ def simpler(plan: Plan) -> Iterator[Simpler]:
         if not member.isdigit():
             if role.idle is not None:
                 rig = plan.rig.with_values({name: role.idle})
-                yield Simpler(_without(plan, rig, [name]), {name: role.idle}, ())
+                within = [key for key in plan.free if "." in owner and key.startswith(f"{owner}.")]
+                scales = tuple(key for key in within if addresses[key].role.idle is None)
+                yield Simpler(_without(plan, rig, [name, *scales]), {name: role.idle}, scales)
             continue
         last = int(member) > 1 and not any(key.startswith(f"{family}.{int(member) + 1}.") for key in addresses)
         if not last or owner in seen:

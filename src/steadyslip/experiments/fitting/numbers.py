@@ -19,7 +19,14 @@ from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.refit import Ramped, driven_as_measured, with_ramps
+from steadyslip.experiments.fitting.refit import (
+    Ramped,
+    Remembered,
+    driven_as_measured,
+    with_memories,
+    with_ramps,
+)
+from steadyslip.experiments.fitting.search import SearchStory
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.machine.slider import Slider
@@ -72,34 +79,6 @@ class Estimate(Displayed):
         if self.unit == "s":
             return f"{self.low:.7g} to {self.high:.7g} s"
         return format_range(self.low, self.high, self.unit, self.area)
-
-
-@dataclass(frozen=True)
-class SearchStory:
-    """How the minimum was found.
-
-    Attributes
-    ----------
-    starts : int
-        Points that the search started from.
-    arrived : int
-        How many of them ended at the best minimum.
-    others : tuple of float
-        Sums of squares of other minima, as multiples of the best.
-    iterations : int
-        Of the last stage.
-    converged : bool
-        Whether the sum of squares is within 1e-7 of where it ends.
-    cut : bool
-        Whether the search ended because the work that it may be was done.
-    """
-
-    starts: int
-    arrived: int
-    others: tuple[float, ...]
-    iterations: int
-    converged: bool
-    cut: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +196,11 @@ class FitNumbers(ReadOnly):
     def as_ramps(self) -> tuple[Ramped, ...]:
         """What would come of it if steps of the rate that the displacement cannot tell from ramps were ramps."""
         return with_ramps(self.plan, self.values, self._ends)
+
+    @cached_property
+    def with_memories(self) -> tuple[Remembered, ...]:
+        """What memories of the normal stress would make of a law that has none, where that stress changes."""
+        return with_memories(self.plan)
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:

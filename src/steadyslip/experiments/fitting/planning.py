@@ -51,7 +51,7 @@ def make_plan(
             raise NotAvailable("fits are not offered for creep and injection; allowed: other pieces, that move the "
                                "load point or change the normal stress")  # fmt: skip
     problems: list[Problem] = []
-    known = _can_be_free(rig, plan_protocol)
+    known = can_be_free(rig, plan_protocol)
     names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
     if free is not None:  # the level of friction is not asked for, but never known beforehand
         names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
@@ -79,7 +79,8 @@ def make_plan(
     return plan
 
 
-def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
+def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Address]:
+    """What a fit may free: what has a value, and matters."""
     found = {
         name: a for name, a in rig.parameters().items()
         if a.value is not None and name not in NEVER_FREE and not a.role.gauge
@@ -92,7 +93,7 @@ def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
 
 def _default_free(rig: Slider) -> list[str]:
     """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
-    found = [name for name in _can_be_free(rig, None) if name.startswith("friction.")]
+    found = [name for name in can_be_free(rig) if name.startswith("friction.")]
     return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
 
 

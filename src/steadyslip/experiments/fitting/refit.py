@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.effort import Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.plan import Plan, with_loading
+from steadyslip.experiments.fitting.planning import can_be_free
+from steadyslip.experiments.fitting.search import searched
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
+BRIEF, FEW_STARTS = 0.1, 12  # of the effort of a fit, and of its starts: what a look at another law may cost
 SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # of the longest that a ramp may be: durations that are tried
 
 
@@ -69,6 +73,52 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
     enough = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.comparison(Effort(budget=budget))
     return minimise(lambda x, _: comparison.residuals(x), z, low, high, enough=enough, **options)
+
+
+@dataclass(frozen=True)
+class Remembered:
+    """Where a search ends if friction has a memory of the normal stress.
+
+    Attributes
+    ----------
+    choice : str
+        What the file says for it: name of the law's field, and word.
+    ssq : float
+    values : dict of str to float
+        Of all unknowns, by name.
+    """
+
+    choice: str
+    ssq: float
+    values: dict[str, float]
+
+
+def with_memories(plan: Plan) -> tuple[Remembered, ...]:
+    """Fits with each memory of the normal stress, the best first, of a law without one; empty where nothing changes it.
+
+    A short search for each: what a longer one would find may be better still.
+    """
+    law = plan.rig.friction
+    if not (law.forgets_stress() and plan.pressed and any(record.stress_changes for record in plan.records)):
+        return ()
+    found = []
+    for field, words in law.decided_by_stress.items():
+        for word in words:
+            own = law.alternatives()[word](law)
+            if own == law:
+                continue
+            rig = replace(plan.rig, friction=own)
+            free = (*plan.free, *(name for name in can_be_free(rig) if name not in plan.rig.parameters()))
+            richer = replace(plan, rig=rig, free=free)
+            budget = Budget.of_fit(sum(map(len, plan.records)), len(richer.space()), BRIEF)
+            try:
+                best = searched(richer, FEW_STARTS, Effort(budget=budget), None)
+            except NotAvailable:
+                continue
+            names = (one.name for one in richer.space().unknowns)
+            values = dict(zip(names, map(float, richer.space().values(best.coordinates)), strict=True))
+            found.append(Remembered(f"{field} = {word!r}", best.ssq, values))
+    return tuple(sorted(found, key=lambda one: one.ssq))
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:

@@ -13,7 +13,6 @@ from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
 from steadyslip.experiments.fitting.effort import Effort, work_of_search
 from steadyslip.experiments.fitting.nested import Simpler, simpler
-from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
@@ -41,6 +40,34 @@ INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of 
 
 Told = Callable[[str, int, float], None]
 """What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
+
+
+@dataclass(frozen=True)
+class SearchStory:
+    """How the minimum was found.
+
+    Attributes
+    ----------
+    starts : int
+        Points that the search started from.
+    arrived : int
+        How many of them ended at the best minimum.
+    others : tuple of float
+        Sums of squares of other minima, as multiples of the best.
+    iterations : int
+        Of the last stage.
+    converged : bool
+        Whether the sum of squares is within 1e-7 of where it ends.
+    cut : bool
+        Whether the search ended because the work that it may be was done.
+    """
+
+    starts: int
+    arrived: int
+    others: tuple[float, ...]
+    iterations: int
+    converged: bool
+    cut: bool = False
 
 
 @dataclass(frozen=True, eq=False)

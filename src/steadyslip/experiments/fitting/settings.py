@@ -62,7 +62,11 @@ class FitSettings(Settings):
     )
     windows: bool = option(False, True, doc="every step of a record becomes a record of its own", default=False)
     compare: tuple[str, ...] = setting(
-        Names("laws to compare: `slip`, `aging`, `prz`, each also with `, two states`"), default=()
+        Names(
+            "laws to compare: `slip`, `aging`, `prz`, each also with `, two states` and with a memory of normal "
+            "stress, `, none`, `, linker-dieterich` or `, prakash-clifton`; a word alone changes nothing else"
+        ),
+        default=(),
     )
 
 

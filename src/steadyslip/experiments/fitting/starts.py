@@ -236,6 +236,8 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         return d_c * (3.0 + 30.0 * spare) ** max(member - 1, 0)
     if unknown.kind == "stress share":
         return alpha
+    if unknown.kind == "immediate share":
+        return 1.0 - alpha
     if unknown.kind == "stiffness":
         return steepness * _stress(part)
     if name.startswith(("trend.", "offset")):

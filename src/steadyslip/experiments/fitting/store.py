@@ -12,10 +12,11 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.identify import Combination
-from steadyslip.experiments.fitting.numbers import FitNumbers, SearchStory
+from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.refit import Ramped
+from steadyslip.experiments.fitting.search import SearchStory
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.loading.pressing import JoinedCurves
 from steadyslip.experiments.measured.columns import ROLES

@@ -103,7 +103,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
     found += list(fit.at_bounds) + _outliers(fit) + _unsettled(fit) + _off_the_loading(fit) + _vague_jumps(fit)
-    found += _untold_ramps(fit)
+    found += _untold_ramps(fit) + _forgotten_stress(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     if other := of_another(fit.version):
@@ -238,6 +238,30 @@ def _of_ramps(fit: FitNumbers, tried: tuple[Ramped, ...]) -> str:
     return f"{verdict}: with {lengths[longest.share]} the sum of squares is {_more(fit, longest)}; {changes}"
 
 
+def _forgotten_stress(fit: FitNumbers) -> list[str]:
+    """That the normal stress changes and friction has no memory of it, and what one would make of the fit."""
+    plan = fit.plan
+    if not (plan.pressed and plan.rig.friction.forgets_stress()):
+        return []
+    changing = [record.source for record in plan.records if record.stress_changes]
+    if not changing:
+        return []
+    said = f"the normal stress changes in {_listed(changing)}, and this law has no memory of it"
+    if not any(noise.correlated for noise in fit.noise):
+        return [f"{said}; residuals are white, which speaks for none"]
+    worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
+    best = next(iter(fit.with_memories), None)
+    if best is None or worth * np.log(fit.ssq / best.ssq) < SURE * (len(best.values) - len(fit.values)):
+        return [f"{said}; none that was tried makes the fit better"]
+    added = [f"{n.rpartition('.')[2]} {x:.3g}" for n, x in best.values.items() if n not in fit.values]
+    moved = [f"{_letter(n)} {best.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
+             if n in best.values and fit.values.get(n)]  # fmt: skip
+    return [
+        f"{said}: with {best.choice} ({', '.join(added)}) the sum of squares is {best.ssq / fit.ssq:.2g} of this, and "
+        f"{', '.join(moved)}; do not use these numbers, and ask for that, in [friction], in lab_rig or with --set"
+    ]
+
+
 def _lengths(fit: FitNumbers, ramped: Ramped) -> str:
     own = [
         format_quantity(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values
@@ -270,8 +294,11 @@ def drive_line(fit: FitNumbers) -> str:
         return "a smooth curve through the measured displacement"
     count = sum(len(course.changes) for course in loads)
     free = sum(one.parameter.startswith("step.") for one in fit.space.unknowns)
+    presses = [loading.stress for loading in plan.loading if plan.pressed and loading.stress is not None]
+    pressed = sum(len(course.changes) for course in presses)
     text = f"commanded loading found in the record, {count} change{'' if count == 1 else 's'} of rate"
-    text += f", {free} of {'its' if count == 1 else 'their'} times and durations fitted" if free else ""
+    text += f" and {pressed} of normal stress" if pressed else ""
+    text += f", {free} of {'its' if count + pressed == 1 else 'their'} times and durations fitted" if free else ""
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
         text += "; at rest at first, how long is fitted (start.hold)"
     if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):

@@ -28,6 +28,8 @@ from steadyslip.files.output import write_columns
 
 FEWEST_ROWS = 20
 """Least number of samples of a record; chosen by trial: fewer do not determine rates and noise."""
+DRIFT = 0.02
+"""Change of the normal stress, as a share, within which a servo may wander without a command; chosen by trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,15 @@ class Record(Displayed, Keeper):
             return self.commanded
         load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
         return Loading(load, None if self.normal is None else stress_course(self.time, self.normal))
+
+    @cached_property
+    def stress_changes(self) -> bool:
+        """Whether the normal stress was changed: at once, by ramps, in waves, or by more than servos let it drift."""
+        stress = self.loading.stress
+        if stress is None:
+            return False
+        along = stress.at(self.time)
+        return bool(stress.changes) or float(np.ptp(along)) > DRIFT * float(np.mean(along))
 
     @cached_property
     def initial_rate(self) -> float | None:

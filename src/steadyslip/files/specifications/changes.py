@@ -41,7 +41,10 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
             index = int(step) - 1 if step.isdigit() else -1
             table = table[index] if 0 <= index < len(table) else None
         elif isinstance(table, dict):
-            table = table.setdefault(step, {})
+            inner = table.setdefault(step, {})
+            if isinstance(inner, str) and full in _known_names(tables):  # a law named by a word alone
+                inner = table[step] = {"law": inner}
+            table = inner
         if not isinstance(table, (dict, list)):
             return [Problem(name, "cannot be set: there is no such table in the file")]
     if isinstance(table, list):

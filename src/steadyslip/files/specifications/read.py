@@ -189,7 +189,8 @@ def read_contents(
     further : sequence of Section
         Tables besides those of rig and protocol, with the records that declare them.
     complete : callable, optional
-        Function that fills in values which tables may omit; called after changes of further tables, before all others.
+        Function that fills in values which tables may omit; called before changes of the rig, which may name what it
+        filled in, and again after them.
     rig_needed : bool
         False if a text with only the protocol's table is valid.
 
@@ -225,6 +226,8 @@ def read_tables(
     for change in [change for change in every if change not in own]:
         changed.add(full_name(split(change)[0], tables)[0])
         reader.problems += apply(change, tables, lines)
+    if complete is not None and changed:  # laws that were changed have parameters of their own
+        complete(tables)
     found_rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
     protocol = reader.protocol(found_rig if isinstance(found_rig, Machine) else None)
     found = {section.name: reader.settings(section) for section in further}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar
 
 import sympy as sp
@@ -25,6 +25,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     """
 
     compared: ClassVar[tuple[str, ...]] = ()
+    decided_by_stress: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def memory(self) -> tuple[str, ...]:
         """Names of the memory variables, in the order of all other methods; empty if there are none."""
@@ -77,9 +78,18 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         """Copy of this fitted law with parameters that the records cannot determine taken from `other`."""
         return self
 
-    def alternatives(self) -> Mapping[str, FrictionLaw]:
-        """Alternative laws to compare in a fit, by label; those listed in `compared` are fitted by default."""
+    def alternatives(self) -> Mapping[str, Callable[[Any], FrictionLaw]]:
+        """What makes another law of the same kind of one, by word, in the order in which words are obeyed.
+
+        Labels are made of words: `aging, two states`. `compared` are the labels that records are compared with unless
+        others are asked for; `decided_by_stress` has, by field, words of which records choose one where their normal
+        stress changes.
+        """
         return {}
+
+    def forgets_stress(self) -> bool:
+        """Whether it has no memory of normal stress, though others of its kind have."""
+        return False
 
     def runs_away(self) -> bool:
         """True if velocity can become infinite in finite time under this law without mass and damping."""

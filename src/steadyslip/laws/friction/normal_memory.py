@@ -141,11 +141,13 @@ class PrakashClifton(NormalMemory, name="prakash-clifton"):
     """
 
     direct_share: float = parameter(
-        "1", share, "instantaneous share g of the response", default=0.0, size=0.2, idle=1.0
-    )
+        "1", share, "instantaneous share g of the response", default=0.0,
+        kind="immediate share", size=0.2, standing=0.5, idle=1.0,
+    )  # fmt: skip
     slip_distance: float | None = parameter(
-        "m", positive, "slip distance d_σ of the lag; d_c unless given", default=None, kind="slip distance"
-    )
+        "m", positive, "slip distance d_σ of the lag; d_c unless given", default=None,
+        kind="slip distance", standing=1e-5,
+    )  # fmt: skip
 
     def memory(self) -> tuple[str, ...]:
         return ("sigma_e",)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import positive, real
 from steadyslip.core.errors import InternalError, Problem
 from steadyslip.core.expressions import asinh_exp
-from steadyslip.core.records import option, parameter, part, parts
+from steadyslip.core.records import option, parameter, part, parts, stand_in
 from steadyslip.laws.friction.evolution import Evolution, Slip
 from steadyslip.laws.friction.law import Expression, FrictionLaw
 from steadyslip.laws.friction.normal_memory import NoMemory, NormalMemory
@@ -59,6 +60,9 @@ class RateState(FrictionLaw, name="rate-state"):
     normal_memory: NormalMemory = part(NormalMemory, "memory of normal stress", default=NoMemory())
 
     compared: ClassVar[tuple[str, ...]] = ("slip", "aging", "prz", "slip, two states")
+    decided_by_stress: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "normal_memory": ("none", "linker-dieterich", "prakash-clifton")
+    }
 
     def inconsistencies(self) -> Iterator[Problem]:
         single = {"b": self.b, "d_c": self.d_c}
@@ -106,18 +110,43 @@ class RateState(FrictionLaw, name="rate-state"):
             return replace(self, normal_memory=other.normal_memory)
         return self
 
-    def alternatives(self) -> Mapping[str, FrictionLaw]:
-        """Laws with every evolution law that has no parameters, each with one state and with two."""
+    def alternatives(self) -> Mapping[str, Callable[[RateState], RateState]]:
+        """Every evolution law without parameters of its own, with one state; two states; every memory."""
+        found: dict[str, Callable[[RateState], RateState]] = {}
+        for name, law in Evolution.registry.items():
+            if issubclass(law, Evolution) and not fields(law):
+                found[name] = partial(RateState._with_one_state, evolution=law())
+        found["two states"] = RateState._with_two_states
+        for name, memory in NormalMemory.registry.items():
+            if issubclass(memory, NormalMemory) and (usual := stand_in(memory)) is not None:
+                found[name] = partial(RateState._remembering, memory=usual)
+        return found
+
+    def _one_state(self) -> tuple[float, float]:
+        """b and d_c of the one state, or the first."""
         b, d_c = (self.states[0].b, self.states[0].d_c) if self.states else (self.b, self.d_c)
         if b is None or d_c is None:
             raise InternalError("b and d_c of a state")
+        return b, d_c
+
+    def _with_one_state(self, evolution: Evolution) -> RateState:
+        b, d_c = self._one_state()
+        return replace(self, evolution=evolution, states=(), b=b, d_c=d_c)
+
+    def _with_two_states(self) -> RateState:
+        b, d_c = self._one_state()
         pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))
-        found: dict[str, FrictionLaw] = {}
-        for name, law in Evolution.registry.items():
-            if issubclass(law, Evolution) and not fields(law):
-                one = replace(self, evolution=law(), states=(), b=b, d_c=d_c)
-                found |= {name: one, f"{name}, two states": replace(one, states=pair, b=None, d_c=None)}
-        return found
+        return replace(self, states=pair, b=None, d_c=None)
+
+    def _remembering(self, memory: NormalMemory) -> RateState:
+        if type(memory) is type(self.normal_memory):
+            return self
+        states = tuple(replace(state, alpha=None) for state in self.states)
+        return replace(self, states=states, normal_memory=memory)
+
+    def forgets_stress(self) -> bool:
+        """If its memory is `NoMemory`."""
+        return isinstance(self.normal_memory, NoMemory)
 
     # parts of the law, valid for numbers and symbols
 

@@ -1,0 +1,200 @@
+"""Records in which the normal stress changes: fits notice it, free a memory of it, and tell which."""
+
+from __future__ import annotations
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+import stress_steps_at_random as random_steps
+from steadyslip.experiments.answers.laws import with_law
+from steadyslip.experiments.fitting.planning import make_plan
+from steadyslip.experiments.spec import spec_from_text
+
+ALPHA = 0.3
+BY = 0.04 * lab.STRESS
+PRESSED = ss.Protocol(
+    pieces=(ss.VelocityStep(at=30.13, to=3e-6), ss.NormalStressStep(at=60.41, by=BY),
+            ss.NormalStressStep(at=100.41, by=-BY)), until=140.0,
+)  # fmt: skip
+PRAKASH = ss.PrakashClifton(direct_share=0.4, slip_distance=30e-6)
+MEMORIES = ("none", "linker-dieterich", "prakash-clifton")
+
+
+@cache
+def pressed():
+    return lab.record(lab.rig(alpha=ALPHA), PRESSED, 1, count=300)
+
+
+def lagging_rig():
+    rig = lab.rig()
+    return ss.Slider(
+        friction=ss.RateState(**lab.TRUTH, v_ref=lab.SLOW, normal_memory=PRAKASH),
+        contact=rig.contact, stiffness=rig.stiffness, drive=rig.drive,
+    )  # fmt: skip
+
+
+@cache
+def compared():
+    return spec_from_text("[friction]\n").compare([pressed()])
+
+
+def near(fit, name, truth):
+    one = fit[name]
+    return one.determined and abs(one.value - truth) < 4 * one.error
+
+
+def test_a_record_tells_whether_its_normal_stress_was_changed():
+    assert pressed().stress_changes
+    assert not lab.record(lab.rig(), lab.STEP, count=300).stress_changes
+    columns = lab.columns(lab.rig(), lab.STEP, 300)
+    for drift, changes in ((0.005, False), (0.1, True)):
+        normal = columns["normal"] * np.linspace(1, 1 + drift, 300)
+        assert ss.record_from_arrays(**{**columns, "normal": normal}).stress_changes is changes
+    del columns["normal"]
+    assert not ss.record_from_arrays(**columns).stress_changes
+
+
+def test_a_file_that_says_nothing_of_it_has_the_memories_compared():
+    found = compared()
+    assert set(found.fits) == set(MEMORIES)
+    assert found.best == "linker-dieterich"
+    best = found.fits[found.best]
+    assert near(best, "alpha", ALPHA)
+    assert near(best, "a", lab.TRUTH["a"])
+    assert "'linker-dieterich' it is" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("text", "labels"),
+    [
+        ('normal_memory = "none"', ()),
+        ('normal_memory = "linker-dieterich"', ()),
+        ('[fit]\ncompare = ["slip", "aging"]', ("slip", "aging")),
+        ('[contact]\nlaw = "inclined-spring"\nangle = "5 deg"\npreload = "10 MPa"', ()),
+        ("", MEMORIES),
+    ],
+)
+def test_what_a_file_says_is_kept(text, labels):
+    assert spec_from_text(f"[friction]\n{text}\n").compared([pressed()]) == labels
+
+
+def test_constant_normal_stress_asks_for_no_memory():
+    assert spec_from_text("[friction]\n").compared([lab.record(lab.rig(), lab.STEP, count=300)]) == ()
+
+
+def test_a_change_of_the_memory_frees_what_it_has():
+    said = spec_from_text("[friction]\na = 0.011\n", changes=["friction.normal_memory=prakash-clifton"])
+    own = {name for name in said.options["free"] if "memory" in name}
+    assert own == {"friction.normal_memory.direct_share", "friction.normal_memory.slip_distance"}
+    assert "friction.a" not in said.options["free"]
+    given = spec_from_text(
+        "[friction]\n", changes=["friction.normal_memory=linker-dieterich", "friction.normal_memory.alpha=0.25"]
+    )
+    assert given.rig.value("friction.normal_memory.alpha") == 0.25
+    assert not [name for name in given.options["free"] if "memory" in name]
+    for word in ("none", "linker-dieterich", "prakash-clifton"):
+        assert make_plan(ss.lab_rig(states=2, normal_memory=word), pressed()).rig.friction.normal_memory.name == word
+
+
+def test_the_memories_are_told_apart():
+    """A lag of the normal stress is no shift of the state, and the other way round."""
+    record = lab.record(lagging_rig(), PRESSED, 2, count=300)
+    found = ss.compare_laws(ss.lab_rig(), record, MEMORIES)
+    assert found.best == "prakash-clifton"
+    best = found.fits[found.best]
+    assert near(best, "direct_share", PRAKASH.direct_share)
+    assert near(best, "slip_distance", PRAKASH.slip_distance)
+    assert near(best, "d_c", lab.TRUTH["d_c"])
+
+
+def test_labels_say_what_is_changed_and_the_rest_is_kept():
+    own = ss.lab_rig("aging", normal_memory="linker-dieterich")
+    for label, wanted in {
+        "slip": ("slip", 0, "linker-dieterich"), "none": ("aging", 0, "none"), "two states": ("aging", 2, own),
+        "two states, prz + prakash-clifton": ("prz", 2, "prakash-clifton"), "linker-dieterich": ("aging", 0, own),
+    }.items():  # fmt: skip
+        law = with_law(own, label).friction
+        memory = law.normal_memory if wanted[2] is own else law.normal_memory.name
+        assert (law.evolution.name, len(law.states), memory) == (
+            *wanted[:2], own.friction.normal_memory if wanted[2] is own else wanted[2]
+        )  # fmt: skip
+    with pytest.raises(ss.ParameterError, match="linker-dieterich"):
+        with_law(own, "linker")
+
+
+def test_what_is_known_stays_known_in_a_comparison():
+    """Values of a file are not fitted, whatever the law; what a law has besides is."""
+    spec = spec_from_text('[friction]\na = 0.011\n[slider]\nstiffness = "20 GPa/m"\n')
+    found = spec.compare([pressed()], starts=9)
+    for label, fit in found.fits.items():
+        assert not {"friction.a", "slider.stiffness"} & set(fit.names)
+        assert ("friction.normal_memory.alpha" in fit.names) == (label == "linker-dieterich")
+
+
+def test_a_law_that_cannot_follow_is_named_and_the_others_are_compared(monkeypatch):
+    from steadyslip.experiments.answers import laws
+
+    whole = laws.fit
+
+    def failing(rig, *args, **options):
+        if rig.friction.normal_memory.name == "none":
+            raise ss.NotAvailable("cannot follow")
+        return whole(rig, *args, **options)
+
+    monkeypatch.setattr(laws, "fit", failing)
+    found = ss.compare_laws(ss.lab_rig(), pressed(), MEMORIES[:2], starts=9)
+    assert found.refused == ("none",)
+    assert found.best == "linker-dieterich"
+    assert "cannot follow the records from any start: none" in str(found)
+    with pytest.raises(ss.NotAvailable, match="none of the laws"):
+        ss.compare_laws(ss.lab_rig(), pressed(), ["none"])
+
+
+def test_a_law_without_memory_says_what_one_would_make_of_it():
+    fit = compared().fits["none"]
+    said = " ".join(str(fit).split())
+    assert "this law has no memory of it: with normal_memory = 'linker-dieterich' (alpha 0.3" in said
+    assert fit.with_memories[0].ssq < 0.1 * fit.ssq
+    constant = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300), starts=9)
+    assert constant.with_memories == ()
+    assert "no memory" not in str(constant)
+
+
+def test_white_residuals_speak_for_no_memory():
+    by = 0.01 * lab.STRESS  # of more the block would be left behind, or run ahead, with no memory at all
+    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=30.13, to=3e-6), ss.NormalStressStep(at=60.41, by=by)), until=120)
+    fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol, 1, count=300))
+    assert "residuals are white, which speaks for none" in " ".join(str(fit).split())
+
+
+def test_bic_decides():
+    """With no memory at all, an α from noise must not win: Akaike's criterion lets it in one of twelve records."""
+    record = SimpleNamespace(friction=np.zeros(3))
+
+    def fit(size, aic, bic):
+        return SimpleNamespace(
+            plan=SimpleNamespace(records=(record,)), ssq=1.0 - 0.1 * size, noise=(), space=range(size),
+            criteria=lambda noise: (aic, bic),
+        )  # fmt: skip
+
+    found = ss.compare({"rich": fit(2, 0.0, 4.0), "poor": fit(1, 1.0, 0.0)})
+    assert found.best == "poor"
+    assert found.weights == pytest.approx({"poor": 1 / (1 + np.exp(-2)), "rich": 1 - 1 / (1 + np.exp(-2))})
+    assert found.verdict.startswith("The records hardly tell 'poor' from 'rich', which has a sum of squares -11.11%")
+
+
+@pytest.mark.slow
+@pytest.mark.campaign
+def test_memories_of_records_at_random():
+    """Six of what `stress_steps_at_random` draws by the hundred: one of each law."""
+    inside = []
+    for one in random_steps.drawn(1, len(random_steps.LABELS)):
+        found, own = random_steps.told(one)
+        assert found.best == one.label
+        inside += own.values()
+    assert np.mean(inside) > 0.8

@@ -57,7 +57,10 @@ def made(rig, records, chance, **options):
     )  # fmt: skip
     samples = sum(map(len, plan.records))
     ramps = (refit.Ramped(0.1, 1 / 7, {"friction.a": 0.1}),)
-    fit.__dict__.update(model=chance.standard_normal(samples), as_measured={"friction.a": 1 / 3}, as_ramps=ramps)
+    memories = (refit.Remembered("normal_memory = 'linker-dieterich'", 1 / 9, {"friction.a": 0.2}),)
+    fit.__dict__.update(
+        model=chance.standard_normal(samples), as_measured={"friction.a": 1 / 3}, as_ramps=ramps, with_memories=memories
+    )  # fmt: skip
     return fit
 
 
@@ -84,6 +87,7 @@ def same(again, fit):
     ):
         assert getattr(again.plan, name) == getattr(fit.plan, name), name
     assert (again.as_measured, again.as_ramps) == (fit.as_measured, fit.as_ramps)
+    assert again.with_memories == fit.with_memories
     for one, other in ((again.coordinates, fit.coordinates), (again.covariance, fit.covariance),
                        (again.model, fit.model), *zip(again.bounds, fit.bounds, strict=True)):  # fmt: skip
         np.testing.assert_array_equal(one, other, strict=True)

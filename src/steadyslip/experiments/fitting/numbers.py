@@ -28,7 +28,7 @@ from steadyslip.experiments.fitting.refit import (
 )
 from steadyslip.experiments.fitting.search import SearchStory
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.experiments.numerics.noise import DETECTED, Noise
 from steadyslip.machine.slider import Slider
 
 
@@ -199,8 +199,17 @@ class FitNumbers(ReadOnly):
 
     @cached_property
     def with_memories(self) -> tuple[Remembered, ...]:
-        """What memories of the normal stress would make of a law that has none, where that stress changes."""
-        return with_memories(self.plan)
+        """Fits with memories of the normal stress, the best first, where it changes and the law has none.
+
+        None are tried if the residuals are white, which speaks for no memory.
+        """
+        return with_memories(self.plan) if self.has_structure else ()
+
+    @property
+    def has_structure(self) -> bool:
+        """True if residuals of a record are correlated from sample to sample."""
+        pairs = zip(self.noise, self.plan.records, strict=True)
+        return any(abs(noise.lag1) > DETECTED / np.sqrt(len(record)) for noise, record in pairs)
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:

@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
-from steadyslip.experiments.fitting.refit import Ramped
+from steadyslip.experiments.fitting.refit import Ramped, Remembered
 from steadyslip.experiments.fitting.search import SearchStory
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.loading.pressing import JoinedCurves
@@ -26,7 +26,7 @@ from steadyslip.experiments.numerics.smoothing import Smooth
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 6, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 7, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
     "loading": str, "refits": str, "steadyslip": str,
@@ -45,7 +45,11 @@ _FORMS = {
     "noise": [(float, bool, float)],
     "records": [(str, [str], bool)],
     "loading": [[[_COURSE]]],
-    "refits": {"measured": [{str: float}], "ramps": [(float, float, {str: float})]},
+    "refits": {
+        "measured": [{str: float}],
+        "ramps": [(float, float, {str: float})],
+        "memories": [(str, float, {str: float})],
+    },
 }
 """What the attributes hold as JSON; see `steadyslip.files.tables.fits_form`."""
 
@@ -95,6 +99,7 @@ def to_dataset(fit: FitNumbers) -> Any:
             {
                 "measured": [] if fit.as_measured is None else [fit.as_measured],
                 "ramps": [[one.share, one.ssq, one.values] for one in fit.as_ramps],
+                "memories": [[one.choice, one.ssq, one.values] for one in fit.with_memories],
             }
         ),
         "steadyslip": fit.version,
@@ -165,6 +170,7 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     found_before = {  # by the program that wrote it: nothing is searched or simulated anew
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(Ramped(*one) for one in refits["ramps"]),
+        "with_memories": tuple(Remembered(*one) for one in refits["memories"]),
         "model": read_only(np.concatenate([found[f"model_{i}"] for i in range(1, len(records) + 1)])),
     }
     fit.__dict__.update(found_before)

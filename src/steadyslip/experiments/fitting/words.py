@@ -247,7 +247,7 @@ def _forgotten_stress(fit: FitNumbers) -> list[str]:
     if not changing:
         return []
     said = f"the normal stress changes in {_listed(changing)}, and this law has no memory of it"
-    if not any(noise.correlated for noise in fit.noise):
+    if not fit.has_structure:
         return [f"{said}; residuals are white, which speaks for none"]
     worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
     best = next(iter(fit.with_memories), None)

@@ -7,11 +7,11 @@ slip, which are frequent, are found in all lanes at once (`steadyslip.kernels.wa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
-from steadyslip.kernels.layout import Row
+from steadyslip.kernels.layout import Out, Row
 from steadyslip.kernels.nodes import larger
 
 FASTER = 1.000001  # slip is faster than the load point by this factor, so that rounding at equal speeds is no event
@@ -19,52 +19,50 @@ ROUNDED = 64 * 2.0**-52
 """Rounding error of a sum of stresses over aσ, the change of friction per unit of ln v; stresses are dozens of aσ."""
 
 
-class Observed(Protocol):
-    """Arguments of event functions at one moment: nodes of a program, SI units."""
+@dataclass(frozen=True)
+class Observed:
+    """Arguments of event functions at one moment and contact: nodes of a program, SI units.
 
-    @property
-    def v(self) -> Any:
-        """Velocity of the block."""
+    Attributes
+    ----------
+    contact : int
+    v, acceleration, sigma : Node
+        Velocity of the block or slip rate of the contact, its rate of change, and normal stress.
+    v_lp : Node
+        Velocity of the load point.
+    v_low, sigma_low : Node
+        Velocity below which the block counts as arrested; normal stress below which contact is lost.
+    h : Node
+        Length of the step, s.
+    outputs : callable
+        Function that computes all outputs of the contact.
+    error : Node
+        Error of the velocity that the integration allows in a step, m/s.
+    rounding : Node
+        Size up to which the acceleration may be rounding, m/s².
+    """
 
-    @property
-    def acceleration(self) -> Any:
-        """Its acceleration."""
-
-    @property
-    def sigma(self) -> Any:
-        """Normal stress."""
+    contact: int
+    v: Any
+    acceleration: Any
+    sigma: Any
+    v_lp: Any
+    v_low: Any
+    sigma_low: Any
+    h: Any
+    outputs: Callable[[], Sequence[Any]]
+    error: Any = 0.0
+    rounding: Any = 0.0
 
     @property
     def tau(self) -> Any:
         """Shear stress of the contact."""
+        return self.outputs()[Out.TAU]
 
     @property
     def T(self) -> Any:  # noqa: N802 -- the theory's letter
         """Stress of the spring."""
-
-    @property
-    def v_lp(self) -> Any:
-        """Velocity of the load point."""
-
-    @property
-    def v_low(self) -> Any:
-        """Velocity below which the block counts as arrested."""
-
-    @property
-    def sigma_low(self) -> Any:
-        """Normal stress below which contact is lost."""
-
-    @property
-    def h(self) -> Any:
-        """Length of the step, s."""
-
-    @property
-    def error(self) -> Any:
-        """Error of the velocity that the integration allows in a step, m/s."""
-
-    @property
-    def rounding(self) -> Any:
-        """Size up to which the acceleration may be rounding, m/s²."""
+        return self.outputs()[Out.T]
 
 
 @dataclass(frozen=True)

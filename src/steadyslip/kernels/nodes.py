@@ -21,6 +21,11 @@ PRIMITIVES = (
 _order = itertools.count()
 
 
+def _operator(op: str, kind: str | None = None, swapped: bool = False) -> Callable[[Node, Any], Node]:
+    """Method of `Node` for a binary operator of Python."""
+    return lambda self, other: self._with(op, other, kind, swapped)
+
+
 class Node:
     """One operation.
 
@@ -52,29 +57,14 @@ class Node:
         pair = (other, self) if swapped else (self, other)
         return Node(op, pair, kind or self.kind)
 
-    def __add__(self, other: Any) -> Node:
-        return self._with("add", other)
-
-    def __radd__(self, other: Any) -> Node:
-        return self._with("add", other, swapped=True)
-
-    def __sub__(self, other: Any) -> Node:
-        return self._with("sub", other)
-
-    def __rsub__(self, other: Any) -> Node:
-        return self._with("sub", other, swapped=True)
-
-    def __mul__(self, other: Any) -> Node:
-        return self._with("mul", other)
-
-    def __rmul__(self, other: Any) -> Node:
-        return self._with("mul", other, swapped=True)
-
-    def __truediv__(self, other: Any) -> Node:
-        return self._with("div", other)
-
-    def __rtruediv__(self, other: Any) -> Node:
-        return self._with("div", other, swapped=True)
+    __add__, __radd__ = _operator("add"), _operator("add", swapped=True)
+    __sub__, __rsub__ = _operator("sub"), _operator("sub", swapped=True)
+    __mul__, __rmul__ = _operator("mul"), _operator("mul", swapped=True)
+    __truediv__, __rtruediv__ = _operator("div"), _operator("div", swapped=True)
+    __lt__, __le__ = _operator("lt", "bool"), _operator("le", "bool")
+    __gt__, __ge__ = _operator("gt", "bool"), _operator("ge", "bool")
+    __and__, __or__ = _operator("and"), _operator("or")
+    __lshift__, __rshift__ = _operator("shl"), _operator("shr")
 
     def __neg__(self) -> Node:
         return Node("neg", (self,))
@@ -82,32 +72,8 @@ class Node:
     def __abs__(self) -> Node:
         return Node("abs", (self,))
 
-    def __lt__(self, other: Any) -> Node:
-        return self._with("lt", other, "bool")
-
-    def __le__(self, other: Any) -> Node:
-        return self._with("le", other, "bool")
-
-    def __gt__(self, other: Any) -> Node:
-        return self._with("gt", other, "bool")
-
-    def __ge__(self, other: Any) -> Node:
-        return self._with("ge", other, "bool")
-
-    def __and__(self, other: Any) -> Node:
-        return self._with("and", other)
-
-    def __or__(self, other: Any) -> Node:
-        return self._with("or", other)
-
     def __invert__(self) -> Node:
         return Node("not", (self,), "bool")
-
-    def __lshift__(self, other: int) -> Node:
-        return self._with("shl", other)
-
-    def __rshift__(self, other: int) -> Node:
-        return self._with("shr", other)
 
     def __bool__(self) -> bool:
         raise TypeError("a program has no branches; use select(condition, value, other)")

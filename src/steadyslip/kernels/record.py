@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import cycle, pairwise
-from typing import Any
 
 from steadyslip.kernels.driver.places import earlier_at, guess_at, scale_at
-from steadyslip.kernels.events import EVENTS
+from steadyslip.kernels.events import EVENTS, Observed
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Row
 from steadyslip.kernels.newton import solved
@@ -54,39 +52,6 @@ def total(terms: Sequence[Value]) -> Value:
 def slope_of(coefficients: Sequence[Value]) -> list[Value]:
     """Coefficients of a polynomial's derivative."""
     return [coefficients[1], *(float(j) * c for j, c in enumerate(coefficients[2:], start=2))]
-
-
-@dataclass(frozen=True)
-class EventArguments:
-    """Arguments of event functions at one moment (`steadyslip.kernels.events.Observed`); stresses computed on
-    demand.
-    """
-
-    record: Evaluator
-    point: Values
-    contact: int
-    v: Any
-    acceleration: Any
-    sigma: Any
-    v_lp: Any
-    v_low: Any
-    sigma_low: Any
-    h: Any
-    error: Any = 0.0
-    rounding: Any = 0.0
-
-    @property
-    def tau(self) -> Any:
-        return self._output(3)
-
-    @property
-    def T(self) -> Any:  # noqa: N802 -- the theory's letter
-        return self._output(4)
-
-    def _output(self, place: int) -> Value:
-        record = self.record
-        found = record.kernel.outputs(record.constants | self.point | record.kernel.named(record.z))
-        return found[len(OUTPUTS) * self.contact + place]
 
 
 class Evaluator:
@@ -221,18 +186,23 @@ class Evaluator:
         """
         return self.kernel.shares(self.constants)[3 * contact : 3 * contact + 3]
 
-    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> EventArguments:
+    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> Observed:
         """Arguments of the event functions of a contact, from its outputs v, acceleration and sigma at a point."""
         v, acceleration, sigma = found[:3]
         ratio, share, pressed = self.shares(contact)
+
+        def outputs() -> Sequence[Value]:
+            every = self.kernel.outputs(self.constants | point | self.kernel.named(self.z))
+            return every[len(OUTPUTS) * contact :]
+
         limits = {
             "v_lp": times(point["in0"], ratio),
             "v_low": times(self.program.load(Row.V_LOW), share),
             "sigma_low": times(self.program.load(Row.SIGMA_LOW), pressed),
         }
-        return EventArguments(self, point, contact, v, acceleration, sigma, h=h, **limits)
+        return Observed(contact, v, acceleration, sigma, h=h, outputs=outputs, **limits)
 
-    def moments(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> list[EventArguments]:
+    def moments(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> list[Observed]:
         """Arguments of the event functions of all contacts."""
         each = len(found) // self.kernel.contacts
         return [self.moment(point, found[c * each :], h, c) for c in range(self.kernel.contacts)]
@@ -247,7 +217,7 @@ class Evaluator:
             stored += [(first, v), (first + 1, sigma / as_node(pressed)), (first + 2, v / as_node(share))]
         return stored
 
-    def event_values(self, moments: Sequence[EventArguments]) -> list[Value]:
+    def event_values(self, moments: Sequence[Observed]) -> list[Value]:
         """Values of all event functions.
 
         Raises

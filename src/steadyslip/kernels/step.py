@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from steadyslip.kernels.driver.places import earlier_at, guess_at
-from steadyslip.kernels.events import COUNTED, EVENTS, ROUNDED
+from steadyslip.kernels.events import COUNTED, EVENTS, ROUNDED, Observed
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import MOST_FAILURES, EventPlace, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, exp, larger, primitive, select, smaller, weighted
-from steadyslip.kernels.record import Evaluator, EventArguments, Values, times, total
+from steadyslip.kernels.record import Evaluator, Values, times, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
@@ -244,7 +244,7 @@ class Step(Evaluator):
         store(Row.HAPPENED, happened)
         return happened
 
-    def _with_errors(self, moment: EventArguments) -> EventArguments:
+    def _with_errors(self, moment: Observed) -> Observed:
         """Arguments of event functions with the uncertainty of velocity and acceleration at the end of the step.
 
         Velocity is known to the error allowed for its variable: relative for a logarithm, else relative to the drive's

@@ -6,14 +6,17 @@ import warnings
 from collections import Counter
 from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
+from steadyslip.core.expressions import PreciseFunction
 from steadyslip.linear.polynomials import is_hurwitz
 from steadyslip.linear.status import without_edge
 from steadyslip.linear.stiffness import in_chunks, interval_ends
+from steadyslip.model.linearisation import characteristic_coefficients
 from steadyslip.model.point import operating_point
 from steadyslip.model.posed import resolved
 from steadyslip.model.range import in_range, surely_in_range
@@ -281,3 +284,64 @@ def test_the_unit_of_stress_changes_no_verdict(name, power):
 def test_what_is_no_number_in_range_is_told_so(question):
     with pytest.raises(ss.ParameterError, match=r"got .*; allowed: "):
         question(ss.read_rig(EXAMPLES / "inclined-spring.toml"))
+
+
+STRIBECK = {
+    "falls": {"mu_coulomb": 0.2, "mu_static": 0.3}, "rises": {"mu_coulomb": 0.3, "mu_static": 0.2},
+}  # fmt: skip
+LEVEL = ss.InclinedSpring(preload=100.0, angle=0.0)
+BRISTLES = {
+    "bristles": lambda **curve: ss.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5),
+    "damped bristles": lambda **curve: ss.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=0.07),
+    "no memory": lambda **curve: ss.CoulombStribeck(**curve, v_stribeck=1e-3),
+    "viscous": lambda **curve: ss.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5, viscous=1e-9),
+}
+
+
+def massless(law):
+    """A body without mass that rubs, between the drive and one with mass."""
+    return ss.Machine(
+        bodies={"carriage": ss.SlidingBody(), "table": ss.SlidingBody(mass=0.6)},
+        links={
+            "screw": ss.Spring(between=("drive", "carriage"), stiffness=1e5),
+            "belt": ss.Spring(between=("carriage", "table"), stiffness=1.3e4),
+            "air": ss.Spring(between=("table", "ground"), damping=2.0),
+        },
+        contacts={
+            "guide": ss.Surface(body="carriage", friction=law, contact=ss.InclinedSpring(preload=100.0, angle=0.0))
+        },
+        drive=ss.Pull(velocity=1e-3),
+    )
+
+
+def routh(coefficients):
+    """First column of the Routh array of a polynomial, lowest power first, in numbers of any kind."""
+    falling = list(coefficients)[::-1]
+    while falling[0] == 0:
+        falling.pop(0)
+    above, row = falling[::2], falling[1::2]
+    column = [above[0]]
+    while row:
+        column.append(row[0])
+        if row[0] == 0:
+            break
+        padded = [*row, *[0] * (len(above) - len(row))]
+        above, row = row, [b - above[0] * c / row[0] for b, c in zip(above[1:], padded[1:], strict=True)]
+    return column
+
+
+@pytest.mark.parametrize("curve", STRIBECK)
+@pytest.mark.parametrize("law", BRISTLES)
+def test_above_the_stribeck_velocity_no_sign_is_lost_with_an_exponential(law, curve):
+    """exp(-(v/v_S)^2) vanishes from 27.3 on: friction that falls was called stable there, beyond 'ill-posed' at 25."""
+    machine = massless(BRISTLES[law](**STRIBECK[curve]))
+    ratios = np.array([1, 3, 9.5, 15, 20, 24, 25, 26, 27, 28, 29, 30, 100.0])
+    told = ss.stability(machine, {"drive.velocity": 1e-3 * ratios})
+    for ratio, words in zip(ratios, told, strict=True):
+        point = operating_point(machine.with_values({"drive.velocity": 1e-3 * ratio}))
+        with mpmath.workdps(50):
+            numbers = [mpmath.mpf(float(np.asarray(one))) for one in (*point.arguments, *point.steady)]
+            exact = PreciseFunction(point.model.arguments, characteristic_coefficients(point.model))(*numbers)
+            right = "stable" if all(one > 0 for one in routh(exact)) else "unstable"
+        assert words == right or (words == "out of range" and ratio > 25), ratio
+    assert np.all(told != "out of range") or law != "viscous"

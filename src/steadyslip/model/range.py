@@ -1,7 +1,8 @@
 """Range check: values and slopes of the equations in steady sliding must be finite in floating point.
 
 The slopes enter the characteristic polynomial, so its coefficients are checked: an infinite slope, or a product that
-overflows, makes a coefficient infinite or NaN. All stages check the range before they compute.
+overflows, makes a coefficient infinite or NaN. An exponential that underflows must not change the degree, as
+exp(−(v/v_S)²) does from 27.3 Stribeck velocities on. All stages check the range before they compute.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
@@ -31,6 +33,10 @@ from steadyslip.model.steady import out_of_range
 
 ORDINARY = 1e20
 """Largest size of ordinary numbers, whose inverse is the smallest: products of a dozen stay below 1e308."""
+_LEAST = -700.0
+"""Exponent below which exp underflows, or loses digits."""
+_REPLACEMENT = -100.0
+"""Exponent in place of smaller ones when testing whether they matter: products of seven do not underflow."""
 _REDUCED_DECADES = (0.75, 0.5, 0.25, 0.0)
 """Factors on the decimal exponent of a parameter by which its influence on the range is tested; chosen by trial."""
 
@@ -105,22 +111,56 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
         values = np.ones(point.shape, dtype=bool)
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
+        values &= ~_underflows(point)
         known = ~out_of_range(point.model, point.arguments, point.shape)
         return np.asarray(known & (~point.exists | (slopes & values)))
+
+
+def _underflows(point: OperatingPoint) -> NDArray[np.bool_]:
+    """True where the characteristic polynomial loses its highest coefficients only by underflow of exponentials."""
+    small = np.zeros(point.shape, dtype=bool)
+    for one in point.evaluate(_exponents(point.model)):
+        small = small | (np.asarray(one) < _LEAST)
+    if not np.any(small):
+        return small
+    functions = _coefficient_function(point.model), _replaced_function(point.model)
+    c, replaced = (stacked(point.evaluate(one), point) for one in functions)
+    places = np.arange(c.shape[-1])
+    degree, right = (np.max(np.where(one != 0, places, -1), axis=-1) for one in (c, replaced))
+    return np.asarray(small & (degree < right))
+
+
+def _exponentials(model: Model) -> list[sp.Expr]:
+    """Exponentials in the coefficients of the characteristic polynomial; none where these are not written out."""
+    if model.delays or not is_written_out(model):
+        return []
+    return [node for node in occurrences(characteristic_coefficients(model)) if isinstance(node, sp.exp)]
+
+
+@question
+def _exponents(model: Model) -> ArrayFunction:
+    return model.function([node.args[0] for node in _exponentials(model)])
+
+
+@question
+def _replaced_function(model: Model) -> ArrayFunction:
+    """Coefficients with the exponents of underflowing exponentials replaced."""
+    least = {node: sp.exp(sp.Max(node.args[0], _REPLACEMENT)) for node in _exponentials(model)}
+    return model.function([sp.sympify(e).xreplace(least) for e in characteristic_coefficients(model)])
 
 
 def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
     """Quick sufficient test that no rig of a point leaves the range of floating point.
 
     True if all parameters have ordinary sizes (`ORDINARY`) and the equations are rational. Otherwise powers and
-    exponentials may overflow to inf or NaN, so True only if all results are finite (`complete`).
+    exponentials may overflow or underflow, so True only if all results are finite (`complete`) and none underflows.
     """
     for value in point.arguments:
         size = np.abs(value) if np.ndim(value) else abs(value)
         least = np.min(size, initial=1.0, where=size != 0) if np.ndim(value) else size or 1.0
         if not (least > 1 / ORDINARY and np.max(size, initial=0.0) < ORDINARY):
             return False
-    return complete or _is_rational(point.model)
+    return (complete and not np.any(_underflows(point))) or _is_rational(point.model)
 
 
 @question

@@ -17,10 +17,10 @@ from moved import motion_text
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.dimensions import unit
 from steadyslip.core.quantities import parse
-from steadyslip.explorer.assembly import parts
-from steadyslip.explorer.equations import _judged, _stable_set, linear_part
+from steadyslip.explorer.assembly import page_parts
+from steadyslip.explorer.equations import _stable_set_programs, _verdict_values, linear_part
+from steadyslip.explorer.minify import minify, minify_generated, share_numbers, shorten_names
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
-from steadyslip.explorer.narrow import dense, narrow, renamed, shared
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
@@ -69,8 +69,8 @@ def polynomial_programs(n):
     """A Linear whose equations are two polynomials p and q of n + 1 coefficients, in the record R."""
     names = sp.symbols(f"c:{2 * n + 2}")
     model = SimpleNamespace(arguments=names)
-    whole = program(model, "coefficients", names[: n + 1], then=_judged)
-    several = _stable_set(n)
+    whole = program(model, "coefficients", names[: n + 1], then=_verdict_values)
+    several = _stable_set_programs(n)
     text = "".join(javascript.text(one) for one in (whole, *several))
     facts = {"parameters": list(map(str, names)), "degree": n, "squares": len(several[0].stores) - 2, "closed": False,
              "contacts": [""], "searched": [False], "joint": False, "observed": []}  # fmt: skip
@@ -179,35 +179,35 @@ def test_shortened_code_says_the_same():
         "/**\n * Many\n * lines.\n */\n"
         "let c = (/** @type {any} */ (b)).d;\n"
     )
-    assert narrow(text) == 'const a=1;const b="// @ /** x */";let c=((b)).d;'
+    assert minify(text) == 'const a=1;const b="// @ /** x */";let c=((b)).d;'
     nested = "const t = `a ${b ? `- ${c} ` : \" ; \"} , d`, r = e.replace(/ , \\//g, ' - ') + + 1 - -f;\n"
-    assert narrow(nested) == "const t=`a ${b ? `- ${c} ` : \" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ +1- -f;"
+    assert minify(nested) == "const t=`a ${b ? `- ${c} ` : \" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ +1- -f;"
     sums = "    var t2 = ((R[0] * x) + R[1]);\n    var t3 = ((t2 - (x * x)) < (t2 * (x + 1)));\n"
-    assert dense(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));"
+    assert minify_generated(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));"
     generated = "function f(R, x, y) {\n    var t1 = R[0] - (-2.5e-07);\n    y[0] = (t1 >= 0) ? t1 : (1 / x);\n}\n"
-    assert dense(generated) == "function f(R,x,y){var t1=R[0]-(-2.5e-07);y[0]=(t1>=0)?t1:1/x;}\n"
+    assert minify_generated(generated) == "function f(R,x,y){var t1=R[0]-(-2.5e-07);y[0]=(t1>=0)?t1:1/x;}\n"
 
 
 def test_names_of_generated_code_are_as_short_as_may_be():
     """Those that others know, and what JavaScript has, keep theirs; numbers with exponents hold no names."""
     text = "function far(R, x, y) {\nvar t1 = R[0], t20 = log(t1) - 1e-7;\ny[0] = Math.abs(t20 * t1) + t20;\n}\n"
     short = "function far(c, e, d) {\nvar a = c[0], b = log(a) - 1e-7;\nd[0] = Math.abs(b * a) + b;\n}\n"
-    assert renamed(text, {"far", "log"}) == short
+    assert shorten_names(text, {"far", "log"}) == short
 
 
 def test_long_numbers_that_functions_share_are_written_once():
     number = "1.221224509226641"
     text = f"(() => {{\nfunction f(R, x, y) {{\ny[0] = {' + '.join(4 * [number])} + 2.5;\n}}\n}})()"
-    once = shared(text)
+    once = share_numbers(text)
     assert once.count(number) == 1
     script = Script(f"const y = [0]; ({once.replace('function f', 'return function f')})(0, 0, y)")
     assert script("y[0]") == sum(4 * [float(number)]) + 2.5
-    assert shared(text.replace("+ 1.2", "- 0.2", 1)).count(number) == 3, "few are as they were"
+    assert share_numbers(text.replace("+ 1.2", "- 0.2", 1)).count(number) == 3, "few are as they were"
 
 
 def test_no_two_parameters_of_a_part_are_called_the_same():
     own = next(one for one in FRICTION if len(getattr(one, "states", ())) > 1)
-    known = parts(rig(friction=own), "A rig", 0)[1]["parameters"]
+    known = page_parts(rig(friction=own), "A rig", 0)[1]["parameters"]
     called = [(one["name"].partition(".")[0], one["label"]) for one in known]
     assert len(set(called)) == len(called)
     assert {("friction", "a"), ("friction", "states.1.b"), ("friction", "states.2.b")} <= set(called)
@@ -224,7 +224,7 @@ TEXT = st.text(max_size=200) | st.lists(
 @pytest.fixture(scope="module")
 def page_of_own():
     """The Rig of a page, as it is on the page."""
-    code, known = parts(OWN, "A rig", 0)
+    code, known = page_parts(OWN, "A rig", 0)
     made = f"const known = {json.dumps(known)};\nconst rig = new Rig(known, programs);"
     return Script(f"{code}\n{made}"), known
 
@@ -281,7 +281,7 @@ velocity = "86.4 mm/day"
 def page_of_user():
     """The same of a user's file, in units of all kinds."""
     own = ss.rig_from_text(WRITTEN)
-    code, known = parts(own, "A rig", 0, WRITTEN)
+    code, known = page_parts(own, "A rig", 0, WRITTEN)
     return Script(f"{code}\nconst known = {json.dumps(known)};\nconst rig = new Rig(known, programs);"), known, own
 
 
@@ -316,7 +316,7 @@ const once = turns.slice(0, 9);"""
 
 def test_a_path_that_goes_round_and_round_is_as_long_as_the_drawing_can_show():
     """Tens of thousands of turns over the same way would take a browser seconds at each repaint."""
-    code = parts(OWN, "A rig", 0)[0]
+    code = page_parts(OWN, "A rig", 0)[0]
     script = Script(f"{code}\n{TURNS}")
     path = script("drawn")
     assert len(path) < 60_000

@@ -9,7 +9,7 @@ import pytest
 import steadyslip as ss
 from explored import ExploredMachine, MovedOnAPage, differences, same_motion
 from machines import at_random, two_mass
-from steadyslip.explorer.assembly import parts
+from steadyslip.explorer.assembly import page_parts
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.motion import OPTIONS
@@ -127,7 +127,7 @@ def test_a_machine_has_one_steady_sliding():
 def test_the_file_of_a_page_is_the_machine_to_the_last_digit():
     """The template, filled with other values, reads as the machine with these values."""
     machine = example("geared-servo")
-    _, known = parts(machine, "geared", 0)
+    _, known = page_parts(machine, "geared", 0)
     values = [one["value"] * (1.1 if one["value"] else 1.0) for one in known["parameters"]]
     filled = "".join(one if isinstance(one, str) else one[1] + repr(values[one[0]]) + one[2] for one in known["toml"])
     changes = {one["name"]: value for one, value in zip(known["parameters"], values, strict=True)}

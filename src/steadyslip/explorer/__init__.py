@@ -1,6 +1,6 @@
-"""A rig as a page for the browser: its equations as JavaScript, its numbers as data, in one file.
+"""Browser page of a rig in one file: its equations as generated JavaScript, its numbers as data.
 
-Knows the Model, its linearisation and kernels, and prints them; nothing physical is said in JavaScript.
+Equations are printed from the Model, its linearisation and kernels; `web/` has no physics.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One HTML file from one rig: equations, numbers, modules and style put together; it asks for nothing from outside."""
+"""Assembly of the self-contained HTML page of a rig: equations, numbers, modules and style."""
 
 from __future__ import annotations
 
@@ -15,9 +15,16 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.records import Address
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
+from steadyslip.explorer.minify import (
+    function_names,
+    minify,
+    minify_css,
+    minify_generated,
+    share_numbers,
+    shorten_names,
+)
 from steadyslip.explorer.motion import DRIVER, driver, motion_part
-from steadyslip.explorer.narrow import dense, functions_of, narrow, narrow_style, renamed, shared
-from steadyslip.explorer.own_file import outside_of, own_file
+from steadyslip.explorer.own_file import display_unit, own_file
 from steadyslip.explorer.sketch import sketch
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
@@ -39,27 +46,27 @@ MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
     "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view", "leaving", "page",
 )  # fmt: skip
-"""Modules of the page, each after those that it imports."""
-USUAL = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
-"""What parameters are unless they say otherwise; `web/rig.js` has the same."""
-LIBRARY = ("motion",)
-"""Modules that a worker needs too, with the runtime and the driver: the page hands it their text."""
-KEYS = ("layout", "routines", "segments")
-"""Of a machine's motion, what `web/motion.js` asks for beside its programs."""
+"""Modules of the page in `web/`, each after those that it imports."""
+DEFAULTS = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
+"""Entries of a parameter that a page leaves out; `web/rig.js` has the same defaults."""
+WORKER_MODULES = ("motion",)
+"""Modules of the worker, which also gets the runtime and the driver, as text from the page."""
+MOTION_KEYS = ("layout", "routines", "segments")
+"""Entries of a kernel that `web/motion.js` uses beside its programs."""
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data:; worker-src blob:; "
     "base-uri 'none'; form-action 'none'"
 )
-"""What the page may ask for: nothing but itself; workers and pictures are made of its own text."""
+"""Content security policy: no requests; workers and images are made from the text of the page."""
 
 
 def page(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
-    """The text of the file; `text` is that of the file which the rig came from, if there is one."""
+    """HTML text of the page of a rig; `text` is that of its rig file, or empty."""
     return document(f"{title} – steadyslip", style(), fragment(rig, title, branch, text))
 
 
 def document(title: str, styles: str, body: str) -> str:
-    """A file that asks for nothing from outside."""
+    """Text of a self-contained HTML document."""
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
@@ -70,25 +77,24 @@ def document(title: str, styles: str, body: str) -> str:
 
 
 def style() -> str:
-    """The style of a `fragment`."""
-    return narrow_style(_web("style.css"))
+    """Style sheet of a `fragment`, minified."""
+    return minify_css(_read_web("style.css"))
 
 
 def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
-    """The explorer as a part of a document; several may be in one.
+    """HTML of the explorer of a rig as a part of a document, which may have several.
 
-    With the `text` of the file that the rig came from, it shows values in the units of that, and saves it with its
-    comments.
+    With the `text` of a rig file it shows values in the units of the file, and saves it with its comments.
 
     Raises
     ------
     NotAvailable
-        If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
+        If an equation has a function that cannot be printed, or numbers leave the range of floating point.
     """
-    code, known = parts(rig, title, branch, text)
+    code, known = page_parts(rig, title, branch, text)
     return (
         '<div class="steadyslip-root"></div>\n'
-        f'<script type="application/json" class="steadyslip-data">{safe(known)}</script>\n'
+        f'<script type="application/json" class="steadyslip-data">{json_for_html(known)}</script>\n'
         f'<script>\n"use strict";\n(() => {{\n{code}'
         "const place = document.currentScript.previousElementSibling;\n"
         "mount(place.previousElementSibling, JSON.parse(place.textContent), programs, library);\n"
@@ -96,57 +102,58 @@ def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> 
     )
 
 
-def safe(known: Mapping[str, Any]) -> str:
-    """Data as JSON that may stand in a document: nothing in a rig can end the element that its data are in."""
+def json_for_html(known: Mapping[str, Any]) -> str:
+    """JSON text for a script element, with <, >, & and line separators escaped so that no data can end the element."""
     data = json.dumps(known, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for letter in "<>&\u2028\u2029":
         data = data.replace(letter, f"\\u{ord(letter):04x}")
     return data
 
 
-def parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -> tuple[str, dict[str, Any]]:
-    """The code of a page, which declares ``mount``, ``render``, ``programs`` and ``library``, and its data."""
+def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -> tuple[str, dict[str, Any]]:
+    """JavaScript of a page, which declares ``mount``, ``render``, ``programs`` and ``library``, and its data."""
     text, facts = linear_part(rig)
     machine, driven, moving, still = "null", "const advance = null, observe = null;", None, ""
     try:
         machine, moving = motion_part(rig, branch)
         driven = driver()
         if moving["parameters"] == facts["parameters"]:
-            del moving["parameters"]  # said once
-    except NotAvailable as refused:  # the verdict can be shown all the same
+            del moving["parameters"]  # equal to those of `facts`
+    except NotAvailable as refused:  # a page without motion still has the verdict
         still = str(refused)
-    modules = [_web(f"{name}.js") for name in MODULES]
-    library = [_web(f"{name}.js") for name in LIBRARY]
-    script = narrow(javascript.as_script(javascript.runtime(), *modules))
-    worker = narrow(javascript.as_script(javascript.runtime(), *library)) + _short(driven, DRIVER)
+    modules = [_read_web(f"{name}.js") for name in MODULES]
+    library = [_read_web(f"{name}.js") for name in WORKER_MODULES]
+    script = minify(javascript.as_script(javascript.runtime(), *modules))
+    worker = minify(javascript.as_script(javascript.runtime(), *library)) + _minified(driven, DRIVER)
     known = _data(rig, title, branch, facts, file) | {
         "motion": moving,
         "still": still,
         "sketch": sketch(rig) if isinstance(rig, Slider) else machine_sketch(rig),
     }
     code = (
-        f"{script}\nconst programs = {_short(text, functions_of(text))};\n"
-        f"const library = () => {{\n{worker}\nconst machine = {_short(machine, {*functions_of(machine), *KEYS})};\n"
+        f"{script}\nconst programs = {_minified(text, function_names(text))};\n"
+        f"const library = () => {{\n{worker}\n"
+        f"const machine = {_minified(machine, {*function_names(machine), *MOTION_KEYS})};\n"
         "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
     )
     return code, known
 
 
-def _short(generated: str, known: Iterable[str]) -> str:
-    """Generated code, of which modules of the page know some names."""
-    whole = shared(generated) if generated.startswith("(() => {") else generated
-    return dense(renamed(whole, {*known, *javascript.runtime_names()}))
+def _minified(generated: str, known: Iterable[str]) -> str:
+    """Minified generated code; `known` are the names that modules of the page use."""
+    whole = share_numbers(generated) if generated.startswith("(() => {") else generated
+    return minify_generated(shorten_names(whole, {*known, *javascript.runtime_names()}))
 
 
-def _web(name: str) -> str:
+def _read_web(name: str) -> str:
     return files("steadyslip.explorer.web").joinpath(name).read_text(encoding="utf-8")
 
 
 def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any], text: str) -> dict[str, Any]:
-    """Everything about a rig but its equations."""
+    """Data of the page of a rig: parameters, rig file, sentences, checks."""
     from steadyslip import __version__
 
-    names = list(_varied(rig, facts))
+    names = list(_variable_parameters(rig, facts))
     places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
     point = operating_point(rig, None, present_zeros(rig), branch)
     axial, file = "slider.axial_stiffness", own_file(rig, names, text)
@@ -155,14 +162,14 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "version": __version__,
         "branch": branch,
         "area": rig.area if isinstance(rig, Slider) else None,
-        "parameters": [_parameter(rig, name, branch) | file.told(name) for name in names],
+        "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],
         "facts": dict(facts),
         "places": places,
         "fixed": [float(np.asarray(value)) for value in point.arguments],
         "axial": names.index(axial) if axial in names else -1,
         "speed": "drive.velocity",
         "toml": file.pieces,
-        **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else _of_slider(rig, names)),
+        **(_machine_data(rig, names, facts) if isinstance(rig, Machine) else _slider_data(rig, names)),
         "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
         "absent": ABSENT,
         "remote": REMOTE,
@@ -171,38 +178,38 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     }
 
 
-def _of_slider(rig: Slider, names: list[str]) -> dict[str, Any]:
-    """What a page says of sliders alone: the parameter of the bar, why they are stable or not."""
+def _slider_data(rig: Slider, names: list[str]) -> dict[str, Any]:
+    """Page data of sliders only: parameter of the bar, sentences with the reasons of a verdict."""
     return {"stiffness": _stiffness(rig, names), "reasons": page_reasons(rig)}
 
 
 def _stiffness(rig: Slider, names: list[str]) -> str | None:
-    """The parameter that the bar of a slider is about."""
+    """Name of the parameter of the bar of stable values of a slider; None without a stiffness."""
     stiffness = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
     return stiffness if stiffness in names else None
 
 
-def _of_machine(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dict[str, Any]:
-    """What a page says of machines alone: the parameter by which it is checked, areas of contacts, phrases."""
+def _machine_data(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Page data of machines only: parameter of the check, indices of the areas of contacts, phrases."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
-        "stiffness": _checked(rig, names),
+        "stiffness": _checked_parameter(rig, names),
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
         "phrases": {name: words for name, words in PHRASES.items() if name not in BEYOND},
     }
 
 
-def _checked(rig: Machine, names: list[str]) -> str | None:
-    """The first stiffness or gain that enters linearly: the page compares its stable values with Python's."""
+def _checked_parameter(rig: Machine, names: list[str]) -> str | None:
+    """Name of the first stiffness or gain that enters linearly, whose stable values the page compares with Python's."""
     point = operating_point(rig)
     stiff = (name for name in rig.of_kind("stiffness") if name in names)
     return next((name for name in stiff if linear_set(point, name) is not None), None) if point.exists else None
 
 
-def _varied(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Address]:
-    """The parameters that a page can vary: those in the equations that matter to the verdict.
+def _variable_parameters(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Address]:
+    """Parameters that a page can vary: those in the equations that affect the verdict.
 
-    An axial stiffness stands in place of that along the sliding.
+    An axial stiffness replaces the stiffness along the slide.
     """
     known = set(facts["parameters"])
     if isinstance(rig, Slider):
@@ -219,10 +226,10 @@ def _varied(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Addres
 def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     one = rig.parameters()[name]
     domain, value = one.role.domain, float(one.value or 0.0)
-    factor, unit = outside_of(rig, one.role.unit)
+    factor, unit = display_unit(rig, one.role.unit)
     natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
     group, label = _group(rig, name)
-    told = {
+    found = {
         "name": name,
         "group": group,
         "label": label,
@@ -238,14 +245,14 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
         "whole": domain.whole,
         "allowed": domain.text,
     }
-    return {key: value for key, value in told.items() if key not in USUAL or value != USUAL[key]}
+    return {key: value for key, value in found.items() if key not in DEFAULTS or value != DEFAULTS[key]}
 
 
 _MEMBERS = {"bodies": "body", "links": "link", "contacts": "contact"}
 
 
 def _group(rig: Slider | Machine, name: str) -> tuple[str, str]:
-    """The heading that a parameter stands below, and what it is called there."""
+    """Heading of a parameter on the page, and its label below that heading."""
     kind, _, rest = name.partition(".")
     if isinstance(rig, Machine) and kind in _MEMBERS:
         member, _, own = rest.partition(".")
@@ -254,7 +261,7 @@ def _group(rig: Slider | Machine, name: str) -> tuple[str, str]:
 
 
 def _label(name: str, names: Iterable[str]) -> str:
-    """A name below the heading of its part: the last word, or all behind the part where several end so."""
+    """Label of a parameter below the heading of its part: last word of its name, or all of it if not unique."""
     part, _, rest = name.partition(".")
     last = name.rpartition(".")[2]
     alike = [one for one in names if one.partition(".")[0] == part and one.rpartition(".")[2] == last]
@@ -262,8 +269,8 @@ def _label(name: str, names: Iterable[str]) -> str:
 
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
-    """Answers of Python at the rig's own numbers and at some others, for the page to compare."""
-    stiff = _stiffness(rig, names) if isinstance(rig, Slider) else _checked(rig, names)
+    """Answers of Python at the values of the rig and at some others, with which the page compares its own."""
+    stiff = _stiffness(rig, names) if isinstance(rig, Slider) else _checked_parameter(rig, names)
     changes: list[dict[str, float]] = [{}]
     for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
         if name in names:
@@ -288,13 +295,15 @@ def _answer(rig: Slider | Machine, names: list[str], branch: int, bar: str | Non
     if answer["status"] in (STABLE, UNSTABLE):
         with np.errstate(all="ignore"):
             numbers = numbers_of(rig, point) if isinstance(rig, Slider) else linear_numbers(point)
-        answer["critical"] = numbers.get("critical_stiffness") if isinstance(rig, Slider) else _end(rig, point, bar)
+        answer["critical"] = (
+            numbers.get("critical_stiffness") if isinstance(rig, Slider) else _nearest_edge(rig, point, bar)
+        )
         answer["eigenvalues"] = [[s.real, s.imag] for s in numbers["eigenvalues"]]
     return answer
 
 
-def _end(rig: Machine, point: OperatingPoint, name: str | None) -> float | None:
-    """The end of the stable values of a parameter that is nearest to its own."""
+def _nearest_edge(rig: Machine, point: OperatingPoint, name: str | None) -> float | None:
+    """Edge of the stable values of a parameter nearest to its own value (SI); None if there is none."""
     found = None if name is None else linear_set(point, name)
     if found is None or name is None or not np.any(found.changes):
         return None

@@ -1,6 +1,6 @@
-"""The linear part of a rig's Model as programs: functions of its parameters and the steady normal stresses.
+"""Linear stability of a rig as programs for a page: functions of its parameters and steady normal stresses.
 
-`web/linear.js` asks them.
+`web/linear.js` calls them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.records import conditions, with_values
 from steadyslip.explorer.modes import mode_part
 from steadyslip.explorer.programs import program
-from steadyslip.explorer.sliding import searched, steady_programs
+from steadyslip.explorer.sliding import needs_search, steady_programs
 from steadyslip.kernels.nodes import Node, Program, Value, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing, cubic
@@ -31,37 +31,36 @@ from steadyslip.model.linearisation import characteristic_coefficients, is_writt
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, ROOT_TOLERANCE, joint_equation
 
-SLIP_RATE = "slip_rate"
-"""What pages call the velocity of a contact in steady sliding."""
+SLIP_RATE = "slip_rate"  # name of the slip velocity of a contact on pages
 
 
-def model_of(rig: Slider | Machine) -> Model:
-    """The rig's Model with what a page can vary from zero kept in it."""
+def page_model(rig: Slider | Machine) -> Model:
+    """Model of a rig in which zero terms that a page can vary are kept."""
     return build_model(rig, present_zeros(rig))
 
 
 def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
-    """The linear part as an expression of JavaScript, and what must be known about it.
+    """JavaScript expression of the programs of linear stability, and data about them.
 
     Returns
     -------
     text : str
-        An object of functions.
+        Expression whose value is an object of functions.
     facts : dict
-        ``parameters`` (dotted names in the order of R), ``contacts`` (their names), ``searched`` (of which of them the
-        `residual` is to be solved for σss; those of others `steady` gives), ``joint`` (whether all σss follow
-        together), ``degree`` of the characteristic polynomial, ``closed`` (whether the `interval` of the closed form
-        exists), ``edge`` (what rounding alone can make), ``grid`` (how many stresses steady sliding is searched on, and
-        the powers of ten that it runs from and to), ``solved`` (misfit of a root as a share of the stress),
-        ``observed`` (names, units and meanings of what `observables` gives), of machines also what `mode_part` says,
-        of sliders ``gain`` (the parameter of the drive that acts as a stiffness, or None).
+        ``parameters`` (dotted names in the order of R), ``contacts`` (their names), ``searched`` (for each contact,
+        True if σss is a root of its `residual`, False if `steady` has it), ``joint`` (True if all σss follow together),
+        ``degree`` of the characteristic polynomial, ``closed`` (True if there is an `interval` in closed form),
+        ``edge`` (relative size of rounding at an edge), ``grid`` (number of stresses of the search, first and last
+        power of ten),
+        ``solved`` (residual of a root over the stress), ``observed`` (names, units and meanings of `observables`); for
+        machines those of `mode_part`, for sliders ``gain`` (parameter of the drive that acts as a stiffness, or None).
 
     Raises
     ------
     NotAvailable
-        If an equation contains what cannot be printed, or acts with a delay, or is too long.
+        If an equation has a delay or a function that cannot be printed, or is too long.
     """
-    model = model_of(rig)
+    model = page_model(rig)
     if model.carried is not None or not is_written_out(model):
         raise NotAvailable(
             "a page has its equations written out, and those of this machine, whose bodies hold each other in so many "
@@ -73,14 +72,14 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
             "steadyslip analyze and boundary take it, and stable_values in Python"
         )
     coefficients = characteristic_coefficients(model)
-    names, observables = _observed(model)
+    names, observables = _shown_observables(model)
     meanings = _meanings(rig)
     closed = has_closed_form(model)
     further: dict[str, Any] = {}
     programs = [
         *steady_programs(model),
         program(model, "allowed", [_allowed(rig, model)]),
-        program(model, "coefficients", coefficients, then=_judged),
+        program(model, "coefficients", coefficients, then=_verdict_values),
         program(model, "statics", _static_terms(model), then=lambda terms: [crossing.share_left(terms, select)]),
         program(model, "observables", observables),
     ]
@@ -92,13 +91,13 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         programs.append(program(model, "split", [*without, *slope]))
         programs.append(program(model, "stiffness", [model.axial_share or 1, model.gain]))
         further = {"gain": rig.gain_name()}
-    edges = _stable_set(len(coefficients) - 1)
+    edges = _stable_set_programs(len(coefficients) - 1)
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
     facts = {
         "parameters": list(model.parameters),
         "contacts": [contact.name for contact in model.contacts],
-        "searched": searched(model),
+        "searched": needs_search(model),
         "joint": joint_equation(model) is not None,
         "degree": len(coefficients) - 1,
         "squares": len(edges[0].stores) - 2,
@@ -108,21 +107,21 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         "solved": ROOT_TOLERANCE,
         "observed": [[name, _unit(model, name), meanings.get(name, "")] for name in names],
     } | further
-    programs += [_linear_split(), *edges]
+    programs += [_linear_split_program(), *edges]
     text = "".join(javascript.text(one) for one in programs)
     return f"(() => {{\n{text}return {{ {', '.join(one.name for one in programs)} }};\n}})()", facts
 
 
 def _meanings(rig: Slider | Machine) -> dict[str, str]:
-    """What friction laws say of the names of their states."""
+    """Meanings of observables by name, from the friction laws of a rig."""
     if isinstance(rig, Machine):
         own = ((name, one.friction.meanings()) for name, one in rig.contacts.items())
         return {f"{name}.{key}": words for name, meant in own for key, words in meant.items()}
     return {"spring_stress": "with the damping to the ground", **rig.friction.meanings()}
 
 
-def _observed(model: Model) -> tuple[list[str], list[sp.Expr]]:
-    """What is shown of steady sliding: not the places of bodies, which count from there, nor what stands still."""
+def _shown_observables(model: Model) -> tuple[list[str], list[sp.Expr]]:
+    """Names and expressions of observables in steady sliding, without displacements and zero velocities."""
     names, values = observed_in_steady_sliding(model)
     unseen = {f"{one.name}.x" for one in model.coordinates}
     unseen |= {f"{one.name}.v" for one in model.coordinates if one.speed == 0}
@@ -137,7 +136,7 @@ def _unit(model: Model, name: str) -> str:
 
 
 def _static_terms(model: Model) -> list[sp.Expr]:
-    """What adds up to the static stiffness, as `steadyslip.linear.status.on_edge` takes it."""
+    """Terms whose sum is the static stiffness, as `steadyslip.linear.status.on_edge` takes them."""
     if has_closed_form(model):
         part = response(model)
         return [part.k, part.mu * part.k * part.B2, part.mu * part.B3]
@@ -147,16 +146,16 @@ def _static_terms(model: Model) -> list[sp.Expr]:
     return [without[0], model.parameters["slider.stiffness"] * slope[0]]
 
 
-def _judged(c: list[Node]) -> list[Value]:
-    """Coefficients, whether all roots are on the left, whether the equations are ill-posed, and `crossing.judged`'s."""
+def _verdict_values(c: list[Node]) -> list[Value]:
+    """Coefficients, 1 or 0 for stable and for ill-posed, and the functions of `crossing.judged`, as nodes."""
     stable, functions = crossing.judged(c, select)
     return [*c, *(select(truth, 1.0, 0.0) for truth in (stable, crossing.is_ill_posed(c))), *functions]
 
 
-def _stable_set(degree: int) -> list[Program]:
-    """Where p + k q may change: real edges and the polynomial in β²; k of a root of it; the verdict at any k.
+def _stable_set_programs(degree: int) -> list[Program]:
+    """Programs for the stable set of p + k q: edges, polynomial in β² of the crossings, k of its roots, verdict at k.
 
-    These read the coefficients of p and q from a record of their own.
+    They read an array with the coefficients of p, then those of q.
     """
 
     def edges(p: list[Node], q: list[Node], _: Node) -> list[Value]:
@@ -180,14 +179,14 @@ def _stable_set(degree: int) -> list[Program]:
 
 
 def _interval(ingredients: list[Node]) -> Sequence[Value]:
-    """Ends of the stable interval in closed form, NaN where there is none."""
+    """Ends of the stable interval of stiffness in closed form, NaN if there is none."""
     numerator, denominator, mu_b2, mu_b3, a2, a3, gain = ingredients
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3, select)
     return cubic.without_gain(low, high, gain, select)
 
 
-def _linear_split() -> Program:
-    """p and q of one coefficient, from it at three values of a parameter, and whether it is linear in that."""
+def _linear_split_program() -> Program:
+    """Program of p and q of a coefficient from its values at three values of a parameter, and 1 if it is linear."""
     made = Program("linear")
     low, own, high = ([made.load(place)] for place in range(3))
     p, q, straight = crossing.linear_split(low, own, high, select)
@@ -197,7 +196,7 @@ def _linear_split() -> Program:
 
 
 def _allowed(rig: Slider | Machine, model: Model) -> sp.Expr:
-    """1 where the conditions that several numbers obey together hold, else 0."""
+    """Expression that is 1 if all conditions on several parameters together hold, else 0."""
     symbols: dict[str, Any] = dict(model.parameters)
     relations = [condition.holds for _, condition in conditions(with_values(rig, symbols))]
     holds = [one if isinstance(one, sp.Basic) else sp.sympify(bool(np.all(one))) for one in relations]

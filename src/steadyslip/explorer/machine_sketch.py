@@ -1,7 +1,7 @@
-"""The sketch of a machine as SVG whose parts a page may move.
+"""Sketch of a machine as SVG whose parts a page can move.
 
-Bodies are marked by the class ``part`` and their name in ``data-body``, wheels by their centre in ``data-turns`` too;
-links by the class ``link``, their ends in ``data-ends`` and the bodies there in ``data-bodies``.
+Bodies have the class ``part`` and their name in ``data-body``, wheels also their centre in ``data-turns``; links have
+the class ``link``, the positions of their ends in ``data-ends`` and the bodies there in ``data-bodies``.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from steadyslip.core.format import typeset
 from steadyslip.machine.drawing import DRIVEN, FORCED, INK, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
 
-UNIT = 62.0  # of the page for one of the drawing
-LETTERS = {False: 11, True: 13}
+UNIT = 62.0  # SVG units for one unit of the drawing: texts of 11 fit (by trial)
+FONT_SIZES = {False: 11, True: 13}  # by `large`, SVG units
 _CLASSES = {PALE: "pale", DRIVEN: "load", FORCED: "forced"}
 _THIN = 'vector-effect="non-scaling-stroke"'
 
 
 def machine_sketch(machine: Machine) -> str:
-    """An ``<svg>`` element that refers to nothing outside itself."""
+    """Self-contained ``<svg>`` element with the sketch of a machine."""
     pencil = SvgPencil()
-    Drawing(machine, pencil, values=False).draw()  # its numbers change on the page
+    Drawing(machine, pencil, values=False).draw()  # without values, which change on the page
     return pencil.svg()
 
 
 class SvgPencil(Pencil):
-    """Strokes as SVG; y points up in the drawing, down on the page."""
+    """Pencil that makes SVG elements; y points up in the drawing, down in SVG."""
 
     def __init__(self) -> None:
         self.parts: list[str] = []
         self.low, self.high = [math.inf, math.inf], [-math.inf, -math.inf]
 
     def svg(self) -> str:
-        """The whole element."""
+        """Whole ``<svg>`` element of all that has been drawn."""
         (x, y), (right, bottom) = [one - 6 for one in self.low], [one + 6 for one in self.high]
         wide, tall = right - x, bottom - y
         return (
@@ -44,7 +44,7 @@ class SvgPencil(Pencil):
             f'font-family="inherit">{"".join(self.parts)}</svg>'
         )
 
-    def _at(self, x: float, y: float) -> tuple[float, float]:
+    def _to_page(self, x: float, y: float) -> tuple[float, float]:
         found = UNIT * x, -UNIT * y
         for axis in (0, 1):
             self.low[axis] = min(self.low[axis], found[axis])
@@ -52,15 +52,15 @@ class SvgPencil(Pencil):
         return found
 
     def _path(self, *points: Point) -> str:
-        return "M" + "L".join("{:.4g} {:.4g}".format(*self._at(x, y)) for x, y in points)
+        return "M" + "L".join("{:.4g} {:.4g}".format(*self._to_page(x, y)) for x, y in points)
 
-    def _drawn(self, path: str, color: str, style: str) -> None:
+    def _add_path(self, path: str, color: str, style: str) -> None:
         kind = f' class="{_CLASSES[color]}"' if color != INK else ""
         self.parts.append(f'<path{kind} d="{path}"{style}/>')
 
     def line(self, *points: Point, color: str = INK, linewidth: float = 1.2, dashed: bool = False) -> None:
         style = f' stroke-width="{linewidth:g}"' if linewidth > 1.6 else ""
-        self._drawn(self._path(*points), color, style + (' stroke-dasharray="4 3"' if dashed else ""))
+        self._add_path(self._path(*points), color, style + (' stroke-dasharray="4 3"' if dashed else ""))
 
     def words(
         self, x: float, y: float, text: str, *, ha: str = "center", va: str = "center", color: str = INK,
@@ -71,7 +71,7 @@ class SvgPencil(Pencil):
     def _text(
         self, x: float, y: float, text: str, ha: str, va: str, color: str, large: bool, paper: bool
     ) -> str:  # fmt: skip
-        lines, size = typeset(text).split("\n"), LETTERS[large]
+        lines, size = typeset(text).split("\n"), FONT_SIZES[large]
         step = 1.2 * size / UNIT
         first = y + {"center": (len(lines) - 1) / 2, "bottom": len(lines) - 1, "top": 0}[va] * step
         first -= {"center": 0.36, "bottom": 0.1, "top": 0.8}[va] * size / UNIT
@@ -79,11 +79,11 @@ class SvgPencil(Pencil):
         kind = " ".join(filter(None, (_CLASSES.get(color, ""), "paper" if paper else "")))
         found = []
         for n, line in enumerate(lines):
-            left, base = self._at(x, first - n * step)
+            left, base = self._to_page(x, first - n * step)
             wide = 0.58 * size * len(line) / UNIT
             for share in {"center": (-0.5, 0.5), "left": (0, 1), "right": (-1, 0)}[ha]:
-                self._at(x + share * wide, first - n * step)
-            self._at(x, first - n * step + size / UNIT)
+                self._to_page(x + share * wide, first - n * step)
+            self._to_page(x, first - n * step + size / UNIT)
             found.append(f'<tspan x="{left:.4g}" y="{base:.4g}">{html.escape(line)}</tspan>')
         marked = f' class="{kind}"' if kind else ""
         return (
@@ -102,16 +102,16 @@ class SvgPencil(Pencil):
         self.parts.append(f'<g class="part" {moved}>{shape}</g>{text}')
 
     def block(self, name: str, x: float, y: float, wide: float, high: float, text: str) -> None:
-        left, top = self._at(x, y + high)
-        self._at(x + wide, y)
+        left, top = self._to_page(x, y + high)
+        self._to_page(x + wide, y)
         shape = f'<rect x="{left:.4g}" y="{top:.4g}" width="{UNIT * wide:.4g}" height="{UNIT * high:.4g}"/>'
         words = self._text(x + wide / 2, y + high / 2, text, "center", "center", INK, len(name) < 9, False)
         self._body(name, shape + words, "", "")
 
     def wheel(self, name: str, x: float, y: float, radius: float, text: str) -> None:
-        (cx, cy), r = self._at(x, y), UNIT * radius
-        self._at(x, y + radius)
-        self._at(x, y - radius)
+        (cx, cy), r = self._to_page(x, y), UNIT * radius
+        self._to_page(x, y + radius)
+        self._to_page(x, y - radius)
         marks = "".join(
             f"M{cx + 0.86 * r * math.cos(a):.4g} {cy + 0.86 * r * math.sin(a):.4g}L{cx + r * math.cos(a):.4g} "
             f"{cy + r * math.sin(a):.4g}"
@@ -130,22 +130,22 @@ class SvgPencil(Pencil):
 
         for n in range(many):
             path += self._path(between(a, b, n / many), between(d, c, (n + 1) / many))
-        self._drawn(path, PALE, ' stroke-width="1"')
+        self._add_path(path, PALE, ' stroke-width="1"')
 
     def gouge(self, x: float, y: float, wide: float, high: float) -> None:
         rows = [y + high * (n + 0.5) / 5 for n in range(5)]
-        self._drawn("".join(self._path((x, row), (x + wide, row)) for row in rows), PALE, ' stroke-width="1"')
+        self._add_path("".join(self._path((x, row), (x + wide, row)) for row in rows), PALE, ' stroke-width="1"')
 
     def frame(self, x: float, y: float, wide: float, high: float) -> None:
-        left, top = self._at(x, y + high)
-        self._at(x + wide, y)
+        left, top = self._to_page(x, y + high)
+        self._to_page(x + wide, y)
         size = f'width="{UNIT * wide:.4g}" height="{UNIT * high:.4g}"'
         self.parts.append(f'<rect class="load" x="{left:.4g}" y="{top:.4g}" {size} rx="5"/>')
 
     def link(self, start: Point, end: Point, sprung: bool, damped: bool, ends: tuple[str, str]) -> None:
         inner = SvgPencil()
-        Pencil.link(inner, (0, 0), (1, 0), sprung, damped, ends)  # a unit long: across it lengths stay
-        (x1, y1), (x2, y2) = self._at(*start), self._at(*end)
+        Pencil.link(inner, (0, 0), (1, 0), sprung, damped, ends)  # drawn from 0 to 1 and stretched along itself only
+        (x1, y1), (x2, y2) = self._to_page(*start), self._to_page(*end)
         angle, long = math.degrees(math.atan2(y2 - y1, x2 - x1)), math.hypot(x2 - x1, y2 - y1)
         path = "".join(part.split(' d="')[1].split('"')[0] for part in inner.parts)
         place = f"translate({x1:.4g} {y1:.4g}) rotate({angle:.4g}) scale({long / UNIT:.4g} 1)"

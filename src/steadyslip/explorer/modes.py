@@ -1,4 +1,4 @@
-"""What a page needs to tell how a machine moves in a mode: its characteristic matrix, speeds, and what holds energy."""
+"""Programs and data for the modes of a machine on a page: characteristic matrix, speeds, energies."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def mode_part(machine: Machine, model: Model) -> tuple[list[Program], dict[str, 
     Returns
     -------
     programs : list of Program
-        ``matrix``, the coefficients that the characteristic matrix has; ``measures``, the speed of the drive and of
-        every coordinate, then of everything that holds energy its weight and what it takes from each coordinate.
+        ``matrix``: non-zero coefficients of the characteristic matrix. ``measures``: speeds of the drive and of every
+        coordinate, then for each energy store its weight and its factor for each coordinate.
     facts : dict
         ``coordinates`` (names), ``matrix`` (size, then row, column and power of s of each coefficient), ``stores``
-        (name, whether kinetic, places of the coordinates), ``shape`` (words and limits).
+        (name, True if kinetic, indices of the coordinates), ``shape`` (sentences and their limits).
     """
     entries = [
         (i, j, powers[0], value)

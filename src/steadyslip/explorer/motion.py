@@ -1,4 +1,4 @@
-"""A rig's motion as JavaScript: its kernel, and what starts it at any values of its parameters."""
+"""Motion of a rig as JavaScript: its kernel, and the programs that start it at any parameter values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.records import with_values
-from steadyslip.explorer.moving import Shares, scales_program, start_program
+from steadyslip.explorer.motion_start import Shares, scales_program, start_program
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.formulation import Choice
@@ -32,15 +32,7 @@ from steadyslip.model.reducing import EVERYWHERE, reduce_model
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.weights import LEAST_WEIGHT, eliminable
 from steadyslip.motion.jobs import Options, automatic_method
-from steadyslip.protocol import (
-    DisplacementStep,
-    DisturbanceStep,
-    Hold,
-    NormalStressStep,
-    Protocol,
-    VelocityStep,
-    pack,
-)
+from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep, pack
 
 OPTIONS = Options(rtol=1e-6, most_steps=100_000)
 DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
@@ -49,22 +41,23 @@ DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
     "push": lambda at, size, drive: DisplacementStep(at=at, by=size),
     "normal": lambda at, size, drive: NormalStressStep(at=at, by=size),
     "pull": lambda at, size, drive: DisturbanceStep(at=at, by=size),
-    "blow": None,  # that is in the start
+    "blow": None,  # changes the starting velocity, not the protocol
 }
-"""What a page can do to a rig at a time: pieces of a protocol of a size, given the velocity of the drive."""
-_TOLD = 3.0, 5.0, 1e3, 7.0  # at, size, until, drive: numbers that can be told apart, sums and products too
+"""Disturbances of a page: piece of a protocol from time (s), size (SI units) and drive velocity (m/s)."""
+# values of time, size, end and drive velocity whose sums and products all differ, so that each can be recognised
+_MARKERS = 3.0, 5.0, 1e3, 7.0
 DRIVER = {"advance": "steadyslip.kernels.driver.lanes", "observe": "steadyslip.kernels.driver.states"}
 
 
 def driver() -> str:
-    """The driver, the same for every rig."""
+    """JavaScript text of the driver of kernels, which does not depend on the rig."""
     return transpiled(DRIVER)
 
 
 def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]]:
-    """The kernel of a rig as an expression of JavaScript, and what must be known about it.
+    """JavaScript expression of the kernel of a rig with its starting programs, and data about it.
 
-    Terms that are zero in a slider can be varied from there unless they would give it inertia, which is another kernel.
+    Zero terms of a slider can be varied on the page, except mass, which would need another kernel.
 
     Raises
     ------
@@ -89,9 +82,9 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
         program(model, "constants", list(kernel.constants.symbols), shares.symbols),
         scales_program(reduction, eliminate, OPTIONS),
         start_program(reduction, shares),
-        program(model, "dashpot", [_through(rig, model)]),
+        program(model, "dashpot", [_load_point_damping(rig, model)]),
     ]
-    segments = [_segments(name, piece) for name, piece in DISTURBANCES.items()]
+    segments = [_segment_program(name, piece) for name, piece in DISTURBANCES.items()]
     functions = "".join(javascript.text(one) for one in (*programs, *segments))
     own, several = (", ".join(one.name for one in some) for some in (programs, segments))
     text = f"(() => {{\n{functions}return {{ {own}, segments: {{ {several} }}, ...{kernel_text} }};\n}})()"
@@ -100,23 +93,23 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
     return text, facts | {"segments": max(len(one.stores) for one in segments) // facts["segment"]}
 
 
-def _through(rig: Slider | Machine, model: Model) -> Any:
-    """The dashpots through which the load point pulls: a jump of it would be an infinite force."""
+def _load_point_damping(rig: Slider | Machine, model: Model) -> Any:
+    """Total damping between load point and rig (zero if none); with damping, a jump of the load point is impossible."""
     elements = with_values(rig, dict(model.parameters)).mechanism().elements
     return sp.Add(*(abs(sp.sympify(one.damping)) for one in elements if LOAD_POINT in one.senses))
 
 
-def _segments(name: str, piece: Callable[[float, float, float], Any] | None) -> Program:
-    """The segments of a disturbance as a program of when, how large, until when and the drive velocity.
+def _segment_program(name: str, piece: Callable[[float, float, float], Any] | None) -> Program:
+    """Program of the protocol segments of a disturbance: reads time, size, end of the run and drive velocity.
 
-    The protocol cuts them with numbers that tell where each comes from. All of it is inside the run: what is not, the
-    page leaves out.
+    The protocol is cut for the values `_MARKERS`; each number found in the segments shows which input it comes from.
+    The disturbance is taken to lie within the run; the page cuts what does not.
     """
-    made, (at, size, until, drive) = Program(name), _TOLD
+    made, (at, size, until, drive) = Program(name), _MARKERS
     pieces = () if piece is None else piece(at, size, drive)
     rows = pack(Protocol.of(pieces), drive, until).rows(0, 1)[0]
     known = [made.load(i) for i in range(4)]
-    values = {0.0: as_node(0.0), **dict(zip(_TOLD, known, strict=True))}
+    values = {0.0: as_node(0.0), **dict(zip(_MARKERS, known, strict=True))}
     values |= {at + size: known[0] + known[1], drive * size: known[3] * known[1]}
     for place, value in enumerate(rows.ravel()):
         made.store(place, values[float(value)], "y")

@@ -1,4 +1,4 @@
-"""The rig file that a page saves: the user's own with its comments and units, or one made for the page."""
+"""Rig file that a page saves: that of the user with comments and units, or a generated one."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-_SENTINEL = 1.2345678901e-211  # first of the numbers that stand for values in the template of a rig file
+_SENTINEL = 1.2345678901e-211  # marks values in a generated rig file; no parameter has this value
 
 
 @dataclass(frozen=True)
 class OwnFile:
-    """What a page must know to save a rig file.
+    """Template of a rig file, and the source of each parameter in it, from which a page saves a file.
 
     Attributes
     ----------
     pieces : list
-        Its text; in between, lists: of a place alone what `told` says of that parameter is written there, of a place
-        with what stands before and behind it, its number in SI units, or, with a third word, nothing at all if it has
-        not changed; of a heading and such lists, these lines below it, if there are any.
+        Texts of the file and, between them, slots. A list of one index: the parameter as its source in the file writes
+        it. A list of index, text before and text after: its number in SI units between them; with one more text, the
+        slot is left out if the value is unchanged. A dict of ``head`` and ``lines``: a heading above such slots.
     """
 
     pieces: list[Any]
     rig: Slider | Machine = field(repr=False)
     given: Mapping[str, ParameterSource]
 
-    def told(self, name: str) -> dict[str, Any]:
-        """How the file gives a parameter: ``own``, its unit as it is written, SI units to one of it, its text there.
+    def source_fields(self, name: str) -> dict[str, Any]:
+        """Data on the source of a parameter in the file: ``own`` has its unit as written, the unit in SI, and its text.
 
-        ``factor`` and ``unit`` where the file gives per unit area what the rig has totals of; ``si`` where it is the
-        other way round; ``was``, the value of the file where that of the rig is another.
+        ``factor`` and ``unit`` are added if the file gives a value per unit area of a rig with totals; ``si`` for the
+        opposite case; ``was`` is the value in the file if that of the rig differs.
         """
         own = self.given.get(name)
         if own is None:
             return {}
         one = self.rig.parameters()[name]
-        factor, unit = outside_of(self.rig, one.role.unit)
+        factor, unit = display_unit(self.rig, one.role.unit)
         kept = isinstance(self.rig, Machine) and own.total  # areas may vary: shown as stresses
         found: dict[str, Any] = {"own": ["" if kept else own.unit, 1.0 if kept else own.size, own.text]}
         if factor != 1.0 and not own.total:
@@ -53,19 +53,19 @@ class OwnFile:
 
 
 def own_file(rig: Slider | Machine, names: Sequence[str], text: str) -> OwnFile:
-    """The file of a rig that a page saves, by the places of parameters among `names`; `text` may be empty."""
+    """Template of the rig file that a page saves; slots are indices in `names`, `text` is the user's file or empty."""
     found = rig_template(text, rig, names) if text else None
     if found is None or not found.pieces:
-        return OwnFile(_template(rig, names), rig, {} if found is None else found.sources)
-    return OwnFile(_pieces(rig, names, found), rig, found.sources)
+        return OwnFile(_generated_pieces(rig, names), rig, {} if found is None else found.sources)
+    return OwnFile(_file_pieces(rig, names, found), rig, found.sources)
 
 
-def outside_of(rig: Slider | Machine, unit: str) -> tuple[float, str]:
-    """Factor and unit in which a page tells a parameter; areas of a machine may vary, so that stresses stay those."""
+def display_unit(rig: Slider | Machine, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a page shows a parameter: totals for sliders with an area, SI units for machines."""
     return outside(unit, rig.area) if isinstance(rig, Slider) else (1.0, unit)
 
 
-def _pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate) -> list[Any]:
+def _file_pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate) -> list[Any]:
     pieces: list[Any] = []
     for kind, words in found.pieces:
         if kind == "text":
@@ -73,19 +73,19 @@ def _pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate) -> 
         elif kind == "value":
             pieces.append([names.index(words)])
         else:
-            lines = [[*_place(rig, names, name, f"{key} = "), "\n"] for name, key in found.keys(words).items()]
+            lines = [[*_slot(rig, names, name, f"{key} = "), "\n"] for name, key in found.keys(words).items()]
             pieces.append({"head": f"\n[{words}]\n" if kind == "table" else "", "lines": lines})
     return pieces
 
 
-def _place(rig: Slider | Machine, names: Sequence[str], name: str, before: str) -> list[Any]:
-    """A number in SI units per unit area, so that every digit comes back: place, what is before it, what behind."""
+def _slot(rig: Slider | Machine, names: Sequence[str], name: str, before: str) -> list[Any]:
+    """Slot of a parameter: index, text before and text after its number in SI units per unit area (all digits kept)."""
     unit = rig.parameters()[name].role.unit
     return [names.index(name), before, ""] if unit == "1" else [names.index(name), f'{before}"', f' {unit}"']
 
 
-def _template(rig: Slider | Machine, names: Sequence[str]) -> list[Any]:
-    """A rig file made for the page, with a place for each value."""
+def _generated_pieces(rig: Slider | Machine, names: Sequence[str]) -> list[Any]:
+    """Pieces of a generated rig file, with a slot for each value."""
     marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
     pieces: list[Any] = []
     for line in rig_to_text(with_values(rig, marks)).splitlines():
@@ -95,15 +95,15 @@ def _template(rig: Slider | Machine, names: Sequence[str]) -> list[Any]:
             factor, _ = outside(unit, rig.area_of(name))
             mark = marks[name]
             if value.partition("  #")[0] in {repr(mark), repr(mark * factor), f'"{mark!r} {unit}"'}:
-                pieces += [_place(rig, names, name, f"{key} = "), "\n"]
+                pieces += [_slot(rig, names, name, f"{key} = "), "\n"]
                 break
         else:
             pieces.append(line + "\n")
-    return _joined(pieces)
+    return _merge_texts(pieces)
 
 
-def _joined(pieces: Sequence[Any]) -> list[Any]:
-    """Texts in a row as one."""
+def _merge_texts(pieces: Sequence[Any]) -> list[Any]:
+    """Pieces with adjacent texts joined."""
     found: list[Any] = []
     for one in pieces:
         if found and isinstance(one, str) and isinstance(found[-1], str):

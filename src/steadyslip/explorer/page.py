@@ -1,4 +1,4 @@
-"""The page of one rig, and what a user does with it."""
+"""`explore`: the browser page of a rig as an object that is shown, saved, opened or made a widget."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from steadyslip.machine.slider import Slider
 
 @dataclass(frozen=True)
 class Explorer(Standalone):
-    """The page of one rig.
+    """Browser page of one rig.
 
     Attributes
     ----------
     html : str
-        The whole file.
+        Text of the HTML file.
     title : str
     rig : Slider or Machine
     branch : int
     text : str
-        Of the file that the rig came from; empty where it is not known.
+        Text of the rig file that the rig was read from; empty if not given.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -35,7 +35,7 @@ class Explorer(Standalone):
     text: str = field(default="", repr=False)
 
     def widget(self) -> Any:
-        """The same as a widget for notebooks, with its values: ``widget.values``, ``widget.rig``.
+        """Page as a notebook widget, with the values on the page in ``widget.values`` and ``widget.rig``.
 
         Raises
         ------
@@ -51,18 +51,18 @@ class Explorer(Standalone):
 def explore(
     rig: Slider | Machine, *, title: str = "rig", branch: int = 0, source: str | PathLike[str] | None = None
 ) -> Explorer:
-    """A page that shows how a rig's verdict depends on its parameters.
+    """Interactive page that shows how the verdict on a rig depends on its parameters.
 
     Parameters
     ----------
     rig : Slider or Machine
-        With any law, contact and drive; users' own laws too.
+        With any laws, including those of users.
     title : str, optional
-        What the page calls the rig.
+        Title of the page.
     branch : int, optional
-        Which steady sliding where there are several, by rising normal stress.
+        Index of the steady state where there are several, by rising normal stress.
     source : path, optional
-        The file that the rig was read from: the page shows values in its units, and saves it with its comments.
+        File that the rig was read from: the page shows values in its units, and saves it with its comments.
 
     Returns
     -------
@@ -72,10 +72,10 @@ def explore(
     Raises
     ------
     NotAvailable
-        If an equation contains what cannot be printed as JavaScript or acts with a delay, or numbers leave the range
-        of floating point.
+        If an equation has a delay or a function that cannot be printed as JavaScript, or numbers leave the range of
+        floating point.
     ParameterError
-        If a machine, which slides steadily in one way, is asked for another `branch`.
+        If `branch` is not 0 for a machine, which has one steady state.
     RigFileError
         If the source cannot be read.
     """

@@ -1,7 +1,6 @@
-"""Expressions of a Model as programs that a page runs.
+"""Programs for a page from expressions of a Model.
 
-Each program reads the record R, the parameters in the Model's order and behind them σss of every contact, and writes
-the array y.
+Each program reads the array R (parameters in the order of the Model, then σss of every contact) and writes the array y.
 """
 
 from __future__ import annotations
@@ -19,20 +18,16 @@ Then = Callable[[list[Node]], Sequence[Value]]
 
 
 def program(
-    model: Model,
-    name: str,
-    expressions: Sequence[Any],
-    further: Sequence[sp.Symbol] = (),
-    then: Then | None = None,
+    model: Model, name: str, expressions: Sequence[Any], further: Sequence[sp.Symbol] = (), then: Then | None = None
 ) -> Program:
-    """Expressions in the Model's parameters, σss and `further` symbols, which stand behind them, as a program.
+    """Program that evaluates expressions in the parameters of a Model, σss and `further` symbols, read in this order.
 
-    What `then` makes of their values is stored instead of them, if it is given.
+    With `then`, a function of the values (nodes), its results are stored instead of the values.
 
     Raises
     ------
     NotAvailable
-        If an expression contains what cannot be printed; it is named.
+        If an expression has a function that cannot be printed; the message names it.
     """
     made = Program(name)
     names = {symbol: f"p{i}" for i, symbol in enumerate((*model.arguments, *further))}

@@ -1,4 +1,4 @@
-"""Steady sliding as programs: the steady normal stresses of all contacts, or the equations that they solve."""
+"""Programs for steady sliding on a page: steady normal stresses of all contacts, or their residuals."""
 
 from __future__ import annotations
 
@@ -11,30 +11,33 @@ from steadyslip.kernels.nodes import Node, Program, Value
 from steadyslip.model.equations import Model
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 
-Rows = list[list[Value | None]]
-"""A matrix; None is zero."""
-FORMULA = 4
+Rows = list[list[Value | None]]  # matrix of nodes; None is zero
+VALUES_PER_CONTACT = 4  # values of `steady` for each contact
 
 
-def searched(model: Model) -> list[bool]:
-    """Of every contact, whether its normal stress has no formula, so that it is searched for."""
+def needs_search(model: Model) -> list[bool]:
+    """True for each contact whose steady normal stress has no formula and must be searched."""
     if joint_equation(model) is not None:
         return [False] * len(model.contacts)
     return [not steady_equation(model, place).affine for place in range(len(model.contacts))]
 
 
 def steady_programs(model: Model) -> list[Program]:
-    """``steady`` and, of contacts that are searched, ``residual`` with their number.
+    """Program ``steady``, and ``residual0``, ``residual1``, ... of the contacts whose σss must be searched.
 
-    Of each contact that has a formula ``steady`` stores σss (NaN where there is none), its coupling, what is left of
-    its load and that load: `FORMULA` places for each contact. Of contacts that press on each other it stores σss of
-    all, then the coefficients, lowest power first, of the polynomial whose roots are the gains with which they do.
+    ``steady`` stores `VALUES_PER_CONTACT` values: σss (NaN if there is none), slope of the normal stress, load left and
+    steady load. For contacts that press on each other it stores all σss, then the coefficients of the characteristic
+    polynomial of their coupling matrix A, lowest power first.
     """
     joint = joint_equation(model)
     if joint is not None:
-        return [_together(model, joint)]
-    sought = searched(model)
-    formulas = [one for place, look in enumerate(sought) for one in ([0] * FORMULA if look else _formula(model, place))]
+        return [_joint_program(model, joint)]
+    sought = needs_search(model)
+    formulas = [
+        one
+        for place, look in enumerate(sought)
+        for one in ([0] * VALUES_PER_CONTACT if look else _formula(model, place))
+    ]
     residuals = [
         program(model, f"residual{place}", [contact.steady_stress - contact.sigma_ss])
         for place, contact in enumerate(model.contacts)
@@ -52,8 +55,8 @@ def _formula(model: Model, place: int) -> list[sp.Expr]:
     return [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, left, left if own is None else own]
 
 
-def _together(model: Model, joint: JointEquation) -> Program:
-    """σ = A σ + b by Cramer's rule, and the characteristic polynomial of A."""
+def _joint_program(model: Model, joint: JointEquation) -> Program:
+    """Program that solves σ = A σ + b by Cramer's rule, and stores the characteristic polynomial of A behind."""
     n = joint.size
     wanted = [*(e for row in joint.matrix for e in row), *joint.rest]
 
@@ -87,7 +90,7 @@ def _product(one: Value | None, other: Value | None) -> Value | None:
 
 
 def _determinant(rows: Rows) -> Value | None:
-    """By its first row."""
+    """Determinant by expansion along the first row; None is zero."""
     if not rows:
         return 1.0
     total: Value | None = None
@@ -103,17 +106,17 @@ def characteristic_polynomial(a: Rows) -> list[Value]:
     coefficients: list[Value | None] = [1.0]
     m: Rows = [[None] * n for _ in range(n)]
     for k in range(1, n + 1):
-        m = [[_entry(a, m, i, j) for j in range(n)] for i in range(n)]
+        m = [[_product_entry(a, m, i, j) for j in range(n)] for i in range(n)]
         for i in range(n):
             m[i][i] = _sum(m[i][i], coefficients[0])
         trace: Value | None = None
         for i in range(n):
-            trace = _sum(trace, _entry(a, m, i, i))
+            trace = _sum(trace, _product_entry(a, m, i, i))
         coefficients.insert(0, None if trace is None else -trace / float(k))
     return [0.0 if one is None else one for one in coefficients]
 
 
-def _entry(a: Rows, b: Rows, i: int, j: int) -> Value | None:
+def _product_entry(a: Rows, b: Rows, i: int, j: int) -> Value | None:
     total: Value | None = None
     for k in range(len(a)):
         total = _sum(total, _product(a[i][k], b[k][j]))

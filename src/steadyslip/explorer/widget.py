@@ -1,4 +1,4 @@
-"""The explorer as a widget of notebooks: what is moved there comes back to Python. Needs anywidget."""
+"""Explorer as a notebook widget whose values are shared with Python; needs anywidget."""
 
 from __future__ import annotations
 
@@ -6,29 +6,29 @@ from functools import cache
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.explorer.assembly import parts, safe, style
+from steadyslip.explorer.assembly import json_for_html, page_parts, style
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 
 def widget(rig: Slider | Machine, title: str, branch: int, text: str = "") -> Any:
-    """A widget of a rig.
+    """Notebook widget of the explorer of a rig.
 
     Returns
     -------
     anywidget.AnyWidget
-        With ``values``, a dict of the values that stand on the page by dotted name, in SI units, and ``rig``, the rig
-        with these values. Setting ``values`` moves the page; ``observe(f, "values")`` calls f when they change.
+        With ``values``, the values on the page by dotted name (SI units), and ``rig``, the rig with these values.
+        Setting ``values`` changes the page; ``observe(f, "values")`` calls f when they change.
 
     Raises
     ------
     NotAvailable
         If anywidget is not installed.
     """
-    made = _kind()
-    code, known = parts(rig, title, branch, text)
+    made = _widget_class()
+    code, known = page_parts(rig, title, branch, text)
     module = (
-        f"{code}const data = {safe(known)};\n"
+        f"{code}const data = {json_for_html(known)};\n"
         "export default { render: ({ model, el }) => render(model, el, data, programs, library) };\n"
     )
     values = {one["name"]: one["value"] for one in known["parameters"]}
@@ -37,7 +37,7 @@ def widget(rig: Slider | Machine, title: str, branch: int, text: str = "") -> An
 
 
 @cache
-def _kind() -> type:
+def _widget_class() -> type:
     try:
         import anywidget
         import traitlets
@@ -45,7 +45,7 @@ def _kind() -> type:
         raise NotAvailable("widgets need anywidget; install it with: pip install 'steadyslip[notebook]'") from None
 
     class ExplorerWidget(anywidget.AnyWidget):
-        """A page about a rig, and the values that stand on it."""
+        """Widget of a rig, with the values on its page."""
 
         values = traitlets.Dict().tag(sync=True)
 
@@ -55,7 +55,7 @@ def _kind() -> type:
 
         @traitlets.validate("values")
         def _checked(self, proposal: Any) -> dict[str, float]:
-            """A part of the values is enough; what the rig cannot have is refused."""
+            """All values after a change of some; raises ParameterError for a value that the rig does not allow."""
             known = getattr(self, "values", None) or {}
             together = {**known, **proposal["value"]}
             changed = {name: value for name, value in together.items() if value != self._origin.value(name)}
@@ -64,7 +64,7 @@ def _kind() -> type:
 
         @property
         def rig(self) -> Slider | Machine:
-            """The rig with the values of the page."""
+            """Rig with the values on the page."""
             changed = {n: v for n, v in self.values.items() if v != self._origin.value(n)}
             return self._origin.with_values(changed) if changed else self._origin
 

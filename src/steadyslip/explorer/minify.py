@@ -1,4 +1,4 @@
-"""Code and styles without what only people read: comments, indentation, spaces; names stay but in generated code."""
+"""Minify JavaScript and CSS: comments, indentation and spaces removed; names shortened in generated code only."""
 
 from __future__ import annotations
 
@@ -7,31 +7,32 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from itertools import groupby, product
 
-_OTHER = re.compile(
+_LITERAL = re.compile(
     r""""(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'"""  # strings
     r"|(?<=[(,=:?&|!]) ?/(?![/*])(?:\\.|\[(?:\\.|[^\]\\\n])*\]|[^/\\\n\[])+/[a-z]*"  # regular expressions
 )
+# products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order of rounding
 _PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
 _SUM = re.compile(r"(?<=[\[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|\]])")
-"""Products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order."""
-_LINE = re.compile(r"([;{,\n])\n+")
-"""Ends of lines that end no statement."""
-_SPACE = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
+_LINE_END = re.compile(r"([;{,\n])\n+")  # line ends that end no statement
+_SPACED_SIGNS = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
 
-def narrow(text: str) -> str:
-    """A module; no string of it goes over several lines."""
+def minify(text: str) -> str:
+    """Minified text of a JavaScript module without multi-line strings."""
     bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
-    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # types within a line
+    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # JSDoc types within a line
     bare = re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
-    return _LINE.sub(r"\1", "".join(_SPACE.sub(_close, part) if code else part for part, code in _parts(bare)))
+    return _LINE_END.sub(
+        r"\1", "".join(_SPACED_SIGNS.sub(_strip_spaces, part) if code else part for part, code in _split_literals(bare))
+    )
 
 
-def _parts(text: str) -> Iterator[tuple[str, bool]]:
-    """Code, and what must stay as it is: strings, templates, regular expressions; whether it is code."""
+def _split_literals(text: str) -> Iterator[tuple[str, bool]]:
+    """Parts of a JavaScript text, each with True for code, False for strings, templates and regular expressions."""
     start = at = 0
     while at < len(text):
-        found = _OTHER.match(text, at)
+        found = _LITERAL.match(text, at)
         end = found.end() if found else _template_end(text, at) if text[at] == "`" else at
         if end > at:
             yield text[start:at], True
@@ -43,7 +44,7 @@ def _parts(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _template_end(text: str, at: int) -> int:
-    """Where a template ends that begins here; others may be within."""
+    """Index after the template literal that begins at `at`, which may contain others."""
     at += 1
     while text[at] != "`":
         if text.startswith("${", at):
@@ -56,78 +57,77 @@ def _template_end(text: str, at: int) -> int:
     return at + 1
 
 
-def _close(found: re.Match[str]) -> str:
-    """Signs without the spaces around, but for two that would be another sign together."""
+def _strip_spaces(found: re.Match[str]) -> str:
+    """Match without spaces around its signs, except between + + and - -, which would join to ++ and --."""
     signs, whole, text = found[1], found[0], found.string
     before = whole[0] == " " and signs[0] in "+-" and text[: found.start()].endswith(signs[0])
     after = whole[-1] == " " and signs[-1] in "+-" and text[found.end() :].startswith(signs[-1])
     return " " * before + signs + " " * after
 
 
-def dense(text: str) -> str:
-    """Generated code, which has no strings, without the spaces beside signs; declarations in a row are one."""
+def minify_generated(text: str) -> str:
+    """Minified generated code, which has no strings: no spaces at signs, adjacent declarations joined."""
     bare = re.sub(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *", r"\1", re.sub(r"^ +", "", text, flags=re.M))
     before = ""
     while before != bare:
         before, bare = bare, _SUM.sub(r"\1", _PRODUCT.sub(r"\1", bare))
-    bare = _once(bare)
+    bare = _drop_brackets(bare)
     rows: list[str] = []
     for declared, lines in groupby(bare.split("\n"), lambda line: line.startswith("var ") and line.endswith(";")):
         own = list(lines)
         rows += ["var " + ",".join(line[4:-1] for line in own) + ";"] if declared else own
-    return _LINE.sub(r"\1", "\n".join(rows))
+    return _LINE_END.sub(r"\1", "\n".join(rows))
 
 
 _NAME = re.compile(r"(?<![\w.$])[A-Za-z_]\w*")
 _LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-_WORDS = frozenset(
+# names of JavaScript that occur in generated code
+_RESERVED = frozenset(
     re.findall(
         r"\w+",
         "as break const continue do else false for function if in let new null of return true var while "
         "Math Number Infinity NaN Float64Array",
     )
 )
-"""What generated code has of JavaScript itself."""
+_LONG_NUMBER = re.compile(r"(?<![\w.])\d+\.\d{8,}(?:e-?\d+)?")
+_MIN_USES = 4  # uses from which a constant for a long number saves characters
 
 
-_LONG, _OFTEN = re.compile(r"(?<![\w.])\d+\.\d{8,}(?:e-?\d+)?"), 4
-
-
-def functions_of(text: str) -> set[str]:
-    """Names of the functions of generated code."""
+def function_names(text: str) -> set[str]:
+    """Names of the functions defined in generated code."""
     return set(re.findall(r"^ *function (\w+)", text, flags=re.M))
 
 
-def renamed(text: str, known: Iterable[str]) -> str:
-    """Generated code with names of its own as short as may be, the shortest for those that occur most.
+def shorten_names(text: str, known: Iterable[str]) -> str:
+    """Generated code with its own names replaced by short ones, the shortest for the most frequent.
 
     Parameters
     ----------
     text : str
-        Without strings.
+        Code without strings.
     known : iterable of str
-        Names that others know.
+        Names used by other code, which are kept.
     """
-    taken = _WORDS.union(known)
+    taken = _RESERVED.union(known)
     counts = Counter(name for name in _NAME.findall(text) if name not in taken)
     free = (name for size in (1, 2, 3) for name in map("".join, product(_LETTERS, repeat=size)) if name not in taken)
     short = {name: next(free) for name, _ in sorted(counts.items(), key=lambda item: (-item[1], item[0]))}
     return _NAME.sub(lambda found: short.get(found[0], found[0]), text)
 
 
-def shared(text: str) -> str:
-    """Generated functions in one that begins with ``(() => {``, with a name for each long number that they share."""
-    counts = Counter(_LONG.findall(text))
-    names = {number: f"number{n}" for n, (number, many) in enumerate(counts.items()) if many >= _OFTEN}
+def share_numbers(text: str) -> str:
+    """Generated code that begins with ``(() => {``, with a constant for each long number used often."""
+    counts = Counter(_LONG_NUMBER.findall(text))
+    names = {number: f"number{n}" for n, (number, many) in enumerate(counts.items()) if many >= _MIN_USES}
     if not names:
         return text
     head, body = text.split("{", 1)
     declared = ", ".join(f"{name} = {number}" for number, name in names.items())
-    return f"{head}{{\nconst {declared};{_LONG.sub(lambda found: names.get(found[0], found[0]), body)}"
+    return f"{head}{{\nconst {declared};{_LONG_NUMBER.sub(lambda found: names.get(found[0], found[0]), body)}"
 
 
-def _once(text: str) -> str:
-    """Brackets in brackets, and brackets around all that is assigned, left out."""
+def _drop_brackets(text: str) -> str:
+    """Code without doubled brackets, and without brackets around a whole assigned value."""
     opened: list[int] = []
     closed: dict[int, int] = {}
     for at, sign in enumerate(text):
@@ -144,6 +144,6 @@ def _once(text: str) -> str:
     return "".join(sign for at, sign in enumerate(text) if at not in spare)
 
 
-def narrow_style(text: str) -> str:
-    """A style sheet."""
+def minify_css(text: str) -> str:
+    """Minified text of a style sheet."""
     return re.sub(r"(?<=[;{},]) +|(?<=[a-z]:) (?=[^{}]*[;}])|;? *(?=\})", "", re.sub(r"^ +", "", text, flags=re.M))

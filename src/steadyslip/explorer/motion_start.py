@@ -1,6 +1,6 @@
-"""What starts a motion on a page, at any values: scales and settings, starting values, shares of disturbances.
+"""Programs that start a motion on a page: scales and settings, starting values, shares of disturbances.
 
-Programs read the record R: parameters, steady normal stresses, and behind them the `Shares`.
+They read the array R: parameters, steady normal stresses, then the symbols of `Shares`.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from steadyslip.motion.jobs import Options, numbers
 
 @dataclass(frozen=True)
 class Shares:
-    """How much of a disturbance acts where: on bodies, at contacts; and by how much a blow multiplies velocities.
+    """Symbols for the share of a disturbance on coordinates and contacts, and for the factors of a blow on velocities.
 
-    The single block of a slider has no names: disturbances act on it, and `blown` is its velocity.
+    For sliders `pushed` and `pressed` are empty (disturbances act on the block), and `blown` has the key "".
     """
 
     pushed: dict[str, sp.Symbol]
@@ -50,29 +50,29 @@ class Shares:
     @classmethod
     def of(cls, rig: Slider | Machine, model: Model) -> Shares:
         if not isinstance(rig, Machine):
-            return cls({}, {}, {"": _blow(model.coordinates[0])} if model.inertial else {})
+            return cls({}, {}, {"": _blow_factor(model.coordinates[0])} if model.inertial else {})
         own = [one for one in model.coordinates if one.name in rig.bodies]
         return cls(
             {one.name: share_of(one.push) for one in model.coordinates},
             {contact.name: share_of(contact.press) for contact in model.contacts},
-            {one.name: _blow(one) for one in own if one.inertial and one.speed != 0},
+            {one.name: _blow_factor(one) for one in own if one.inertial and one.speed != 0},
         )
 
     @property
     def symbols(self) -> list[sp.Symbol]:
-        """All of them, in the order in which they stand in a record."""
+        """All symbols, in the order in which they follow in the array R."""
         return [*self.pushed.values(), *self.pressed.values(), *self.blown.values()]
 
     def places(self) -> dict[str, dict[str, int]]:
-        """Where they stand behind the steady normal stresses, by what a page calls them."""
+        """Index of each share behind the normal stresses, by kind of disturbance (pull, normal, blow) and name."""
         order = {symbol: place for place, symbol in enumerate(self.symbols)}
         along = {name: symbol for name, symbol in self.pushed.items() if not name.endswith(NORMAL)}
         named = {"pull": along, "normal": self.pressed, "blow": self.blown}
         return {kind: {name: order[symbol] for name, symbol in own.items()} for kind, own in named.items()}
 
 
-def _blow(coordinate: Coordinate) -> sp.Symbol:
-    """Velocity at the start over that of steady sliding."""
+def _blow_factor(coordinate: Coordinate) -> sp.Symbol:
+    """Symbol for the velocity at the start over that of steady sliding."""
     return inner_symbol(f"blow_on_{coordinate.velocity.name}", positive=True)
 
 
@@ -80,11 +80,13 @@ def _blow(coordinate: Coordinate) -> sp.Symbol:
 
 
 def start_program(reduction: Reduction, shares: Shares) -> Program:
-    """Variables that jumps leave alone, and behind them guesses of what is searched for: of steady sliding, but for a
-    blow."""
+    """Program of the starting values: variables that are continuous at jumps, then guesses of the unknowns.
+
+    Values are those of steady sliding, with velocities multiplied by the factors of a blow.
+    """
     model = reduction.model
     memory = {item.symbol: sp.sympify(model.steady[item.symbol]) for item in (*model.memory, *model.states)}
-    speeds = {one.velocity: one.speed * _blown(one, model, shares) for one in model.coordinates}
+    speeds = {one.velocity: one.speed * _blow_on(one, model, shares) for one in model.coordinates}
     found = {**memory, **speeds}
     for contact, sliding in zip(model.contacts, reduction.slidings, strict=True):
         if sliding.variable is not None:
@@ -95,13 +97,13 @@ def start_program(reduction: Reduction, shares: Shares) -> Program:
     return program(model, "start", [*starts, *guesses], shares.symbols)
 
 
-def _blown(coordinate: Coordinate, model: Model, shares: Shares) -> sp.Expr:
+def _blow_on(coordinate: Coordinate, model: Model, shares: Shares) -> sp.Expr:
     name = coordinate.name if model.contacts[0].name else ""
     return shares.blown.get(name, sp.Integer(1))
 
 
 def _slip_rate(contact: Contact, model: Model, speeds: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """That which belongs to velocities of bodies, with the load point at that of steady sliding."""
+    """Slip rate of a contact for given coordinate velocities, with the load point as in steady sliding."""
     load = model.inputs["load_velocity"]
     slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
     return slip.xreplace({load: model.steady[load], **speeds})
@@ -111,24 +113,29 @@ def _slip_rate(contact: Contact, model: Model, speeds: dict[sp.Symbol, sp.Expr])
 
 
 def scales_program(reduction: Reduction, eliminate: int | tuple[int | None, ...] | None, options: Options) -> Program:
-    """The scale of the load point's way, whether the motion is posed, the least weight of the states left out; then of
-    every contact its slip rate and area; then settings."""
+    """Program of the scales of a motion and the settings of the driver.
+
+    It stores the displacement scale of the load point (m), 1 if the motion is well-posed (else 0), the least weight of
+    an eliminated state; then slip rate and area of every contact; then the settings.
+    """
     model = reduction.model
     wanted: list[Any] = [model.parameters["drive.velocity"]]
     wanted += [model.steady[contact.velocity] for contact in model.contacts]
     wanted += [contact.sigma_ss for contact in model.contacts]
     wanted += [contact.area for contact in model.contacts]
     several = [weight_expressions(model, index) for index in range(len(model.contacts))]
-    wanted += [sp.sympify(e).xreplace({sp.zoo: sp.nan}) for own in several for e in own]  # of what holds nothing
+    wanted += [sp.sympify(e).xreplace({sp.zoo: sp.nan}) for own in several for e in own]  # division by zero: NaN
     if model.contacts[0].name:
         wanted += scale_expressions(model)
     if not model.is_single:
         wanted += [e for row in balance_jacobian(model) for e in row]
     each = eliminate if isinstance(eliminate, tuple) else (eliminate,)
-    return program(model, "scales", wanted, then=partial(_scaled, reduction, each, options, list(map(len, several))))
+    return program(
+        model, "scales", wanted, then=partial(_scale_values, reduction, each, options, list(map(len, several)))
+    )
 
 
-def _scaled(
+def _scale_values(
     reduction: Reduction, eliminate: tuple[int | None, ...], options: Options, counts: list[int], found: list[Node]
 ) -> Sequence[Value]:
     model, many = reduction.model, len(reduction.model.contacts)
@@ -143,30 +150,30 @@ def _scaled(
         contact_scales(one, speed, reduction, select, i)
         for i, (one, speed) in enumerate(zip(weights, speeds, strict=True))
     ]
-    way: Any
+    natural_slip: Any
     if model.contacts[0].name:
         count = len(scale_expressions(model))
         directs = [direct_effect_scale(one, select) for one in weights]
         scales, searched = machine_scales(reduction, rest[:count], speeds, stresses, directs, own, select)
-        way, searched, rest = speeds[0] * shortest_time(scales, select), searched or (1.0,), rest[count:]
+        natural_slip, searched, rest = speeds[0] * shortest_time(scales, select), searched or (1.0,), rest[count:]
     else:
         scales, unknown = own[0]
-        way, searched = scales["x"], (unknown,)
-    posed = weights[0].by_unknown > 0 if model.is_single else _rises(rest)
+        natural_slip, searched = scales["x"], (unknown,)
+    posed = weights[0].by_unknown > 0 if model.is_single else _all_eigenvalues_positive(rest)
     shares: Any = 1.0
     for one, which in zip(weights, eliminate, strict=True):
         if which is not None:
             share = abs(one.by_memory[which] / one.direct)
             shares = select(share < shares, share, shares)
     given = {"watch": 1.0, "record": 1.0, "guess": 0.0}
-    settings = given | numbers(speeds[0], stresses[0], way, searched[0], options)
+    settings = given | numbers(speeds[0], stresses[0], natural_slip, searched[0], options)
     rows = [settings[name] for name in SETTINGS] + [options.rtol * scales[name] for name in reduction.names]
     rows += [0.0] * (len(searched) - 1) + list(searched[1:])
-    told = [value for pair in zip(speeds, areas, strict=True) for value in pair]
-    return [way * drive / speeds[0], select(posed, 1.0, 0.0), shares, *told, *rows]
+    per_contact = [value for pair in zip(speeds, areas, strict=True) for value in pair]
+    return [natural_slip * drive / speeds[0], select(posed, 1.0, 0.0), shares, *per_contact, *rows]
 
 
-def _rises(entries: list[Node]) -> Any:
+def _all_eigenvalues_positive(entries: list[Node]) -> Any:
     """Whether all eigenvalues of a matrix are positive."""
     size = round(len(entries) ** 0.5)
     less: list[list[Value | None]] = [

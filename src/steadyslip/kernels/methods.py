@@ -355,9 +355,4 @@ def dop853() -> Method:
     )  # fmt: skip
 
 
-METHODS: dict[str, Callable[[], Method]] = {
-    "tsit5": explicit,
-    "dop853": dop853,
-    "rodas4": rodas4,
-    "rodas5p": rodas5p,
-}
+METHODS: dict[str, Callable[[], Method]] = {"tsit5": explicit, "dop853": dop853, "rodas4": rodas4, "rodas5p": rodas5p}

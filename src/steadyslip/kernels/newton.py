@@ -11,6 +11,8 @@ from steadyslip.kernels.nodes import Loop, Node, Value, as_node, larger, select,
 NEWTON_STEPS = 6  # iterations from the guess of the last stage; chosen by trial: each costs as much as the residuals
 MAX_LOG_STEP = 2.0  # largest change of ln v (or asinh v) in one iteration; chosen by trial, against overshoot
 
+RTOL, ATOL = 1e-7, 1e-9  # of z and of its scale: last change of a converged unknown, whose error is near its square
+
 
 def solved(
     kernel: Formulation, given: Mapping[str, Value], near: Sequence[Value], scales: Sequence[Value]
@@ -31,7 +33,7 @@ def solved(
 
     found = Loop(NEWTON_STEPS, near, improved).outcome()
     small = [
-        abs(change) <= 1e-7 * abs(z) + 1e-9 * abs(as_node(scale))
+        abs(change) <= RTOL * abs(z) + ATOL * abs(as_node(scale))
         for z, change, scale in zip(found[:n], found[n:], scales, strict=True)
     ]
     good = small[0]

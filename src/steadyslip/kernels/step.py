@@ -23,6 +23,7 @@ rtol."""
 LAST_ERROR_WEIGHT, EARLIER_ERROR_WEIGHT = 0.7, 0.3
 """Weights of the last two errors in step control: without the second, steps that stability limits oscillate about that
 limit and every sixth is rejected."""
+SHRINK, GROW = 0.2, 6.0  # limits of the ratio of a step to the one before; usual values (DOP853: 1/3, 6)
 LOWEST_TREND = -3.0  # an error smaller than the aim by this in ln e² does not count as a trend; chosen by trial
 INITIAL_SHARE = 1e-3  # share of the allowed error from which an event function has a sign at a segment's start
 LOG_SAFETY_REJECTED = math.log(0.8)  # ln of the step over the longest allowed after a rejection; chosen by trial
@@ -40,7 +41,7 @@ class Step(Evaluator):
         self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.END)
         rest = self.end - self.tau
         self.rest = rest
-        self.last = self.proposed >= rest * 0.99999999
+        self.last = self.proposed >= rest * 0.99999999  # no tiny step is left for rounding
         self.h: Value = select(self.last, rest, self.proposed)
         self.new: Sequence[Value] = ()
         self.fastest: Value = 0.0  # largest diagonal entry of the Jacobian, 1/s; not needed by explicit methods
@@ -61,7 +62,7 @@ class Step(Evaluator):
         self.size = primitive("rough_log", smaller(larger(error, 1e-10), 1e30))
         self.earlier = self.program.load(Row.ERROR)
         factor = exp(select(self.good, self._log_growth(), LOG_SAFETY_REJECTED - 0.5 / method.order * self.size))
-        factor = select(error < 1e60, smaller(larger(factor, 0.2), 6.0), 0.2)
+        factor = select(error < 1e60, smaller(larger(factor, SHRINK), GROW), SHRINK)  # also where the error is NaN
         self.after = select(self.last, self.end, self.tau + self.h)
         next_h = self.h * factor
         self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
@@ -149,7 +150,7 @@ class Step(Evaluator):
             for i in range(n):
                 if s and any(method.c[s]):
                     right[i] = right[i] + inverse * weighted(method.c[s], [u[i] for u in self.stages])
-                if kernel.timed and abs(method.time_weights[s]) > 1e-12:
+                if kernel.timed and abs(method.time_weights[s]) > 1e-12:  # others are zero but for rounding
                     right[i] = right[i] + h * method.time_weights[s] * in_time[i]
             self.stages.append(substituted(matrix, right))
         self.new = [y[i] + self.stages[-1][i] for i in range(n)]

@@ -14,7 +14,7 @@ from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
 from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
-from steadyslip.experiments.numerics.splitting import displacement_noise
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
 
 RAMP_GAIN = 40.0  # decrease of chi squared by which a ramp must fit better than a step; chosen by trial
 OUTLIER = 9.0  # squared deviation (in units of the noise) from which a sample weighs less: three standard deviations
@@ -65,7 +65,7 @@ def smooth_load(time: Array, displacement: Array) -> Course:
     """Course of the load-point rate from a smoothing curve through its displacement."""
     spline = smoothing_curve(time, displacement, displacement_noise(time, displacement))
     strays = displacement - spline(time)
-    return Course(0.0, curve=spline.derivative(), strays=1.4826 * float(np.median(np.abs(strays))))
+    return Course(0.0, curve=spline.derivative(), strays=MAD_TO_SIGMA * float(np.median(np.abs(strays))))
 
 
 def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[float], list[float], list[float]]:
@@ -92,7 +92,7 @@ def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, fl
     own = np.repeat(run.groups, [j - i for i, j in run.members])
     t = time[rows] - time[0]
     r = displacement[rows] - run.levels[own] - run.rate * t
-    scale = 1.4826 * float(np.median(np.abs(r)))
+    scale = MAD_TO_SIGMA * float(np.median(np.abs(r)))
     count = np.bincount(own)
     u = t - (np.bincount(own, t) / count)[own]
     size = float(np.sum(u * u))
@@ -168,7 +168,9 @@ class _ChangeFit:
         """Best duration (zero for a step), and the range of durations that fit nearly as well."""
         if len(self.time) < 8 or not self.reach > 0:
             return 0.0, 0.0, 0.0
-        grid = np.concatenate([[0.0], np.geomspace(0.2 * self.spacing, self.reach, 60)])
+        grid = np.concatenate(
+            [[0.0], np.geomspace(0.2 * self.spacing, self.reach, 60)]
+        )  # 60 durations suffice to bracket the best
         misfits = np.array([self._misfit(d) for d in grid]) / self.inflation
         best = max(int(np.argmin(misfits)), 1)
         low, high = float(grid[best - 1]), float(grid[min(best + 1, len(grid) - 1)])
@@ -181,7 +183,7 @@ class _ChangeFit:
             return 0.0, 0.0, float(grid[beyond - 1]) if beyond else float(grid[-1])
         near = np.flatnonzero(misfits <= least + OUTLIER)
         ends = (grid[near[0]], grid[near[-1]]) if len(near) else (low, high)
-        return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)
+        return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)  # for safety
 
     def _misfit(self, duration: float, rows: Array | slice = slice(None)) -> float:
         """Chi squared of a ramp between the two lines, robust against glitches."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import reversed_column, run_at_start
-from steadyslip.experiments.numerics.splitting import displacement_noise, split
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, split
 
 RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
 LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
@@ -223,7 +223,7 @@ def _segmented(pieces: _Pieces) -> list[list[int]]:
     own[-1] = int(np.argmin(total[-1]))
     for k in range(count - 1, 0, -1):
         own[k - 1] = origin[k, own[k]]
-    inside = cost[everyone, own] < price * (1 - 1e-9)
+    inside = cost[everyone, own] < price * (1 - 1e-9)  # beyond rounding
     inside |= everyone == own
     found: list[list[int]] = []
     for k in range(count):
@@ -264,10 +264,11 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
     slope, error = float(pieces.slope[longest]), float(pieces.slope_error[longest])
     like = RATE_SIGMAS * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
     main = inner[np.abs(pieces.slope[inner] - slope) <= like]
-    lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))
+    lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))  # not back again
     whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= (
         RELIABLE if gap is not None else FEWEST
     )
+    # at rest within its error, which must be small beside the rate
     still = abs(slope) < 0.02 * abs(rate) + RATE_SIGMAS * error and RATE_SIGMAS * error < 0.05 * abs(rate)
     far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
     long = (gap is None or gap > SLIP * pieces.span) and far
@@ -382,7 +383,7 @@ def _robust_line(
         rate = float(np.sum(weight * u * (x - mean_x[own]))) / size
         levels = mean_x - rate * mean_t
         r = x - levels[own] - rate * t
-        scale = 1.4826 * float(np.median(np.abs(r)))
+        scale = MAD_TO_SIGMA * float(np.median(np.abs(r)))
         if not scale > 0:
             break
         weight = 1.0 / (1.0 + (r / (2 * scale)) ** 2)

@@ -194,7 +194,7 @@ def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tu
 
 def _local_median(spacing: Array) -> Array:
     """Median spacing in blocks of 51 intervals, so that a change of sampling rate is not a series of gaps."""
-    block = 51
+    block = 51  # intervals; chosen by trial
     if len(spacing) < 2 * block:
         return np.full(len(spacing), np.median(spacing))
     count = len(spacing) // block

@@ -11,14 +11,7 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import Problem, QuantityError, unknown_name
 from steadyslip.core.quantities import described, example
 
-ROLES = {
-    "time": "s",
-    "displacement": "m",
-    "velocity": "m/s",
-    "friction": "1",
-    "shear": "Pa",
-    "normal": "Pa",
-}
+ROLES = {"time": "s", "displacement": "m", "velocity": "m/s", "friction": "1", "shear": "Pa", "normal": "Pa"}
 """Roles of columns, with SI units; displacement and velocity are those of the load point."""
 
 MOST_LISTED = 40  # names in a message; more would not be read

@@ -353,8 +353,10 @@ def _samples_wanted(record: Record, count: int) -> Array:
     moments = [time[0], *(step.time for step in record.steps if step.kind != "normal-stress oscillation")]
     for i, moment in enumerate(moments):
         after = time >= moment - 2 * usual
-        share = 0.3 if i == 0 and len(moments) > 1 else 1.0
-        weight += share * np.where(after, 1.0 / (np.maximum(time - moment, 0.0) + 5 * usual), 0.0) / 8.0
+        share = 0.3 if i == 0 and len(moments) > 1 else 1.0  # the run-in before the first change matters less
+        weight += (
+            share * np.where(after, 1.0 / (np.maximum(time - moment, 0.0) + 5 * usual), 0.0) / 8.0
+        )  # about ln(duration / 5 spacings): weighs each change like the whole record
     share = weight * np.gradient(time)
     if count >= n:
         return np.ones(n)

@@ -7,6 +7,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 EVIDENCE = 60.0  # how much the squared misfit must fall, in units of the noise variance
+MAD_TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 FEWEST = 4  # samples between changes
 RESOLUTION = 1e-7  # of the whole range: noise of columns without any
 MOST = 500  # ranges
@@ -16,7 +17,7 @@ STAIRS = 0.2  # share of samples between which a column starts or stops to chang
 
 def spread(values: Array) -> float:
     """Standard deviation from the median, which steps do not disturb."""
-    return float(1.4826 * np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+    return float(MAD_TO_SIGMA * np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
 def line(time: Array, values: Array) -> tuple[float, float]:

@@ -27,6 +27,7 @@ _VALUE = re.compile(
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*")
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _STEP = 1e-6  # relative change of the first number, others multiples: small, to stay valid, yet beyond rounding
+_ZERO_STEP = 1e-9  # change of a number that is 0, in its unit
 _SENTINEL = 1.2345678901e-211  # first of the placeholder values of omitted parameters; no rig has such numbers
 
 
@@ -204,14 +205,16 @@ def _slots_by_name(text: str, rig: Slider | Machine, slots: list[Slot], names: I
 
 def _changed_number(slot: Slot, n: int) -> float:
     number = float(slot.number.replace("_", ""))
-    return number * (1 - _STEP * (n + 1)) if number else 1e-9 * (n + 1)
+    return number * (1 - _STEP * (n + 1)) if number else _ZERO_STEP * (n + 1)
 
 
 def _matches(slot: Slot, n: int, old: float, new: float, area: float | None) -> bool:
     if old:
         return abs((1 - new / old) / _STEP - (n + 1)) < 1e-3
     sizes = [slot.size, slot.size / area if area else slot.size]
-    return not float(slot.number.replace("_", "")) and any(abs(new / (1e-9 * size) - (n + 1)) < 1e-3 for size in sizes)
+    return not float(slot.number.replace("_", "")) and any(
+        abs(new / (_ZERO_STEP * size) - (n + 1)) < 1e-3 for size in sizes
+    )
 
 
 def _read(text: str, changes: list[tuple[Slot, float]]) -> Slider | Machine | None:

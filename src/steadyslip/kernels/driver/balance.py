@@ -9,6 +9,8 @@ from steadyslip.kernels.layout import Array, Layout, Routines, call
 
 FIRST_REACH = 0.01  # first step of a bracket over the natural size of w; by trial: larger ones may skip a root
 ROUNDS = 300  # sweeps over coupled balances before giving up; chosen by trial
+MOST_TRIALS = 200  # of a bracket and of its root: doubling reaches 1e58 scales, halving the last bit after some 60
+SETTLED = 1e-14  # relative change of the unknowns in a sweep, some tens of roundings, that counts as converged
 NEWTON_STEPS = 50  # most Newton steps for all balances; the steps at least halve, so that 37 lead from 1 to ROUNDED
 ROUNDED = 1e-11  # relative change of an unknown that rounding of the balances may cause: below it, converged
 
@@ -30,7 +32,7 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
             if not math.isfinite(w):
                 return False
             moved = max(moved, abs(w - near) / (R[scale_at(layout, k)] + abs(w)))
-        if moved <= 1e-14 or layout.massless == 1 or solve_together(R, layout, routines, y):
+        if moved <= SETTLED or layout.massless == 1 or solve_together(R, layout, routines, y):
             return True
     return False
 
@@ -79,7 +81,7 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
     step = FIRST_REACH * scale if value < 0.0 else -FIRST_REACH * scale
     low = high = w
     found = False
-    for _ in range(200):
+    for _ in range(MOST_TRIALS):
         trial = w + step
         R[place] = trial
         call(routines.balance, R, 0.0, y)
@@ -93,12 +95,12 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
             step = 2.0 * step
         else:
             step = 0.25 * step
-            if abs(step) < 1e-12 * (1.0 + abs(w)):
+            if abs(step) < 1e-12 * (1.0 + abs(w)):  # the balance is finite nowhere near
                 break
     if not found:
         return math.nan
     w = 0.5 * (low + high)
-    for _ in range(200):
+    for _ in range(MOST_TRIALS):
         R[place] = w
         call(routines.balance, R, 0.0, y)
         value, slope = y[k], y[own]
@@ -111,7 +113,7 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
         trial = w - value / slope if slope > 0.0 else math.nan
         if not (low < trial < high):
             trial = 0.5 * (low + high)
-        if trial == w or high - low <= 4e-16 * abs(trial):
+        if trial == w or high - low <= 4e-16 * abs(trial):  # two roundings
             w = trial
             break
         w = trial

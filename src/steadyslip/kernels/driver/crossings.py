@@ -15,6 +15,9 @@ from steadyslip.kernels.driver.places import (
 from steadyslip.kernels.driver.slip import begin_slip_event, record_event, track_slowest
 from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
 
+MOST_BISECTIONS = 100  # of regula falsi, which needs about ten; halving alone would need 44
+LOCATED = 1e-13  # share of a step to which an event is located, some hundred roundings
+
 
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
     """Value of an event function at the fraction theta of the last step, with sign: positive before the event."""
@@ -33,7 +36,7 @@ def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -
     if not at_high <= 0.0:
         return 1.0
     side = 0
-    for _ in range(100):
+    for _ in range(MOST_BISECTIONS):
         theta = high - at_high * (high - low) / (at_high - at_low)
         if not (low < theta < high):
             theta = 0.5 * (low + high)
@@ -48,7 +51,7 @@ def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -
             if side == -1:
                 at_low = 0.5 * at_low
             side = -1
-        if high - low < 1e-13 or value == 0.0:
+        if high - low < LOCATED or value == 0.0:
             break
     return high
 

@@ -239,6 +239,6 @@ def serve_lane(
     cursor[Cursor.BUSY] -= 1
     for i in range(layout.rows):
         R[i] = 0.0
-    R[Row.RTOL] = 1.0
+    R[Row.RTOL] = 1.0  # an idle lane takes steps with the others: these keep its numbers finite
     R[Row.H] = 1e-3
     R[Row.END] = 1e300

@@ -9,6 +9,8 @@ from steadyslip.kernels.driver.places import output_size
 from steadyslip.kernels.driver.samples import BETWEEN
 from steadyslip.kernels.layout import GROUP, Array, Cursor, Layout, Routines, Row, Setting, call
 
+LOGGED_AT_ONCE = 16  # rows of the log per lane and contact that one service may need: two for each kind of event
+
 
 def flagged(S: Array, lanes: int) -> int:
     """Number of lanes whose flag is raised."""
@@ -61,9 +63,9 @@ def advance(
             watch(layout, routines, S, y)
             attention = flagged(S, lanes)
         if attention > 0:
-            if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes * layout.contacts > log.shape[0]) or (
-                recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + (4 + BETWEEN) * lanes > recorded.shape[0]
-            ):
+            if (
+                log.shape[0] > 0 and cursor[Cursor.LOGGED] + LOGGED_AT_ONCE * lanes * layout.contacts > log.shape[0]
+            ) or (recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + (4 + BETWEEN) * lanes > recorded.shape[0]):
                 cursor[Cursor.PAUSED] = 1
                 return 1
             for lane in range(lanes):

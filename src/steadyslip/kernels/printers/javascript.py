@@ -66,6 +66,7 @@ def literal(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "(-Infinity)"
+    # integers below 1e15 are exact and shorter without decimal point
     short = int(value) if abs(value) < 1e15 and value == int(value) and math.copysign(1, value) > 0 else value
     return repr(short) if math.copysign(1, value) > 0 else f"({short!r})"
 

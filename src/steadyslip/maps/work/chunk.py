@@ -122,8 +122,8 @@ def reuse_memory() -> None:
         return
     with suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
-        library.mallopt(_TRIM_THRESHOLD, 2**28)
-        library.mallopt(_MMAP_THRESHOLD, 2**25)
+        library.mallopt(_TRIM_THRESHOLD, 2**28)  # bytes: far more than the arrays of a chunk
+        library.mallopt(_MMAP_THRESHOLD, 2**25)  # bytes: the largest that the library accepts
 
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD of malloc.h

@@ -112,7 +112,7 @@ def _note_differences(store: Store, plan: Map) -> None:
 def _check_space(store: Store) -> None:
     """Raise an error if the disk is full; the size of a whole map is unknown before it is compressed."""
     free = shutil.disk_usage(store.path).free
-    if free < 2**16:
+    if free < 2**16:  # less than the smallest files of a map
         raise NotAvailable(f"cannot write {str(store.path)!r}: the disk is full")
 
 

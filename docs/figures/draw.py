@@ -1,0 +1,232 @@
+"""Draws the figures of pages from what the program computes: ``python docs/figures/draw.py [NAME...]``.
+
+One function for each figure, which returns its Axes. Figures are 85 mm wide, a column of a journal, and told apart by
+dashes and marks, so that grey will do. An SVG carries the numbers that it was drawn from, which the tests compute anew.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+import steadyslip as ss
+from steadyslip.figures.style import BLACK, BLUE, GREY, VERMILION
+from steadyslip.units import GPa, MPa, m, mm, s, um
+
+WIDTH, FONT = 85 / 25.4, 7.0  # inches, points
+STYLE = {
+    "font.size": FONT, "axes.labelsize": FONT, "xtick.labelsize": FONT, "ytick.labelsize": FONT, "legend.fontsize": 6.5,
+    "legend.frameon": False, "legend.handlelength": 2.6, "lines.linewidth": 1.0, "lines.markersize": 3.5,
+    "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6, "svg.hashsalt": "steadyslip",
+    "svg.fonttype": "path",
+}  # fmt: skip
+
+
+def panels(*heights):
+    """Axes one above the other, of heights in mm."""
+    figure = Figure(figsize=(WIDTH, sum(heights) / 25.4), layout="constrained")
+    return np.atleast_1d(figure.subplots(len(heights), 1, height_ratios=heights))
+
+
+# --- slow slip ---------------------------------------------------------------------------------------
+
+KAPPAS = (0.70, 0.75, 0.78, 0.82, 0.86, 0.89, 0.93, 0.97)
+MEASURED = {0.89: 0.080, 0.78: 1.42, 0.75: 2.60}  # κ: mm/s; Leeman et al. 2016, published peak velocities, rounded
+
+
+def fault(evolution, mass=500, **cutoffs):
+    """The rig of the page on slow slip."""
+    rock = ss.RateState(a=0.006, b=0.010, d_c=8 * um, mu_ref=0.6, v_ref=10 * um / s, evolution=evolution, **cutoffs)
+    face, drive = ss.Constant(preload=10 * MPa), ss.Steady(10 * um / s)
+    return ss.Slider(friction=rock, contact=face, stiffness=1 * GPa / m, mass=mass, drive=drive)
+
+
+def peaks(rig):
+    """Peak velocities (mm/s) over `KAPPAS`, after the motion has settled."""
+    kick = [ss.VelocityStep(at=0.1, to=10.5 * um / s), ss.VelocityStep(at=0.2, to=10 * um / s)]
+    found = []
+    for kappa in KAPPAS:
+        softer = rig.with_values({"stiffness": kappa * ss.critical_stiffness(rig)})
+        run = ss.simulate(softer, kick, until=1500 * s)
+        found.append(np.max(run["v"][run["t"] > 1000]) / (mm / s))
+    return found
+
+
+def slow_slip():
+    (ax,) = panels(62)
+    rows = (
+        (fault(ss.Aging()), "a, b constant", "-", "o"),
+        (fault(ss.Aging(), mass=5e6), "the same, $10^4$ times the mass", ":", "^"),
+        (fault(ss.Aging(), b_cutoff_velocity=1000 * um / s), "$v_b$ = 1000 µm/s, aging", "--", "s"),
+        (fault(ss.Slip(), b_cutoff_velocity=300 * um / s), "$v_b$ = 300 µm/s, slip", "-.", "D"),
+    )
+    for rig, label, line, mark in rows:
+        ax.plot(KAPPAS, peaks(rig), line, marker=mark, color=BLACK, markerfacecolor="white", label=label)
+    ax.plot([*MEASURED], [*MEASURED.values()], "*", color=VERMILION, markersize=8, label="measured")
+    ax.set(yscale="log", ylim=(0.03, 2e5), xlabel="κ = k/k$_{cr}$", ylabel="peak velocity (mm/s)")
+    ax.legend(loc="upper right")
+    return [ax]
+
+
+# --- a step of normal stress -------------------------------------------------------------------------
+
+
+def bench(memory):
+    """A rock between faces that are driven so stiffly that it slides at a given velocity."""
+    rock = ss.RateState(a=0.010, b=0.015, d_c=5 * um, mu_ref=0.6, v_ref=1 * um / s, normal_memory=memory)
+    face, drive = ss.Constant(preload=5 * MPa), ss.Steady(1 * um / s)
+    return ss.Slider(friction=rock, contact=face, stiffness=1e6 * GPa / m, drive=drive)
+
+
+STEP = 5.5 * MPa
+MEMORIES = (
+    (ss.NoMemory(), "no memory", "-"),
+    (ss.LinkerDieterich(alpha=0.2), "α = 0.2", "--"),
+    (ss.LinkerDieterich(alpha=0.56), "α = 0.56", "-."),
+    (ss.PrakashClifton(slip_distance=1 * um), "Prakash-Clifton, 1 µm", ":"),
+)
+
+
+def normal_stress_steps():
+    above, below = panels(46, 44)
+    times = np.concatenate([[0.0, 0.999], 1 + np.geomspace(1e-5, 25, 60)])
+    for (memory, label, line), colour in zip(MEMORIES, (GREY, BLACK, VERMILION, BLUE), strict=True):
+        run = ss.simulate(bench(memory), ss.NormalStressStep(at=1, by=STEP - 5 * MPa), until=27, times=times)
+        above.plot(run["slip"] / um - 1, run["shear_stress"] / MPa, line, color=colour, label=label)
+    above.set(xlabel="slip since the step (µm)", ylabel="shear stress (MPa)", xlim=(-1, 20))
+    above.legend(loc="lower right")
+    ratios = np.array([0.5, 0.7, 0.9, 1.1, 1.4, 2.0])
+    for mark, alpha, colour, line in (("o", 0.2, BLACK, "--"), ("s", 0.56, VERMILION, "-.")):
+        rig, drops = bench(ss.LinkerDieterich(alpha=alpha)), []
+        for ratio in ratios:
+            step = ss.NormalStressStep(at=1, by=(ratio - 1) * 5 * MPa)
+            run = ss.simulate(rig, step, until=1.02, times=[1.01])  # 0.01 µm later, when the drive has taken it up
+            drops.append(run["friction"][0] - 0.6)
+        below.plot(ratios, -alpha * np.log(ratios), line, color=colour, label=f"$-$α ln(σ$_2$/σ$_1$), α = {alpha}")
+        below.plot(ratios, drops, mark, color=colour, markerfacecolor="white")
+    below.set(xscale="log", xlabel="σ$_2$/σ$_1$", ylabel="change of friction at once")
+    below.set_xticks([0.5, 0.7, 1, 1.4, 2], ["0.5", "0.7", "1", "1.4", "2"])
+    below.minorticks_off()
+    below.legend(loc="upper right")
+    return [above, below]
+
+
+# --- an oscillating normal stress --------------------------------------------------------------------
+
+
+def creeping():
+    """The velocity-strengthening rig of the page on oscillation."""
+    memory = ss.LinkerDieterich(alpha=0.2)
+    rock = ss.RateState(a=0.010, b=0.008, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s, normal_memory=memory)
+    face, drive = ss.Constant(preload=25 * MPa), ss.Steady(10 * um / s)
+    return ss.Slider(friction=rock, contact=face, stiffness=10 * GPa / m, drive=drive)
+
+
+def near_critical():
+    """A weakening rock, 1.3 times as stiff as it has to be."""
+    rock = ss.RateState(a=0.010, b=0.015, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s)
+    face, drive = ss.Constant(preload=25 * MPa), ss.Steady(10 * um / s)
+    return ss.Slider(friction=rock, contact=face, stiffness=16.25 * GPa / m, drive=drive)
+
+
+SIZES = (1 * MPa, 3 * MPa)
+
+
+def oscillating_normal_stress():
+    gain, phase, drop, lost = panels(36, 30, 30, 36)
+    periods = np.geomspace(1, 100, 9)
+    found = ss.response(creeping(), periods, output="shear-stress", amplitudes=SIZES)
+    dense = np.geomspace(1, 100, 60)
+    small = found.transfer(dense)
+    gain.plot(dense, np.abs(small), "-", color=BLACK, label="small")
+    phase.plot(dense, np.degrees(np.angle(small)), "-", color=BLACK)
+    drop.plot(dense, np.zeros_like(dense), "-", color=BLACK)
+    for j, (mark, line, colour) in enumerate((("o", ":", BLUE), ("s", "--", VERMILION))):
+        style = {"marker": mark, "linestyle": line, "color": colour, "markerfacecolor": "white"}
+        gain.plot(periods, found.gains[j], **style, label=f"{SIZES[j] / MPa:g} MPa")
+        phase.plot(periods, found.phases[j], **style)
+        drop.plot(periods, 100 * found.shift[j] / 15e6, **style)
+    shaken = ss.response(near_critical(), periods, limits=True)
+    lost.plot(periods, shaken.linear_to / MPa, "o:", color=BLUE, markerfacecolor="white", label="linear up to")
+    lost.plot(periods, shaken.lost_at / MPa, "s-", color=BLACK, markerfacecolor="white", label="sliding lost from")
+    gain.set(yscale="log", ylabel="gain τ/σ")
+    phase.set(ylabel="phase (deg)")
+    drop.set(ylabel="mean of τ (%)")
+    lost.set(yscale="log", xlabel="period (s)", ylabel="amplitude (MPa)")
+    for one in (gain, phase, drop, lost):
+        one.set(xscale="log", xlim=(0.9, 110))
+    gain.legend(loc="lower right")
+    lost.legend(loc="upper left")
+    return [gain, phase, drop, lost]
+
+
+# --- injection ---------------------------------------------------------------------------------------
+
+
+def well():
+    """A fault with pore fluid, stable where what presses it together is less than 10 MPa."""
+    rock = ss.RateState(a=0.010, b=0.015, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s)
+    fluid = ss.PoreFluid(preload=9 * MPa, suction=0.0, drainage=1.0, slip_distance=10 * um, v_ref=10 * um / s)
+    drive = ss.Steady(10 * um / s)
+    return ss.Slider(friction=rock, contact=fluid, stiffness=5 * GPa / m, mass=1e4, drive=drive)
+
+
+PUMPED = (ss.InjectionRamp(at=50, by=-6 * MPa, duration=300), ss.InjectionRamp(at=550, by=6 * MPa, duration=300))
+
+
+def injection():
+    stiff, rate = panels(38, 38)
+    found = ss.frozen_verdicts(well(), PUMPED, until=1000)
+    some = slice(None, None, 10)
+    stiff.plot(found.t[some], found.critical_stiffness[some] / GPa, "-", color=BLACK, label="k$_{cr}$ at that moment")
+    stiff.axhline(5, color=BLUE, linestyle="--", label="k")
+    times = np.arange(0, 1000, 4.0)  # of each interval the fastest: events are shorter than that
+    fastest = np.maximum.reduceat(found.run["v"], np.searchsorted(found.run["t"], times))
+    rate.plot(times, fastest, "-", color=BLACK)
+    for one in (stiff, rate):
+        for time, _ in found.crossings:
+            one.axvline(time, color=GREY, linewidth=3, zorder=0)
+    rate.axvline(found.departure, color=VERMILION, linestyle=":")
+    stiff.set(ylabel="stiffness (GPa/m)", ylim=(4, 9))
+    rate.set(yscale="log", xlabel="time (s)", ylabel="slip rate (m/s)")
+    stiff.legend(loc="upper right")
+    return [stiff, rate]
+
+
+# --- files -------------------------------------------------------------------------------------------
+
+FIGURES = {
+    "slow-slip": slow_slip,
+    "normal-stress-steps": normal_stress_steps,
+    "oscillating-normal-stress": oscillating_normal_stress,
+    "injection": injection,
+}
+
+
+def numbers(axes):
+    """What is drawn: of each line of each Axes its values, to four digits."""
+    return [[[float(f"{y:.4g}") for y in line.get_ydata()] for line in ax.get_lines()] for ax in axes]
+
+
+def drawn(path):
+    """The same of a file."""
+    found = re.search(r"<dc:description>(.*?)</dc:description>", path.read_text(encoding="utf-8"), re.S)
+    return json.loads(found[1])
+
+
+def draw(name, folder=Path(__file__).parent):
+    """Write a figure as SVG, with its numbers, and return its Axes."""
+    with rc_context(STYLE):
+        axes = FIGURES[name]()
+        about = {"Date": None, "Creator": None, "Description": json.dumps(numbers(axes))}
+        axes[0].figure.savefig(Path(folder) / f"{name}.svg", facecolor="white", metadata=about)
+    return axes
+
+
+if __name__ == "__main__":
+    for wanted in sys.argv[1:] or FIGURES:
+        draw(wanted)

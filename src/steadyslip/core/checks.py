@@ -1,4 +1,4 @@
-"""A second, independent question behind a number of an answer, and what came of it: alike for every kind of answer."""
+"""Independent checks of the numbers in a result, for all kinds of results."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ UNDECIDED = "not decided: "
 
 @dataclass(frozen=True)
 class Check(Displayed):
-    """One number of an answer, and the second question that was asked of it.
+    """Check of one number of a result by a second, independent computation.
 
     Attributes
     ----------
     what : str
-        The number, such as ``eigenvalues`` or ``edge of friction.a at 0.0142``.
+        Number that was checked, such as ``eigenvalues`` or ``edge of friction.a at 0.0142``.
     how : str
-        What was asked.
+        Description of the second computation.
     error : float
-        What came of it, as a share of the number; inf where nothing did.
+        Relative difference of the two; inf if the second gave no result.
     allowed : float
-        Up to which the number is told.
+        Largest relative error with which the number is reported.
     passed : bool
     """
 
@@ -41,13 +41,13 @@ class Check(Displayed):
 
 
 def check(what: str, how: str, error: float, allowed: float) -> Check:
-    """A check that passes where the error is known and not larger than what is allowed."""
+    """Make a Check that passes if the error is finite and not larger than allowed."""
     error = float(error) if math.isfinite(error) else math.inf
     return Check(what, how, error, float(allowed), error <= allowed)
 
 
 def in_words(checks: Sequence[Check]) -> str:
-    """One line: what was checked, or what failed; empty without checks."""
+    """Summary in one line: numbers that passed, or failed; empty without checks."""
     failed = [one.what for one in checks if not one.passed]
     edges = sum(one.passed and one.what.startswith("edge of ") for one in checks)
     passed = [one.what for one in checks if one.passed and not one.what.startswith("edge of ")]
@@ -57,6 +57,6 @@ def in_words(checks: Sequence[Check]) -> str:
 
 
 def as_data(checks: Sequence[Check]) -> dict[str, Any]:
-    """For JSON: the line as ``checked``, and every check; errors of which nothing is known are None."""
+    """Checks as a dict for JSON: the summary as ``checked``, and every check; unknown errors are None."""
     listed = [asdict(one) | {"error": one.error if math.isfinite(one.error) else None} for one in checks]
     return {"checked": in_words(checks), "checks": listed}

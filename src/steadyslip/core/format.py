@@ -55,12 +55,13 @@ def _best(value: float, names: tuple[str, ...]) -> str | None:
 
 _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
+_SHORTEST, _LONGEST = 1e-3, 1e5  # numbers between are written without exponent; others in the SI unit without prefix
 
 
 def _few(value: float, digits: int) -> str:
     """Format a number with a few digits, without an exponent below 1e5."""
     text = f"{value:.{digits}g}"
-    return f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < 1e5 else text
+    return f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < _LONGEST else text
 
 
 def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
@@ -80,13 +81,13 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     names = _own.get().get(unit(si_unit)[1], ())
     own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
-    if own is not None and (value == 0 or scaled is None or 1e-3 <= abs(value / unit(own)[0]) < 1e5):
+    if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < _LONGEST):
         return f"{_few(value / unit(own)[0], digits)} {own}"
     if si_unit == "rad":
         return f"{_few(value / units.deg, digits)} deg"
     if si_unit == "m/rad":
         value, si_unit = value * 2 * math.pi, "m/rev"
-    if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:
+    if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:  # shorter times than 10 min in s
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
                 return f"{_few(value / size, digits)} {name}"
@@ -95,9 +96,10 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     size = abs(value)
     for factor, prefix in _SHOWN_PREFIXES:
         long = prefix == "T" and size < 1e14  # G is kept up to 1e14: faults are customarily given in GN, GN/m
+        # 0.9999: values that four digits round up to the next prefix take it; lengths and times have no large prefixes
         if size >= 0.9999 * factor and not long and (prefix not in ("T", "G", "M", "k") or scaled[0] in ("Pa", "N")):
             break
-    if not 1e-3 <= size / factor < 1e5:
+    if not _SHORTEST <= size / factor < _LONGEST:
         return f"{_few(value, digits)} {si_unit}"
     return f"{_few(value / factor, digits)} {prefix}{si_unit}"
 

@@ -17,7 +17,7 @@ from steadyslip.core.entries import Names, Option, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem, one
 from steadyslip.core.roles import Role, fault
 
-LARGEST = 1.7e308  # integers may be larger than any float
+LARGEST = 1.7e308  # just below the largest float; Python integers may be larger
 MOST = 1e150  # its square is finite
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -49,7 +49,7 @@ class Letters:
         """Make a symbol and give it a letter: `letter`, or else an unused one made from the user's dotted name."""
         found = inner_symbol(name, **assumptions)
         if found in self.known:
-            raise InternalError("a symbol stands for one thing")
+            raise InternalError("every symbol to be made once only")
         self.known[found] = letter or self.unused(dotted)
         return found
 

@@ -31,7 +31,7 @@ def digest(folder: Path) -> str:
         if b"\r" in content:
             content = content.replace(b"\r\n", b"\n")
         found.update(f"{name}\n{len(content)}\n".encode() + content)
-    return found.hexdigest()[:8]
+    return found.hexdigest()[:8]  # 32 bits tell versions apart
 
 
 def _files(folder: str, above: str) -> list[str]:

@@ -16,16 +16,16 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
     for name, link in links.items():
         ends = link.get("between")
         for end in ends if isinstance(ends, list) else ():
-            yield from _unknown(f"links.{name}.between", end, [*bodies, GROUND, LOAD_POINT])
+            yield from unknown_body(f"links.{name}.between", end, [*bodies, GROUND, LOAD_POINT])
     for name, surface in contacts.items():
-        yield from _unknown(f"contacts.{name}.body", surface.get("body"), [*bodies, LOAD_POINT])
-        yield from _unknown(f"contacts.{name}.against", surface.get("against"), [*bodies, GROUND, LOAD_POINT])
+        yield from unknown_body(f"contacts.{name}.body", surface.get("body"), [*bodies, LOAD_POINT])
+        yield from unknown_body(f"contacts.{name}.against", surface.get("against"), [*bodies, GROUND, LOAD_POINT])
         if isinstance(by := surface.get("loaded_by"), str) and by not in links:
             yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", by, links))
     drive = tables.get("drive")
     driven = drive if isinstance(drive, dict) else {}
     for key in ("body", "measured", "speed_measured"):
-        yield from _unknown(f"drive.{key}", driven.get(key), list(bodies))
+        yield from unknown_body(f"drive.{key}", driven.get(key), list(bodies))
     named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
     named += [surface.get(key) for surface in contacts.values() for key in ("body", "against")]
     lost = list(unreferenced_bodies(bodies, [*named, driven.get("body")]))
@@ -67,6 +67,7 @@ def _tables(raw: Any) -> dict[str, dict[str, Any]]:
     return {key: one for key, one in raw.items() if isinstance(one, dict)} if isinstance(raw, dict) else {}
 
 
-def _unknown(where: str, name: Any, known: list[str]) -> Iterator[Problem]:
+def unknown_body(where: str, name: Any, known: list[str]) -> Iterator[Problem]:
+    """Yield a Problem if a name is not that of a known body; values of other types are ignored."""
     if isinstance(name, str) and name not in known:
         yield Problem(where, unknown_name("body", name, known))

@@ -14,7 +14,7 @@ from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part
 from steadyslip.machine.bodies import Body
-from steadyslip.machine.ends import floating_body, unreferenced_bodies
+from steadyslip.machine.ends import floating_body, unknown_body, unreferenced_bodies
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
     GROUND,
@@ -77,9 +77,7 @@ class Machine(Rig):
                 yield Problem(kind, f"there are none; a machine has one or more, [{kind}.NAME]")
 
     def _end(self, where: str, name: str, allowed: tuple[str, ...] = (GROUND, LOAD_POINT)) -> Iterator[Problem]:
-        known = [*self.bodies, *allowed]
-        if name not in known:
-            yield Problem(where, unknown_name("body", name, known))
+        return unknown_body(where, name, [*self.bodies, *allowed])
 
     def _end_problems(self) -> Iterator[Problem]:
         """Yield Problems with ends of links, contacts and drive: unknown bodies, or the wrong kind of motion."""

@@ -101,7 +101,7 @@ def machine_determinant(model: Model, rows: Rows) -> Polynomial:
     kept = [*core, *(block.own[-1] for block in blocks)]
     table = list(rows.items())
     if any(row[j] for i, (_, row) in enumerate(table) for j in inside.difference(kept) if i not in inside):
-        raise InternalError("memory of friction acts by way of friction only")
+        raise InternalError("memory variables to act on other equations through friction only")
     placeholders = Placeholders()
     forces = {one.velocity for one in model.coordinates}
     matrix = []

@@ -75,7 +75,7 @@ def _polynomial(point: OperatingPoint, late: Delays) -> Array:
 def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
     """Eigenvalues of the state matrix in any order, (..., n)."""
     blocks = blocks_of(point, (), (), late)
-    rate_x, rate_z, balance_x, balance_z = (blocks[i] for i in (0, 2, 6, 8))
+    rate_x, rate_z, balance_x, balance_z = (blocks[i] for i in (0, 2, 6, 8))  # in the order of `Descriptor`
     good = np.all([np.all(np.isfinite(one), axis=(-2, -1)) for one in (rate_x, rate_z, balance_x, balance_z)], axis=0)
     if all(one.inertial for one in point.model.coordinates):
         whole = np.where(good[..., None, None], balance_z, np.eye(balance_z.shape[-1]))

@@ -229,7 +229,8 @@ class Forces:
     @cached_property
     def drive_elements(self) -> list[Element]:
         """Elements that carry the force of the drive."""
-        return [one for one in self.mechanism.elements if LOAD_POINT in one.senses and _is_active(one)]
+        carrying = [one for one in self.mechanism.elements if one.stiffness != 0 or one.damping != 0]
+        return [one for one in carrying if LOAD_POINT in one.senses]
 
     def _drive_motion_force(self, displacement: Mapping[str, Any], speed: Mapping[str, Any], integral: Any) -> sp.Expr:
         """Force of the drive caused by its motion, minus that of steady sliding, including integral action."""
@@ -389,8 +390,3 @@ class Forces:
         moved = self._tension(element, self.x, self.moving) - self._tension(element, {}, self.speeds)
         held = (self.held + self.loading) / element.acts[LOAD_POINT] if element is self.drive_elements[0] else 0
         return -(1 - self.free) * moved - held
-
-
-def _is_active(element: Element) -> bool:
-    """True if an element has stiffness or damping."""
-    return not (element.stiffness == 0 and element.damping == 0)

@@ -222,5 +222,5 @@ def single_variable(variables: Iterable[VelocityVariable | None]) -> VelocityVar
     """The velocity variable of a slider's only contact."""
     (one,) = variables
     if one is None:
-        raise InternalError("a single contact has its own velocity variable")
+        raise InternalError("the only contact to have a velocity variable")
     return one

@@ -188,7 +188,7 @@ def warn_of_range(count: int, size: int) -> None:
         f"{count} of {size} rigs have no answer (NaN): their numbers leave the range of floating point; "
         "steadyslip.stability tells which"
     )
-    warnings.warn(message, OutOfRangeWarning, stacklevel=6)
+    warnings.warn(message, OutOfRangeWarning, stacklevel=6)  # the line that called the public function
 
 
 def out_of_range_error(point: OperatingPoint) -> NotAvailable:

@@ -244,7 +244,7 @@ class _Reducer:
     def _w(self, index: int) -> sp.Symbol:
         variable = self.moving.variables[index]
         if variable is None:
-            raise InternalError("a contact without a velocity variable has none")
+            raise InternalError("the contact to have a velocity variable")
         return variable.w
 
     def _speed_of(self, coordinate: Coordinate) -> sp.Symbol:

@@ -46,7 +46,7 @@ def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
     """Array function of a contact's velocity variable from its slip rate and all memory variables."""
     model, variable = reduction.model, reduction.slidings[index].variable
     if variable is None:
-        raise InternalError("a contact with a velocity variable")
+        raise InternalError("the contact to have a velocity variable")
     memory = (item.symbol for item in model.memory)
     return model.function([variable.w_of_v], model.contacts[index].velocity, *memory)
 
@@ -202,7 +202,7 @@ def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any
             residual, slope = point.evaluate(function, x, v, *current)
             change = residual / slope
         current[index] = current[index] - change
-        if not np.any(np.abs(change) > 1e-15 * (1 + np.abs(current[index]))):  # some roundings
+        if not np.any(np.abs(change) > 1e-15 * (1 + np.abs(current[index]))):  # four roundings
             break
     return current[index]
 

@@ -27,7 +27,7 @@ from steadyslip.model.determinant import TooManyTerms, determinant
 from steadyslip.model.equations import Carried, Entries
 from steadyslip.model.placeholders import Placeholders
 
-LONGEST = 8
+MAX_TERMS = 8
 """Largest number of terms of the determinant for which the statics are solved symbolically; chosen by trial."""
 UNHELD = "nothing holds some body of this machine in its place; give every body a link"
 SymbolFactory = Callable[..., sp.Symbol]
@@ -166,7 +166,7 @@ def _solve(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr]
     matrix = [[placeholders.polynomial(derivative(sp.expand(e), u)) for u in unknowns] for e in equations]
     right = [[placeholders.polynomial(-e.xreplace(nothing))] for e in equations]
     try:
-        determinant([[{(0,): one} if one != 0 else {} for one in row] for row in matrix], LONGEST)
+        determinant([[{(0,): one} if one != 0 else {} for one in row] for row in matrix], MAX_TERMS)
     except TooManyTerms:
         return None
     symbols = sorted(_free_symbols(entry for row in (*matrix, *right) for entry in row), key=str)

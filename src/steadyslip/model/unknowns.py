@@ -63,7 +63,7 @@ class Unknowns:
         for k in range(len(rows)):
             pivot = next((i for i in range(k, len(rows)) if rows[i][1][k] != 0), None)
             if pivot is None:
-                raise InternalError("equations that fix their unknowns")
+                raise InternalError("equations with a regular Jacobian")
             rows[k], rows[pivot] = rows[pivot], rows[k]
             above, own = rows[k]
             for i in range(k + 1, len(rows)):

@@ -126,7 +126,7 @@ class RateState(FrictionLaw, name="rate-state"):
         """b and d_c of the one state, or the first."""
         b, d_c = (self.states[0].b, self.states[0].d_c) if self.states else (self.b, self.d_c)
         if b is None or d_c is None:
-            raise InternalError("b and d_c of a state")
+            raise InternalError("b and d_c, or states, to be given")
         return b, d_c
 
     def _with_one_state(self, evolution: Evolution) -> RateState:
@@ -135,7 +135,7 @@ class RateState(FrictionLaw, name="rate-state"):
 
     def _with_two_states(self) -> RateState:
         b, d_c = self._one_state()
-        pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))
+        pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))  # starting values of a fit; by trial
         return replace(self, states=pair, b=None, d_c=None)
 
     def _remembering(self, memory: NormalMemory) -> RateState:

@@ -1,6 +1,6 @@
 """Random machines of two bodies with unlike laws, whose cycles may double their period below the edge.
 
-``python tests/helpers/doubled_machines.py COUNT SEED`` does many by hand.
+``python tests/helpers/doubled_machines.py COUNT SEED`` does many by hand, with ``otherwise`` behind of other laws.
 """
 
 import sys
@@ -26,9 +26,36 @@ def drawn(random):
     stiff = second.bristle_stiffness * loads[1] * 10 ** random.uniform(-1, 0.3, size=2) * (1.0, 4.0)
     mass = stiff[0] * (bend / v) ** 2 * 10 ** random.uniform(-2.5, -0.5, size=2)
     damping = 10 ** random.uniform(-2.5, -1.3, size=2) * np.sqrt(stiff * mass.min())
+    return chain(v, (first, second), loads, stiff, mass, damping)
+
+
+def drawn_otherwise(random):
+    """Such a chain of another pair: bristles first, or two states before bristles or before rate-and-state friction."""
+    v, kind = 10 ** random.uniform(-4, -2), int(random.integers(3))
+    loads = 10 ** random.uniform(0.5, 2, size=2)
+    if kind == 0:
+        first, second = lugre(random, v), rate_state(random, v)
+        length = first.mu_static / first.bristle_stiffness
+        stiff = first.bristle_stiffness * loads[0] * 10 ** random.uniform(-1, 0.3, size=2) * (1.0, 4.0)
+    else:
+        a, length = random.uniform(0.005, 0.02), 10 ** random.uniform(-6, -5)
+        b = a * random.uniform(1.0, 2.0), a * random.uniform(0.3, 1.0)
+        d_c = length, length * 10 ** random.uniform(0.5, 2)
+        states = tuple(ss.State(b=one, d_c=d) for one, d in zip(b, d_c, strict=True))
+        first = ss.RateState(a=a, mu_ref=0.6, v_ref=v, evolution=ss.Slip(), states=states)
+        stiff = (sum(b) - a) * loads[0] / np.sqrt(d_c[0] * d_c[1]) * 10 ** random.uniform(-0.3, 1, size=2)
+        second = lugre(random, v) if kind == 1 else one_state(random, v, a, length)
+        loads[1] = loads[0] * 10 ** random.uniform(-1, 0.3)
+    mass = stiff[0] * (length / v) ** 2 * 10 ** random.uniform(-2.5, -0.5, size=2)
+    damping = 10 ** random.uniform(-2.5, -1.3, size=2) * np.sqrt(stiff * mass.min())
+    return chain(v, (first, second), loads, stiff, mass, damping)
+
+
+def chain(v, laws, loads, stiff, mass, damping):
+    """The machine of two bodies p and q, in this order behind the drive."""
     contacts = {
         name: ss.Surface(body=body, friction=law, contact=ss.Constant(preload=load))
-        for name, body, law, load in zip(("cp", "cq"), "pq", (first, second), loads, strict=True)
+        for name, body, law, load in zip(("cp", "cq"), "pq", laws, loads, strict=True)
     }
     links = {
         name: ss.Spring(between=ends, stiffness=k, damping=c)
@@ -36,6 +63,18 @@ def drawn(random):
     }
     bodies = {name: ss.SlidingBody(mass=m) for name, m in zip("pq", mass, strict=True)}
     return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.Pull(velocity=v))
+
+
+def one_state(random, v, a, d_c):
+    """Rate-and-state friction with healing at rest."""
+    own = {
+        "a": a * random.uniform(0.7, 2),
+        "b": a * random.uniform(0.3, 2),
+        "d_c": d_c * 10 ** random.uniform(-0.5, 1.5),
+    }
+    mu_ref = random.uniform(0.4, 0.7)
+    evolution = (ss.Aging(), ss.PRZ())[int(random.integers(2))]
+    return ss.RateState(**own, mu_ref=mu_ref, v_ref=v, evolution=evolution)
 
 
 def rate_state(random, v):
@@ -117,20 +156,25 @@ def places(branch, many):
 
 
 def judged(branch, value):
-    """Cycles at a value, the stable ones, and whether one has about twice the period of an unstable one beside it."""
+    """What `at` says at a value; its stable cycles, and whether one of them all is of twice the period."""
     found = branch.at(value)
-    stable = [cycle for cycle in found if cycle.stable]
-    base = [cycle.period for cycle in found if not cycle.stable]
-    twice = any(1.6 < one.period / period < 2.4 for one in found for period in base)
-    return found, stable, twice
+    return found, [cycle for cycle in found if cycle.stable], 2 in found.multiples
 
 
-def main(count, seed, many=7):
+def folds_without_multiplier_one(branch):
+    """Folds, of a branch and its doublings, at which no multiplier is 1 to a thousandth: there is none."""
+    return [
+        one.cycle.value for level in (branch, branch.doubled) for one in level.special
+        if one.kind == "fold" and min(abs(m - 1) for m in one.cycle.multipliers) > 1e-3
+    ]  # fmt: skip
+
+
+def main(count, seed, otherwise="", many=7):
     """Machines with doublings, until there are so many."""
     number = {"places": 0, "twice": 0, "other": 0, "in words": 0, "silent": 0, "machines": 0}
     while number["machines"] < count:
         seed += 1
-        machine = drawn(np.random.default_rng(seed))
+        machine = (drawn_otherwise if otherwise else drawn)(np.random.default_rng(seed))
         try:
             onset = ss.hopf(machine, ALONG)
             low, high = (0.4, 1.05) if onset.stable == "above" else (0.95, 2.5)
@@ -148,13 +192,15 @@ def main(count, seed, many=7):
             number["places"] += 1
             told += [] if twice else [f"    {value / onset.value:.4f} {line}" for line in str(found).splitlines()]
             at = machine.with_values({ALONG: value})
-            worst = max([worst, *(closing(at, cycle) for cycle in stable)])
+            worst = max([worst, *(closing(at, cycle) for cycle in stable if not otherwise)])
         flips = [one.cycle.value / onset.value for one in branch.special if one.kind == "period doubling"]
         ends = [[end.kind for end in pair] for pair in branch.doubled.bounds]
         words = *branch.doubled.broken, branch.doubled.end
-        print(seed, np.round(flips, 4), ends, *words, f"closing {worst:.1g}")
+        print(
+            seed, np.round(flips, 4), ends, *words, f"closing {worst:.1g}", folds_without_multiplier_one(branch) or ""
+        )
         print("\n".join([*told, f"    {number}"]), flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    main(int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:])

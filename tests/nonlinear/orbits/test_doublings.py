@@ -7,11 +7,15 @@ import pytest
 
 import steadyslip as ss
 from dimensionless import two_states
-from doubled_machines import ALONG, closing, drawn, judged, places
+from doubled_machines import ALONG, closing, drawn, drawn_otherwise, judged, places
 from steadyslip.core.checks import in_words
+from steadyslip.nonlinear.continuation import turned_round
 from steadyslip.nonlinear.orbits import tracer
 from steadyslip.nonlinear.orbits.cycle import End
+from steadyslip.nonlinear.orbits.doublings import doubled_sheets
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
+from steadyslip.nonlinear.orbits.search import seed_at
+from steadyslip.nonlinear.orbits.values import tracer_of
 
 
 @dataclass
@@ -84,7 +88,10 @@ def test_ranges_of_stability_end_where_multipliers_leave_the_unit_circle(doublin
 def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling):
     """Twice the period beside the doubling, by the branch and by a motion from beside the unstable cycle alone."""
     value = 0.862 * doubling.onset.value
-    once, twice = doubling.at(value)
+    seen = doubling.at(value)
+    (once, twice), multiples = seen, seen.multiples
+    assert multiples == (1, 2)
+    assert ", of those of 2 times the period; checked: " in str(seen).splitlines()[1]
     assert (once.stable, twice.stable) == (False, True)
     assert twice.period == pytest.approx(2 * once.period, rel=0.01)
     found = replace(doubling, doubled=None).at(value)
@@ -161,3 +168,65 @@ def test_special_cycles_that_fall_inside_one_step_are_found(monkeypatch):
     assert len({point.index for point in branch.special}) == 2  # with a cycle between the two
     assert found[1] == pytest.approx(found[0], rel=1e-7)
     assert len(found[0]) == 2
+
+
+@pytest.mark.campaign
+def test_doubled_cycles_are_followed_through_reversals_of_slip():
+    """To the end of the range, by multipliers that stay exact; the last closes by SciPy, equations typed by hand."""
+    machine = drawn(np.random.default_rng(386))
+    edge = ss.hopf(machine, ALONG).value
+    branch = ss.cycles(machine, ALONG, between=(0.4 * edge, 1.05 * edge))
+    ((begin, end),) = branch.doubled.bounds
+    assert (begin.kind, end.kind) == ("period doubling", "range")
+    last = branch.doubled.cycles[-1]
+    assert last.lowest_velocity < 0
+    assert last.multiplier_error < 1e-6
+    assert closing(machine.with_values({ALONG: last.value}), last) < 1e-5  # deviations grow 18-fold in a period
+
+
+@pytest.mark.campaign
+def test_a_branch_goes_on_where_the_beginning_of_its_cycles_disappears():
+    """They begin where slip speeds up elsewhere then: the branch does not turn back, at a fold that is none."""
+    machine = drawn_otherwise(np.random.default_rng(47))
+    onset = ss.hopf(machine, ALONG)
+    follower = tracer_of(onset, 0, None)
+    follower.limits = 0.6615 * onset.value, 0.67 * onset.value
+    first = seed_at(follower, 0.6655 * onset.value, [])
+    if first.point.tangent[-1] > 0:
+        first = replace(first, point=turned_round(first.point))
+    sheet = follower.followed(first.shooting, first, 0.02)
+    assert sheet.end.startswith("end of the range")
+    assert (np.diff([known.cycle.value for known in sheet.known]) < 0).all()
+    assert (np.diff([known.cycle.period for known in sheet.known]) > 0).all()
+    assert [one.kind for one in sheet.special] == ["period doubling"]
+
+
+@pytest.mark.campaign
+def test_each_doubling_has_a_part_of_the_work(monkeypatch):
+    """Where the sheet from the first one takes all it may, that from the other is still followed from its end."""
+    machine = drawn(np.random.default_rng(33))
+    edge = ss.hopf(machine, ALONG).value
+    branch = ss.cycles(machine, ALONG, between=(0.4 * edge, 1.05 * edge), doublings=0)
+    flips = [point.cycle for point in branch.special if point.kind == "period doubling"]
+    monkeypatch.setattr(tracer, "MOST_STEPS", 120_000)
+    sheets = doubled_sheets(tracer_of(branch.onset, 0, None), flips)
+    assert [sheet.bounds[0].value for sheet in sheets] == [flip.value for flip in flips]
+    assert min(len(sheet.known) for sheet in sheets) > 3
+    assert all("million steps of integration taken" in sheet.end for sheet in sheets)
+
+
+@pytest.mark.campaign
+def test_cycles_double_where_they_begin_fast():
+    """Beside a doubling at peaks of 37 load-point velocities: twice as far aside is four times as far on."""
+    machine = drawn_otherwise(np.random.default_rng(57))
+    onset = ss.hopf(machine, ALONG)
+    follower = tracer_of(onset, 0, None)
+    follower.limits = 0.8 * onset.value, 0.853 * onset.value
+    first = seed_at(follower, 0.83 * onset.value, [])
+    if first.point.tangent[-1] < 0:
+        first = replace(first, point=turned_round(first.point))
+    (flip,) = follower.followed(first.shooting, first, 0.02).special
+    assert flip.kind == "period doubling"
+    near, far = (follower.doubled(flip.cycle, size).cycle for size in (1e-3, 2e-3))
+    assert near.period == pytest.approx(2 * flip.cycle.period, rel=1e-4)
+    assert (far.value - flip.cycle.value) / (near.value - flip.cycle.value) == pytest.approx(4, rel=0.1)

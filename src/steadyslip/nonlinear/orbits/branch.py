@@ -119,31 +119,36 @@ class CycleBranch(Displayed):
     def at(self, value: float) -> CyclesAt:
         """The cycles that exist at one value of the parameter, corrected to full precision.
 
-        If none of them attracts, those of twice the period and so on follow, until one does. If none of these does
-        either, motions are simulated at the value; the stable cycle that one comes to, if it does, is the last, and
-        ``simulated`` of what comes back says what each motion showed: cycles of several slip events may lie on sheets
-        of their own, in windows among irregular motion. ``between`` are the special cycles, or ends of a branch, that
-        bound the window around the value.
+        Those of the branch come first, then those of twice the period and so on. If none of them attracts, motions are
+        simulated at the value; the stable cycle that one comes to, if it does, is the last, and ``simulated`` of what
+        comes back says what each motion showed: cycles of several slip events may lie on sheets of their own, in
+        windows among irregular motion. ``between`` are the special cycles, or ends of a branch, that bound the window
+        around the value, ``multiples`` tell cycles of twice the period, and ``missed`` says what could not be computed.
         """
-        found = list(self._followed(value))
-        branch, levels = self.doubled, [self]
+        found, multiples, missed = list[Cycle](), list[int](), list[str]()
+        branch: CycleBranch | None = self
+        levels = list[CycleBranch]()
         while branch is not None:
-            if not any(cycle.stable for cycle in found):
-                found += branch._followed(value)
+            here, gaps = cycles_at(self.onset, self.steady, self.rtol, value, branch._continuous())
+            found, multiples = found + here, multiples + len(here) * [2 ** len(levels)]
+            missed += [f"a cycle {self._between(*ends)} could not be computed" for ends in gaps]
             levels.append(branch)
             branch = branch.doubled
         if any(cycle.stable for cycle in found):
-            return CyclesAt(found)
+            return CyclesAt(found, multiples, missed)
         seen = simulations(self.onset, self.steady, self.rtol, value, found)
+        also = [one.cycle for one in seen if one.cycle is not None]
         beside = neighbours([(one.special, one.stretches) for one in levels], value)
         places = [one.words(self.unit, self._area("value")) for one in beside if one is not None]
-        where = {0: "", 1: " beyond ", 2: " between "}[len(places)] + " and ".join(places)
-        window = "none of the cycles that were followed attracts" + where
-        return CyclesAt([*found, *(one.cycle for one in seen if one.cycle is not None)], seen, beside, window)
+        window = "none of the cycles that were followed attracts" + {0: "", 1: " beyond ", 2: " between "}[len(places)]
+        window += " and ".join(places)
+        return CyclesAt([*found, *also], [*multiples, *(0 for _ in also)], missed, seen, beside, window)
 
-    def _followed(self, value: float) -> tuple[Cycle, ...]:
-        """Those of the branch itself."""
-        return cycles_at(self.onset, self.steady, self.rtol, value, self._continuous())
+    def _between(self, low: Cycle, high: Cycle) -> str:
+        """Where there is a cycle between two neighbours, in words."""
+        where = " and ".join(format_quantity(one.value, self.unit, 6, self._area("value")) for one in (low, high))
+        periods = " and ".join(format_quantity(one.period, "s") for one in (low, high))
+        return f"between {where}, of a period between {periods},"
 
     def _continuous(self) -> list[list[Cycle]]:
         """Cycles from gap to gap, folds among them."""

@@ -69,8 +69,9 @@ def cycles(
     doublings : int, optional
         How many period doublings to follow onto the branch of twice the period, one after another.
     most_points : int, optional
-        Limit of cycles on a branch. Four million steps of integration are the limit of work: what was found until
-        then is kept, and ``end`` says so.
+        Limit of cycles on a branch. Four million steps of integration are the limit of work on it, and as many on its
+        cycles of twice the period, of which each doubling may take half of what is left: what was found until then is
+        kept, and ``end`` says so.
     rtol : float, optional
         Error allowed per step of integration; 1e-10, with mass 1e-9, unless given.
     branch : int, optional

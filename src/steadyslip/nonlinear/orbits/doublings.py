@@ -19,9 +19,11 @@ def doubled_sheets(tracer: Tracer, flips: Sequence[Cycle]) -> list[Sheet]:
     """Cycles of twice the period, from each of some period doublings that no sheet before has ended at."""
     sheets: list[Sheet] = []
     reached: set[int] = set()
+    since = tracer.flow.steps
     for i, flip in enumerate(flips):
         if i in reached or tracer.interrupted:
             continue
+        tracer.allot(since, 1.0 if i == len(flips) - 1 else 1.0 - 0.5 ** (i + 1))  # half of what is left
         sheet = _entered(tracer, sheets, flip)
         reached.add(i)
         if sheet.end == ENDS["doubling"]:

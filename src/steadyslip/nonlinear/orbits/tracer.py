@@ -35,7 +35,7 @@ STANDING = 12  # so many cycles within a twentieth of each other, at one value b
 RETRACED = 4  # so many cycles in a row between neighbours that are known are the way back
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
 TOO_UNSTABLE = 1e8
-MOST_STEPS = 4_000_000  # of integration for all sheets of a question: some seconds
+MOST_STEPS = 4_000_000  # of integration for all sheets of a branch: some seconds
 LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
 HIDDEN = 0.1  # share of a small cycle's distance from the edge that rounding may be
 SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
@@ -129,6 +129,11 @@ class Tracer:
         self.logarithmic = flow.domain.low == 0 and onset.value > 0
         self.unit_of_value = abs(onset.value) or 1.0
         self.count, self.interrupted = 0, False
+        self.begun, self.most_steps = 0, MOST_STEPS
+
+    def allot(self, since: int, share: float) -> None:
+        """Let the next sheets take steps up to a share of those for a branch, which began after `since` steps."""
+        self.begun, self.most_steps = self.flow.steps, since + round(share * MOST_STEPS)
 
     def shooting(self, fractions: Array = ONE, amplitude: float = 1.0, scales: Array | None = None) -> Shooting:
         made = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value, scales)
@@ -179,11 +184,15 @@ class Tracer:
         """
         flow, (vector, pieces) = self.flow, self.deviation(cycle, -1.0)
         orbit = orbit_of(cycle)
-        shooting = self.shooting(np.tile(orbit.fractions, 2) / 2, scales=orbit.scales)
+        count = len(orbit.fractions)
         aside = [size * vector]
         for piece in (*pieces, *pieces[:-1]):
             aside.append(piece @ aside[-1])
-        states = np.tile(orbit.states, (2, 1)) + aside
+        fractions = np.tile(orbit.fractions, 2) / 2
+        fractions[count - 1] += fractions[count]  # no cut in the middle: the motion is fast where cycles begin
+        states = np.delete(np.tile(orbit.states, (2, 1)) + aside, count, axis=0)
+        fractions = np.delete(fractions, count)
+        shooting = self.shooting(fractions, scales=orbit.scales)
         tangent = np.zeros(states.size + 2)
         tangent[: flow.size] = aside[0] / np.hypot(shooting.scales, orbit.states[0])
         curve = shooting.curve()
@@ -277,9 +286,9 @@ class Tracer:
                 if len(sheet.known) >= self.most:
                     sheet.end = f"most_points = {self.most} reached"
                     break
-                if self.flow.steps > MOST_STEPS:
-                    sheet.end = f"{MOST_STEPS / 1e6:g} million steps of integration taken, all that are spent "
-                    sheet.end += "on one question; ask for the rest with between=(low, high)"
+                if self.flow.steps > self.most_steps:
+                    sheet.end = f"{(self.most_steps - self.begun) / 1e6:.3g} million steps of integration taken, all "
+                    sheet.end += "that are spent on this part; ask for the rest with between=(low, high)"
                     break
             lost = {ENDS["retraces"], ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
             lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}
@@ -352,6 +361,8 @@ class Tracer:
 
             def accept(point: Point, shooting: Shooting = here.shooting, made: dict[int, Known] = made) -> None:
                 made[0] = self.known(shooting, point)
+                if made[0].cycle.amplitude > SHRUNK and self._slows(made[0]):
+                    raise Failure("the cycle begins where slip slows down")
 
             finer = None
             try:

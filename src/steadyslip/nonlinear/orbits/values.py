@@ -32,18 +32,22 @@ def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
 
 def cycles_at(
     onset: Onset, steady: int, rtol: float | None, value: float, stretches: Sequence[Sequence[Cycle]]
-) -> tuple[Cycle, ...]:
-    """The cycles at one value among stretches of a branch that are continuous, in the order of the branch."""
+) -> tuple[list[Cycle], list[tuple[Cycle, Cycle]]]:
+    """The cycles at one value among stretches of a branch that are continuous, in the order of the branch.
+
+    Second come neighbours to both sides of the value between which no cycle was found.
+    """
     tracer = tracer_of(onset, steady, rtol)
-    found: list[Cycle] = []
+    found, missed = list[Cycle](), list[tuple[Cycle, Cycle]]()
     for stretch in stretches:
         for low, high in pairwise(stretch):
             if (low.value - value) * (high.value - value) <= 0 and high.value != value:
                 cycle = _at_value(tracer, low, high, value)
                 found += [] if cycle is None else [cycle]
+                missed += [(low, high)] if cycle is None else []
         if stretch and stretch[-1].value == value:
             found.append(stretch[-1])
-    return tuple(found)
+    return found, missed
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,11 @@ class CyclesAt(tuple[Cycle, ...]):
 
     Attributes
     ----------
+    multiples : tuple of int
+        For each cycle 1 if it is one of the branch, 2 of its cycles of twice the period and so on; 0 if simulation
+        found it.
+    missed : tuple of str
+        Neighbours on the branch or its doublings between which there is a cycle that could not be computed, in words.
     simulated : tuple of Simulation
         What motions showed that were simulated because no cycle of the branch or its doublings attracts; empty if one
         does.
@@ -84,26 +93,30 @@ class CyclesAt(tuple[Cycle, ...]):
         stop: they bound the window in which none of these attracts. None where there is no such place.
     """
 
+    multiples: tuple[int, ...]
+    missed: tuple[str, ...]
     simulated: tuple[Simulation, ...]
     between: tuple[Neighbour | None, Neighbour | None]
     _window: str
 
     def __new__(
-        cls, cycles: Iterable[Cycle], simulated: Sequence[Simulation] = (),
-        between: tuple[Neighbour | None, Neighbour | None] = (None, None), window: str = "",
+        cls, cycles: Iterable[Cycle], multiples: Sequence[int] = (), missed: Sequence[str] = (),
+        simulated: Sequence[Simulation] = (), between: tuple[Neighbour | None, Neighbour | None] = (None, None),
+        window: str = "",
     ) -> CyclesAt:  # fmt: skip
         """The cycles as a tuple, with what motions showed, and the window around the value in words."""
         made = super().__new__(cls, cycles)
+        made.multiples, made.missed = tuple(multiples), tuple(missed)
         made.simulated, made.between, made._window = tuple(simulated), between, window
         return made
 
     def __str__(self) -> str:
         lines = [
-            f"{'stable' if one.stable else 'unstable'} cycle of period {format_quantity(one.period, 's')}; "
-            f"{in_words(one.checks)}"
-            for one in self
+            f"{'stable' if one.stable else 'unstable'} cycle of period {format_quantity(one.period, 's')}"
+            f"{f', of those of {multiple} times the period' if multiple > 1 else ''}; {in_words(one.checks)}"
+            for multiple, one in zip(self.multiples, self, strict=True)
         ]
-        return "\n".join([*lines, *map(str, self.simulated), *filter(None, [self._window])]) or "no cycle"
+        return "\n".join([*lines, *self.missed, *map(str, self.simulated), *filter(None, [self._window])]) or "no cycle"
 
 
 def simulations(

@@ -208,15 +208,21 @@ def test_no_two_quantities_of_a_record_share_a_place():
                          massless=3, unknowns=2, contacts=2)  # fmt: skip
     places = [*((row, 1) for row in Row), (layout.level, 4), (layout.slope, 4)]
     places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 8)]
-    places += [(layout.omega, 8), (layout.phase, 8), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
-    places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 8), (layout.happened, 8), (layout.counted, 16)]
+    places += [(layout.omega, 8), (layout.phase, 8), (layout.constant, 5), (layout.state_old, 3), (layout.stage, 21)]
+    places += [
+        (layout.observable, 2),
+        (layout.rate_before, 3),
+        (layout.event_value, 8),
+        (layout.sign_change, 8),
+        (layout.event_count, 16),
+    ]
     places += [
         (layout.guess, 2),
         (layout.scale, 2),
-        (layout.earlier, 1),
-        (layout.elsewhere, 3),
-        (layout.tallies, TALLIED),
-        (layout.jumped, 4),
+        (layout.unknown_old, 1),
+        (layout.further_contact, 3),
+        (layout.further_statistics, TALLIED),
+        (layout.before_jump, 4),
     ]
     taken = [place + i for place, count in places for i in range(count)]
     assert sorted(taken) == list(range(layout.rows))

@@ -1,4 +1,4 @@
-"""The pair of order 8 of Dormand and Prince, in the form of Hairer, Nørsett & Wanner.
+"""Coefficients of the pair of order 8 of Dormand and Prince, in the form of Hairer, Nørsett & Wanner.
 
 Solving Ordinary Differential Equations I, 2nd edition, II.5 and II.10, and their code DOP853: the result of order 8,
 error estimates of orders 5 and 3 that are combined, and a dense output of order 7 that needs three more stages.

@@ -60,7 +60,7 @@ class Kernel(Formulation):
             record.program.store(place, value)
         moments = record.moments(point, found[self.size :])
         for e, value in enumerate(record.event_values(moments) if self.choice.dense else ()):
-            record.program.store(self.layout.mark + e, value)
+            record.program.store(self.layout.event_value + e, value)
         if self.choice.dense and self.limit is not None:
             for row, v in ((Row.W_LIMIT, faster(moments[0])), (Row.W_LP, moments[0].v_lp)):
                 record.program.store(row, self.limit(record.constants | {"v": v})[0])

@@ -24,7 +24,7 @@ class Row(IntEnum):
     """Outputs at the end of the step."""
     Z, Z_SCALE = 3, 4
     """First unknown of the balances (or guess of it), and its scale."""
-    TAU, H, END = 5, 6, 7
+    TAU, H, LENGTH = 5, 6, 7
     """Time since the start of the segment, size of the next step, length of the segment (s)."""
     START, STOP, SEGMENT = 8, 9, 10
     """Start and end of the segment since the start of the run (s), and its number."""
@@ -32,20 +32,22 @@ class Row(IntEnum):
     ACTIVE, FLAG, GOOD = 12, 13, 14
     """Flags: lane has a job, lane needs the driver, last step was accepted."""
     ACCEPTED, REJECTED, FAILURES, ERROR = 15, 16, 17, 18
-    MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 19, 20, 21, 22, 23, 24
-    NEXT, TAKEN = 25, 26
+    """Numbers of accepted and rejected steps, and of rejected ones in a row; ln of the last squared error."""
+    MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 19, 20, 21, 22, 23, 24
+    """Settings: most steps, limits of velocity (m/s) and normal stress (Pa); flags: watch events, record steps."""
+    NEXT_TIME, NEXT_SAMPLE = 25, 26
     """Local time of the next requested sample (s), and its number."""
     V_DRIVE, LOG = 27, 28
     """Velocity of the drive (m/s); flag: a log is kept."""
-    DONE, TAU_OLD, W_RATE_OLD = 29, 30, 31
+    STEP_SIZE, TAU_OLD, W_RATE_OLD = 29, 30, 31
     """Size of the last step, its local starting time, and the rate of the velocity variable there."""
     EXTENDED = 32
     """Flag: the polynomials of the dense output of the last step are stored."""
-    HAPPENED = 33
+    EVENT_COUNT = 33
     """Number of events in the last step."""
     W_LIMIT, W_LP = 34, 35
     """Velocity variable at the slip limit and at the load-point velocity, valid while inputs are constant."""
-    # statistics of slip events; those up to PEAK_GROWTH are results
+    # statistics of slip events (s, m, Pa, m/s); those up to PEAK_GROWTH are results, of the last complete event
     EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 36, 37, 38
     EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 39, 40, 41, 42, 43, 44
     LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47
@@ -63,7 +65,7 @@ class Row(IntEnum):
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
-"""Number of rows of event statistics (EVENTS to NOW_SEGMENT); those of further contacts are a group of their own."""
+"""Number of rows of event statistics, EVENTS to NOW_SEGMENT; further contacts have theirs in a group of their own."""
 
 
 MOST_FAILURES = 400.0
@@ -200,29 +202,29 @@ class Layout(NamedTuple):
     omega: int
     phase: int
     constant: int
-    old: int
+    state_old: int
     stage: int
-    curve: int
+    polynomial: int
     """Dense output of the last step: per variable, coefficients of powers of the fraction of the step."""
-    mark: int
+    event_value: int
     """Values of the event functions at the end of the step."""
-    happened: int
+    sign_change: int
     """Sign changes of event functions in the last step: 1 rose, -1 fell."""
-    counted: int
+    event_count: int
     """Number of events so far, by kind."""
-    seen: int
-    before: int
+    observable: int
+    rate_before: int
     guess: int
     """Guesses of further unknowns and of velocity variables that balances fix."""
     scale: int
     """Scales of further unknowns."""
-    earlier: int
+    unknown_old: int
     """Further unknowns at the start of the last step."""
-    elsewhere: int
+    further_contact: int
     """Per further contact: velocity, then normal stress and velocity as shares of the first contact's."""
-    tallies: int
+    further_statistics: int
     """Event statistics of further contacts."""
-    jumped: int
+    before_jump: int
     """Per contact: velocity before a jump, and whether it slipped."""
     rows: int
 
@@ -238,13 +240,13 @@ def make_layout(
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "level": inputs, "slope": inputs,
         "amplitude": waves, "omega": waves, "phase": waves,
-        "constant": constants, "old": size if stages else 0, "stage": size * stages,
-        "curve": size * terms if stages else 0,
-        "mark": events, "happened": events, "counted": 2 * events, "seen": seen,
-        "before": own if seen else 0,
-        "guess": further_ones, "scale": further_ones, "earlier": max(unknowns - 1, 0),
-        "elsewhere": 3 * (contacts - 1), "tallies": TALLIED * (contacts - 1),
-        "jumped": 2 * contacts if events else 0,
+        "constant": constants, "state_old": size if stages else 0, "stage": size * stages,
+        "polynomial": size * terms if stages else 0,
+        "event_value": events, "sign_change": events, "event_count": 2 * events, "observable": seen,
+        "rate_before": own if seen else 0,
+        "guess": further_ones, "scale": further_ones, "unknown_old": max(unknowns - 1, 0),
+        "further_contact": 3 * (contacts - 1), "further_statistics": TALLIED * (contacts - 1),
+        "before_jump": 2 * contacts if events else 0,
     }  # fmt: skip
     places, position = {}, max(Row) + 1
     for name, count in sizes.items():
@@ -282,7 +284,7 @@ class Routines(NamedTuple):
     extend : polynomials of the dense output of the last step, which `dense` reads
     watch_group : frequent events within the last step, for `GROUP` lanes from lane `number` on
     rates_lanes, see_lanes : rates; observables (all lanes)
-    extend_lanes, look_lanes : `extend`; observables at `Row.NEXT`, within the last step (all lanes)
+    extend_lanes, look_lanes : `extend`; observables at `Row.NEXT_TIME`, within the last step (all lanes)
     """
 
     step: Routine

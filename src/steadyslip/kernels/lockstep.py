@@ -112,11 +112,11 @@ class LockstepKernel(Formulation):
         return record.program
 
     def _look_program(self) -> Program:
-        """Observable and derivatives at `Row.NEXT`, within the last step."""
+        """Observable and derivatives at `Row.NEXT_TIME`, within the last step."""
         record = Evaluator(self, Program("look_lanes"), extended=True)
         load = record.program.load
-        moment = load(Row.NEXT)
-        theta = (moment - load(Row.TAU_OLD)) / load(Row.DONE)
+        moment = load(Row.NEXT_TIME)
+        theta = (moment - load(Row.TAU_OLD)) / load(Row.STEP_SIZE)
         record.z = record.guesses_at_fraction(theta)
         return self._seen(
             record, record.inputs(moment) | {f"y{i}": y for i, y in enumerate(record.state_at_fraction(theta))}
@@ -124,7 +124,7 @@ class LockstepKernel(Formulation):
 
     def _seen(self, record: Evaluator, point: Values) -> Program:
         for i, value in enumerate(record.evaluated(self.seen, point)):
-            record.program.store(self.layout.seen + i, value)
+            record.program.store(self.layout.observable + i, value)
         return record.program
 
     def input_rates(self) -> tuple[int, ...]:

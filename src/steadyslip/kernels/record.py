@@ -120,8 +120,8 @@ class Evaluator:
         kernel, method, load, n = self.kernel, self.kernel.method, self.program.load, self.kernel.size
         place = [[kernel.layout.stage + s * n + i for i in range(n)] for s in range(method.stages)]
         found: list[list[Value]] = [[load(row) for row in rows] for rows in place]
-        h = load(Row.DONE)
-        old = [load(kernel.layout.old + i) for i in range(n)]
+        h = load(Row.STEP_SIZE)
+        old = [load(kernel.layout.state_old + i) for i in range(n)]
         for s in range(method.stages, method.all_stages):
             y = [old[i] + h * weighted(method.a[s], [k[i] for k in found]) for i in range(n)]
             point = self.inputs(load(Row.TAU_OLD) + method.nodes[s] * h)
@@ -137,10 +137,10 @@ class Evaluator:
     def _polynomial(self, i: int) -> list[Value]:
         method, load = self.kernel.method, self.program.load
         if self.extended:
-            return [load(self.kernel.layout.curve + i * self.kernel.terms + j) for j in range(self.kernel.terms)]
-        old, stages = load(self.kernel.layout.old + i), [stage[i] for stage in self.stages]
+            return [load(self.kernel.layout.polynomial + i * self.kernel.terms + j) for j in range(self.kernel.terms)]
+        old, stages = load(self.kernel.layout.state_old + i), [stage[i] for stage in self.stages]
         if not method.implicit:
-            h, columns = load(Row.DONE), zip(*method.dense, strict=True)
+            h, columns = load(Row.STEP_SIZE), zip(*method.dense, strict=True)
             return [old, *(h * weighted(column, stages) for column in columns)]
         change = weighted(method.arguments()[method.stages], stages)
         inner = [weighted(row, stages) for row in method.dense]  # coefficients of the polynomial in θ (1 − θ) inner(θ)
@@ -151,7 +151,7 @@ class Evaluator:
         found = list(self.polynomial(i))
         if not self.kernel.method.implicit:
             return found
-        h = self.program.load(Row.DONE)
+        h = self.program.load(Row.STEP_SIZE)
         first = h * self.program.load(Row.W_RATE_OLD) - found[1]
         last = h * self.program.load(self.kernel.layout.rate + i) - total(slope_of(found))
         found[1] = found[1] + first
@@ -167,7 +167,7 @@ class Evaluator:
         """Store the polynomials of the dense output of the last step."""
         for i in range(self.kernel.size):
             for j, coefficient in enumerate(self.polynomial(i)):
-                self.program.store(self.kernel.layout.curve + i * self.kernel.terms + j, coefficient)
+                self.program.store(self.kernel.layout.polynomial + i * self.kernel.terms + j, coefficient)
         self.program.store(Row.EXTENDED, 1.0)
 
     def guesses_at_fraction(self, theta: Node) -> list[Value]:
@@ -213,7 +213,7 @@ class Evaluator:
         for c in range(1, self.kernel.contacts):
             v, _, sigma = found[3 * c : 3 * c + 3]
             _, share, pressed = self.shares(c)
-            first = self.kernel.layout.elsewhere + 3 * (c - 1)
+            first = self.kernel.layout.further_contact + 3 * (c - 1)
             stored += [(first, v), (first + 1, sigma / as_node(pressed)), (first + 2, v / as_node(share))]
         return stored
 

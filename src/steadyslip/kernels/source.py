@@ -78,7 +78,7 @@ class Constants:
 
     @property
     def all(self) -> list[sp.Symbol]:
-        """All constants, then the rates of change that were asked for."""
+        """Symbols of all constants, then of the rates of change that were requested."""
         return [*self.symbols.values(), *self.rates.values()]
 
     def rate_of(self, constant: sp.Symbol, direction: int) -> sp.Symbol:
@@ -141,7 +141,7 @@ class Formulas:
 
     @property
     def symbols(self) -> set[str]:
-        """Keys of the values that are needed."""
+        """Keys that the mapping of values must have."""
         return {self.names.get(e, e.name) for e in self._count if e.is_Symbol}
 
     def __call__(self, values: Mapping[str, Value]) -> list[Value]:

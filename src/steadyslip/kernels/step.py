@@ -38,7 +38,7 @@ class Step(Evaluator):
         self.old = self.state()
         self.first: list[Value] = [load(layout.rate + i) for i in range(n)]
         self.atol, self.rtol = [load(layout.atol + i) for i in range(n)], load(Row.RTOL)
-        self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.END)
+        self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.LENGTH)
         rest = self.end - self.tau
         self.rest = rest
         self.last = self.proposed >= rest * 0.99999999  # no tiny step is left for rounding
@@ -180,11 +180,11 @@ class Step(Evaluator):
         store(Row.FAILURES, failures)
         reasons = [
             moved >= self.end,
-            accepted + rejected >= load(Row.MOST),
+            accepted + rejected >= load(Row.MOST_STEPS),
             failures >= MOST_FAILURES,
             abs(v) >= load(Row.V_HIGH),
             sigma <= load(Row.SIGMA_LOW),
-            moved > load(Row.NEXT),
+            moved > load(Row.NEXT_TIME),
         ]
         for c, (place, value) in enumerate(self.further_contact_rows(self.outputs)):
             store(place, select(good, value, load(place)))
@@ -219,7 +219,7 @@ class Step(Evaluator):
         count = as_node(0.0)
         for e, value in enumerate(self.event_values(moments)):
             event, at = EVENTS[e % len(EVENTS)], moments[e // len(EVENTS)]
-            before = load(layout.mark + e)
+            before = load(layout.event_value + e)
             known, least, small = self.good, as_node(0.0), 0.0
             if event.uncertain is not None:
                 least = event.uncertain(at)
@@ -232,17 +232,17 @@ class Step(Evaluator):
                 change = select((before <= -small) & (value > 0.0), 1.0, change)
             change = select(known, change, 0.0)
             change = change * load(Row.WATCH)
-            store(layout.happened + e, change)
+            store(layout.sign_change + e, change)
             for kind, own in ((2 * e, change < 0.0), (2 * e + 1, change > 0.0)):
                 if COUNTED[kind % len(COUNTED)]:
-                    place = layout.counted + kind
+                    place = layout.event_count + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
-            store(layout.mark + e, select(known, value, before))
+            store(layout.event_value + e, select(known, value, before))
             if e % len(EVENTS) not in tuple(EventPlace):  # other events are only counted, unless there is a log
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)
-        store(Row.HAPPENED, happened)
+        store(Row.EVENT_COUNT, happened)
         return happened
 
     def _with_errors(self, moment: Observed) -> Observed:
@@ -274,7 +274,7 @@ class Step(Evaluator):
         """Store old state, stages and unknowns for dense output."""
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
         for i in range(n):
-            store(layout.old + i, self.old[i])
+            store(layout.state_old + i, self.old[i])
         for s in self.kernel.method.dense_stages:
             for i in range(n):
                 store(layout.stage + s * n + i, self.stages[s][i])
@@ -283,5 +283,5 @@ class Step(Evaluator):
         for k in range(self.kernel.unknowns):
             store(earlier_at(layout, k), self.program.load(guess_at(layout, k)))
         store(Row.EXTENDED, 0.0)
-        store(Row.DONE, self.h)
+        store(Row.STEP_SIZE, self.h)
         store(Row.TAU_OLD, self.tau)

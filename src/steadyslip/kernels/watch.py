@@ -26,25 +26,27 @@ class Watch(Evaluator):
         super().__init__(kernel, Program("watch_group"))
         self.speed = speed
         load, layout = self.program.load, kernel.layout
-        slip, turn = load(layout.happened + EventPlace.SLIP), load(layout.happened + EventPlace.TURN)
+        slip, turn = load(layout.sign_change + EventPlace.SLIP), load(layout.sign_change + EventPlace.TURN)
         self.begins, self.ends = slip > 0.0, slip < 0.0
         self.peak, self.trough = turn < 0.0, turn > 0.0
         self.turns = self.peak | self.trough
-        self.tau_old, self.h = load(Row.TAU_OLD), load(Row.DONE)
+        self.tau_old, self.h = load(Row.TAU_OLD), load(Row.STEP_SIZE)
         self.now_from, self.now_event = load(Row.NOW_FROM), load(Row.NOW_EVENT)
 
     def write(self) -> Program:
-        """The whole program."""
+        """Write the program and return it."""
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
         self._locate()
-        count = load(Row.HAPPENED)
+        count = load(Row.EVENT_COUNT)
         left = (
-            (load(layout.happened + EventPlace.CONTACT) < 0.0) | (self.turns & (self.begins | self.ends)) | ~self.found
+            (load(layout.sign_change + EventPlace.CONTACT) < 0.0)
+            | (self.turns & (self.begins | self.ends))
+            | ~self.found
         )
         if self.kernel.choice.level != "constant":
             left = left | self.begins | self.ends
         self.here = (count > 0.0) & ~left
-        store(Row.HAPPENED, select(self.here, 0.0, count))
+        store(Row.EVENT_COUNT, select(self.here, 0.0, count))
         self._turn()
         self._slip()
         store(Row.FLAG, load(Row.FLAG) - select(self.here, 1.0, 0.0))
@@ -75,7 +77,7 @@ class Watch(Evaluator):
         self.tau = self.tau_old + theta * self.h
         self.there = self.state_at_fraction(theta)
         start, stop = program.load(Row.START), program.load(Row.STOP)
-        self.time = select(self.tau < program.load(Row.END), smaller(start + self.tau, stop), stop)
+        self.time = select(self.tau < program.load(Row.LENGTH), smaller(start + self.tau, stop), stop)
         point = self.inputs(self.tau) | {f"y{i}": y for i, y in enumerate(self.there)}
         self.v, self.v_lp = self.speed(self.constants | point)[0], point["in0"]
         self.stress = kernel.outputs(self.constants | point)[Out.T]

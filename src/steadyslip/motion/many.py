@@ -302,7 +302,7 @@ def _columns(model: Model) -> dict[str, tuple[int, int, bool]]:
 
 
 class _Store:
-    """Result arrays of all runs."""
+    """Arrays that collect the results of all runs."""
 
     def __init__(
         self, jobs: Jobs, size: int, times: np.ndarray, observables: Sequence[str] | None, events: bool

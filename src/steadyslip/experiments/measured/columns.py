@@ -40,7 +40,7 @@ _BRACKETS = re.compile(r"^(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*$")
 
 @dataclass(frozen=True)
 class Column:
-    """Column of a role.
+    """Column of a file that has a role, with its unit.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ class ColumnSettings(Settings):
 
 
 class RecordSettings(Settings):
-    """How to read records: which column is what, which part to use."""
+    """Options for reading records: roles of columns, and the part to use."""
 
     time: ColumnSettings | None = part(ColumnSettings, "column of the time", default=None)
     displacement: ColumnSettings | None = part(ColumnSettings, "column of the load point's displacement", default=None)

@@ -111,7 +111,7 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
 
 
 def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], path: str) -> str:
-    """Tables of members by name."""
+    """TOML text of a table for each member, by name."""
     blocks = []
     for name, one in members.items():
         first = []
@@ -124,7 +124,7 @@ def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], pa
 
 
 def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
-    """Table of values by dotted name: an inline table or a list each."""
+    """TOML text of values by dotted name: an inline table or a list each."""
     lines = [f"[{path}]"]
     for name, one in values.items():
         if isinstance(one, role.family):
@@ -137,6 +137,6 @@ def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
 
 
 def _member(family: type[FrozenRecord], member: FrozenRecord, name: str, path: str, area: float | None) -> str:
-    """One table of a list."""
+    """TOML text of one table of a list."""
     first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
     return _table(f"[[{name}]]", member, first, path, area)

@@ -60,10 +60,10 @@ def process_events(
     R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array, order: Array
 ) -> bool:  # fmt: skip
     """Handle the events of the last step in order of time; True if contact is lost in it."""
-    tau_old, h = R[Row.TAU_OLD], R[Row.DONE]
+    tau_old, h = R[Row.TAU_OLD], R[Row.STEP_SIZE]
     each, count = events_per_contact(layout), 0
-    for e in range(layout.events if R[Row.HAPPENED] > 0.0 else 0):
-        change = R[layout.happened + e]
+    for e in range(layout.events if R[Row.EVENT_COUNT] > 0.0 else 0):
+        change = R[layout.sign_change + e]
         if change != 0.0 and (e % each <= EventPlace.CONTACT or log.shape[0] > 0):
             kind = 2 * e + (2 if change > 0.0 else 1)
             order[count, 0], order[count, 1] = located(R, layout, routines, kind, y), kind
@@ -86,15 +86,15 @@ def process_events(
                 R[layout.state + i] = y[i]
             for i in range(count):  # the step counted later events, which do not happen any more
                 if order[i, 0] < 2.0:
-                    R[layout.counted + int(order[i, 1]) - 1] -= 1.0
+                    R[layout.event_count + int(order[i, 1]) - 1] -= 1.0
             return True
-    R[Row.HAPPENED] = 0.0
+    R[Row.EVENT_COUNT] = 0.0
     for c in range(layout.contacts):
         own, v = tally_at(layout, c), velocity_at(R, layout, c)
         R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)
         R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], v)
-        if R[own + Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.END] and v >= SLIP_EVENT * R[own + Row.NOW_FROM]:
+        if R[own + Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.LENGTH] and v >= SLIP_EVENT * R[own + Row.NOW_FROM]:
             state_now(R, layout, routines, R[Row.TAU], y)
             begin_slip_event(R, layout, c, y, log, cursor)
     return False
@@ -103,8 +103,8 @@ def process_events(
 def save_before_jump(R: Array, layout: Layout) -> None:
     """Store velocity and slip state of each contact before a jump, for `events_of_jump`."""
     for c in range(layout.contacts if layout.events > 0 else 0):
-        R[layout.jumped + 2 * c] = velocity_at(R, layout, c)
-        R[layout.jumped + 2 * c + 1] = R[layout.mark + events_per_contact(layout) * c + EventPlace.SLIP]
+        R[layout.before_jump + 2 * c] = velocity_at(R, layout, c)
+        R[layout.before_jump + 2 * c + 1] = R[layout.event_value + events_per_contact(layout) * c + EventPlace.SLIP]
 
 
 def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
@@ -112,8 +112,8 @@ def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, 
     state_now(R, layout, routines, 0.0, y)
     for c in range(layout.contacts):
         own, each, v = tally_at(layout, c), events_per_contact(layout), y[outputs_at(layout, c) + Out.V]
-        before, was_slipping = R[layout.jumped + 2 * c], R[layout.jumped + 2 * c + 1] > 0.0
-        slipping = R[layout.mark + each * c + EventPlace.SLIP] > 0.0
+        before, was_slipping = R[layout.before_jump + 2 * c], R[layout.before_jump + 2 * c + 1] > 0.0
+        slipping = R[layout.event_value + each * c + EventPlace.SLIP] > 0.0
         if slipping != was_slipping:
             kind = Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS
             record_event(R, layout, kind + 2 * each * c, 0.0, y, log, cursor)

@@ -30,4 +30,4 @@ def interpolate_state(R: Array, layout: Layout, routines: Routines, theta: float
 def state_at_fraction(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
     """Write state and outputs at the fraction theta of the last step to `y`."""
     interpolate_state(R, layout, routines, theta, y)
-    call(routines.outputs, R, R[Row.TAU_OLD] + theta * R[Row.DONE], y)
+    call(routines.outputs, R, R[Row.TAU_OLD] + theta * R[Row.STEP_SIZE], y)

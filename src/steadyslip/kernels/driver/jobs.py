@@ -63,7 +63,7 @@ def load_job(
         S[(first + i) * lanes + lane] = initial[j if initial.shape[0] > 1 else 0, i]
     own = settings[j if settings.shape[0] > 1 else 0]
     S[Row.RTOL * lanes + lane] = own[Setting.RTOL]
-    S[Row.MOST * lanes + lane] = own[Setting.MOST_STEPS]
+    S[Row.MOST_STEPS * lanes + lane] = own[Setting.MOST_STEPS]
     S[Row.V_HIGH * lanes + lane] = own[Setting.V_HIGH]
     S[Row.V_LOW * lanes + lane] = own[Setting.V_LOW]
     S[Row.SIGMA_LOW * lanes + lane] = own[Setting.SIGMA_LOW]
@@ -86,7 +86,7 @@ def exhausted(S: Array, lanes: int, lane: int) -> int:
     """Status of a lane that must stop (too many rejected steps in a row, or steps in all); RUNNING if it may go on."""
     if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
         return Status.STUCK
-    if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST * lanes + lane]:
+    if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST_STEPS * lanes + lane]:
         return Status.TOO_MANY_STEPS
     return Status.RUNNING
 
@@ -120,7 +120,7 @@ def start_tally(
     R[own + Row.PEAK_GROWTH] = math.nan
     R[own + Row.NOW_BEGIN] = math.nan
     R[own + Row.NOW_FROM] = math.inf
-    if R[Row.WATCH] > 0.0 and R[layout.mark + events_per_contact(layout) * contact + EventPlace.SLIP] > 0.0:
+    if R[Row.WATCH] > 0.0 and R[layout.event_value + events_per_contact(layout) * contact + EventPlace.SLIP] > 0.0:
         state_now(R, layout, routines, 0.0, y)
         record_event(R, layout, Kind.SLIP_BEGINS + 2 * events_per_contact(layout) * contact, 0.0, y, log, cursor)
 
@@ -129,7 +129,7 @@ def highest_velocity(R: Array, layout: Layout) -> float:
     """Highest velocity (m/s) of all contacts, each divided by its share of the first contact's slip rate."""
     found = abs(R[Row.V])
     for c in range(1, layout.contacts):
-        found = max(found, abs(R[layout.elsewhere + 3 * (c - 1) + 2]))
+        found = max(found, abs(R[layout.further_contact + 3 * (c - 1) + 2]))
     return float(found)
 
 
@@ -137,7 +137,7 @@ def lowest_stress(R: Array, layout: Layout) -> float:
     """Lowest normal stress (Pa) of all contacts, each divided by its share of the first contact's."""
     found = R[Row.SIGMA]
     for c in range(1, layout.contacts):
-        found = min(found, R[layout.elsewhere + 3 * (c - 1) + 1])
+        found = min(found, R[layout.further_contact + 3 * (c - 1) + 1])
     return float(found)
 
 
@@ -159,7 +159,7 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
         for i in range(first):
             tally[row, place + i] = R[tally_at(layout, c) + Row.EVENTS + i]
         for i in range(counted):
-            tally[row, place + first + i] = R[layout.counted + counted * c + i]
+            tally[row, place + first + i] = R[layout.event_count + counted * c + i]
     R[Row.ACTIVE] = 0.0
     R[Row.FLAG] = 0.0
 
@@ -194,7 +194,7 @@ def continue_job(
         return Status.BLOW_UP
     if status != Status.RUNNING:
         return status
-    while R[Row.TAU] >= R[Row.END]:
+    while R[Row.TAU] >= R[Row.LENGTH]:
         k = int(R[Row.SEGMENT]) + 1
         s = j if segments.shape[0] > 1 else 0
         if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # rows of no length pad shorter protocols
@@ -241,4 +241,4 @@ def serve_lane(
         R[i] = 0.0
     R[Row.RTOL] = 1.0  # an idle lane takes steps with the others: these keep its numbers finite
     R[Row.H] = 1e-3
-    R[Row.END] = 1e300
+    R[Row.LENGTH] = 1e300

@@ -50,7 +50,7 @@ def events_per_contact(layout: Layout) -> int:
 
 def tally_at(layout: Layout, contact: int) -> int:
     """Offset that turns a row between `Row.EVENTS` and `Row.NOW_SEGMENT` into that of a contact."""
-    return layout.tallies + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
+    return layout.further_statistics + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
 
 
 def guess_count(layout: Layout) -> int:
@@ -70,9 +70,9 @@ def scale_at(layout: Layout, index: int) -> int:
 
 def earlier_at(layout: Layout, index: int) -> int:
     """Index in a record of an unknown's value at the start of the last step."""
-    return layout.earlier + index - 1 if index > 0 else int(Row.Z_OLD)
+    return layout.unknown_old + index - 1 if index > 0 else int(Row.Z_OLD)
 
 
 def velocity_at(R: Array, layout: Layout, contact: int) -> float:
     """Velocity (m/s) of a contact at the end of the step."""
-    return float(R[layout.elsewhere + 3 * (contact - 1)] if contact > 0 else R[Row.V])
+    return float(R[layout.further_contact + 3 * (contact - 1)] if contact > 0 else R[Row.V])

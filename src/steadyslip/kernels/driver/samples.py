@@ -14,8 +14,8 @@ BETWEEN = 3  # extra points recorded within each step of a method of high order,
 
 def schedule_sample(R: Array, times: Array) -> None:
     """Set the local time of the next requested sample, which the kernel compares with its own."""
-    k = int(R[Row.TAKEN])
-    R[Row.NEXT] = times[k] - R[Row.START] if k < times.shape[0] else math.inf
+    k = int(R[Row.NEXT_SAMPLE])
+    R[Row.NEXT_TIME] = times[k] - R[Row.START] if k < times.shape[0] else math.inf
 
 
 def take_samples(
@@ -25,8 +25,8 @@ def take_samples(
 
     A sample at a breakpoint belongs to the segment that begins there, one at the end of the run to the last segment.
     """
-    arrived = R[Row.TAU] >= R[Row.END]
-    k = int(R[Row.TAKEN])
+    arrived = R[Row.TAU] >= R[Row.LENGTH]
+    k = int(R[Row.NEXT_SAMPLE])
     while k < times.shape[0]:
         tau = times[k] - R[Row.START]
         if at_end:
@@ -36,13 +36,13 @@ def take_samples(
         else:
             if times[k] >= R[Row.STOP] or (tau >= R[Row.TAU] and not arrived):
                 break
-            interpolate_state(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
+            interpolate_state(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.STEP_SIZE], 0.0), 1.0), y)
         for i in range(layout.size):
             samples[row, k, Sampled.STATE + i] = y[i]
         for j in range(max(layout.unknowns, 1)):
             samples[row, k, point_at(layout, j)] = y[unknown_at(layout, j)]
         k += 1
-    R[Row.TAKEN] = k
+    R[Row.NEXT_SAMPLE] = k
     schedule_sample(R, times)
 
 
@@ -63,7 +63,7 @@ def record_step(R: Array, layout: Layout, routines: Routines, cursor: Array, rec
     for i in range(1, BETWEEN + 1 if layout.extra > 0 else 1):
         theta = i / (BETWEEN + 1)
         interpolate_state(R, layout, routines, theta, y)
-        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], y, cursor, recorded)
+        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.STEP_SIZE], y, cursor, recorded)
     record_now(R, layout, cursor, recorded, y)
 
 

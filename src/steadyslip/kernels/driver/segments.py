@@ -10,7 +10,7 @@ from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
 
 def clock(R: Array, tau: float) -> float:
     """Time since the start of the run at local time tau; at the segment's end exactly that of the breakpoint."""
-    return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.END] else R[Row.STOP])
+    return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.LENGTH] else R[Row.STOP])
 
 
 def set_inputs(S: Array, layout: Layout, lanes: int, lane: int, row: Array, first: int) -> None:
@@ -25,7 +25,7 @@ def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -
     S[Row.TAU * lanes + lane] = 0.0
     S[Row.START * lanes + lane] = row[0]
     S[Row.STOP * lanes + lane] = row[1]
-    S[Row.END * lanes + lane] = row[1] - row[0]
+    S[Row.LENGTH * lanes + lane] = row[1] - row[0]
     set_inputs(S, layout, lanes, lane, row, 3)
     waves, first = layout.inputs * layout.harmonics, 3 + 2 * layout.inputs
     for i in range(waves):

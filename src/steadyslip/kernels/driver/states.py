@@ -63,7 +63,7 @@ def advance_to_segment(R: Array, layout: Layout, routines: Routines, segments: A
     """Advance the record from its segment (-1: before the first) to segment k, adding up the load point's motion."""
     while R[Row.SEGMENT] < k:
         if R[Row.SEGMENT] >= 0.0:
-            R[Row.TAU] = R[Row.END]
+            R[Row.TAU] = R[Row.LENGTH]
             call(routines.restore, R, 0.0, y)  # adds the motion of the load point
         R[Row.SEGMENT] += 1.0
         row = segments[s, int(R[Row.SEGMENT])]

@@ -49,12 +49,12 @@ def schedule_table_sample(S: Array, lanes: int, lane: int, times: Array, is_last
 
     A sample at the end of a row belongs to the next row.
     """
-    S[Row.NEXT * lanes + lane] = math.inf
-    k = int(S[Row.TAKEN * lanes + lane])
+    S[Row.NEXT_TIME * lanes + lane] = math.inf
+    k = int(S[Row.NEXT_SAMPLE * lanes + lane])
     if k < times.shape[0]:
         stop = S[Row.STOP * lanes + lane]
         if times[k] < stop or (is_last and times[k] <= stop):
-            S[Row.NEXT * lanes + lane] = times[k] - S[Row.START * lanes + lane]
+            S[Row.NEXT_TIME * lanes + lane] = times[k] - S[Row.START * lanes + lane]
 
 
 def shift_sensitivities(S: Array, layout: Layout, group: int, count: int, k: int, node_rates: Array) -> bool:
@@ -68,7 +68,7 @@ def shift_sensitivities(S: Array, layout: Layout, group: int, count: int, k: int
             if rate != 0.0:
                 moved = True
                 for i in range(own):
-                    change = S[(layout.before + i) * W + lane] - S[(layout.rate + i) * W + lane]
+                    change = S[(layout.rate_before + i) * W + lane] - S[(layout.rate + i) * W + lane]
                     S[(layout.state + own * (1 + d) + i) * W + lane] += rate * change
     return moved
 
@@ -82,11 +82,11 @@ def finish_row(
     while True:
         waiting = 0
         for lane in range(W):
-            if S[Row.TAU * W + lane] < S[Row.END * W + lane]:
-                brief = S[Row.H * W + lane] < INSTANT * S[Row.END * W + lane]
+            if S[Row.TAU * W + lane] < S[Row.LENGTH * W + lane]:
+                brief = S[Row.H * W + lane] < INSTANT * S[Row.LENGTH * W + lane]
                 if S[Row.ACTIVE * W + lane] == 0.0 or brief or exhausted(S, W, lane) != Status.RUNNING:
                     S[Row.ACTIVE * W + lane] = 0.0
-                    S[Row.TAU * W + lane] = S[Row.END * W + lane]
+                    S[Row.TAU * W + lane] = S[Row.LENGTH * W + lane]
                 else:
                     waiting += 1
         if waiting == 0:
@@ -104,7 +104,7 @@ def lanes_due(S: Array, lanes: int) -> int:
     """Number of active lanes that have passed their next sample."""
     found = 0
     for lane in range(lanes):
-        if S[Row.NEXT * lanes + lane] <= S[Row.TAU * lanes + lane] and S[Row.ACTIVE * lanes + lane] > 0.0:
+        if S[Row.NEXT_TIME * lanes + lane] <= S[Row.TAU * lanes + lane] and S[Row.ACTIVE * lanes + lane] > 0.0:
             found += 1
     return found
 
@@ -113,13 +113,13 @@ def store_samples(S: Array, layout: Layout, group: int, count: int, times: Array
     """Store observables and derivatives of lanes that are due; returns how many are due again in the same step."""
     W, passed = layout.lanes, 0
     for lane in range(W):
-        if S[Row.NEXT * W + lane] <= S[Row.TAU * W + lane] and S[Row.ACTIVE * W + lane] > 0.0:
-            sample = int(S[Row.TAKEN * W + lane])
+        if S[Row.NEXT_TIME * W + lane] <= S[Row.TAU * W + lane] and S[Row.ACTIVE * W + lane] > 0.0:
+            sample = int(S[Row.NEXT_SAMPLE * W + lane])
             for i in range(1 + layout.directions):
-                seen[group + lane % count, i, sample] = S[(layout.seen + i) * W + lane]
-            S[Row.TAKEN * W + lane] = sample + lanes_of_job(layout, count, lane)
+                seen[group + lane % count, i, sample] = S[(layout.observable + i) * W + lane]
+            S[Row.NEXT_SAMPLE * W + lane] = sample + lanes_of_job(layout, count, lane)
             schedule_table_sample(S, W, lane, times, is_last)
-            if S[Row.NEXT * W + lane] <= S[Row.TAU * W + lane]:
+            if S[Row.NEXT_TIME * W + lane] <= S[Row.TAU * W + lane]:
                 passed += 1
     return passed
 
@@ -144,11 +144,11 @@ def through_table(
         count = min(W, jobs - group)
         for lane in range(W):
             load_job(S, layout, W, lane, group + lane % count, layout.state, constants, initial, settings)
-            S[Row.TAKEN * W + lane] = lane // count
+            S[Row.NEXT_SAMPLE * W + lane] = lane // count
         for k in range(rows):
             is_last = k == rows - 1
             for i in range(layout.own * W):
-                S[layout.before * W + i] = S[layout.rate * W + i]
+                S[layout.rate_before * W + i] = S[layout.rate * W + i]
             enter_row(S, layout, group, count, k, segments, times, input_rates, places)
             call(routines.rates_lanes, S, 0.0, y)
             if k > 0 and node_rates.shape[1] > 0 and shift_sensitivities(S, layout, group, count, k, node_rates):

@@ -68,7 +68,7 @@ class SampleSettings(Settings):
 
 
 class MapSettings(Settings):
-    """What to compute of which rigs; a further table, named after a result, for the options of each."""
+    """Quantities to compute for which rigs; options of a quantity are in a table named after it."""
 
     compute: tuple[str, ...] | None = setting(
         Names("results, see below; unless given `status`, with `critical_stiffness` for a slider, `growth_rate` for a "

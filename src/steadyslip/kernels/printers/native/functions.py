@@ -104,7 +104,7 @@ class _Function(Expressions):
             raise self.refuse(node, f"the result of {node.name}")
 
     def written(self) -> list[str]:
-        """Definition of the whole function."""
+        """Lines of the definition of the function."""
         heads: list[str] = []
         for argument, type_ in zip(self.node.args.args, self.types, strict=True):
             value = self._received(type_, heads)

@@ -1,16 +1,16 @@
-// The verdict: a sentence, why, and a bar of the stable values of one parameter.
+// Banner: the verdict, its reason, and a bar with the stable values of one parameter.
 import { make, put, svg, tell } from "./dom.js";
 import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
 import { digits, shown, told, unitFor } from "./quantities.js";
 import { asStiffness, besides, beyondWords, headline, kindOf, reason } from "./words.js";
 
-const DECADE = Math.log(10); // on both sides of what is marked
-const ASUNDER = 1e3; // between marks that share a unit
-const TOLD_OF = 3; // contacts in a sentence
-const WIDTH = 7.4; // of a letter on the bar
+const DECADE = Math.log(10); // natural logarithm of ten: margin of the bar beyond its outermost marks
+const ASUNDER = 1e3; // largest ratio of marks that are written in one unit
+const TOLD_OF = 3; // most contacts that a sentence lists
+const WIDTH = 7.4; // width of a letter on the bar, SVG units
 
-/** Marks or labels of a bar: class, place in per cent and text; only what is new is written. */
+/** Update marks or labels of a bar (class, position in per cent, text); elements that are unchanged stay. */
 function placed(box, rows, name) {
   while (box.children.length > rows.length) box.lastChild.remove();
   while (box.children.length < rows.length) box.append(make(name, {}));
@@ -23,7 +23,7 @@ function placed(box, rows, name) {
 }
 
 export class Banner {
-  /** @param {import("./page.js").Page} page @param {string[]} differs what this browser computes otherwise than Python did */
+  /** @param {import("./page.js").Page} page @param {string[]} differs results that differ from those of Python, in words */
   constructor(page, differs) {
     this.page = page;
     this.data = page.rig.data;
@@ -49,7 +49,7 @@ export class Banner {
     this.showBar(answer);
   }
 
-  /** How fast it slides: contacts of machines by name where they do not slide as fast as the drive goes. */
+  /** Text of the sliding velocity: that of the drive, or slip rates of contacts by name where these differ from it. */
   speed({ observed }) {
     const { parameters, speed, facts } = this.data, i = parameters.findIndex((one) => one.name === speed), drive = this.page.rig.values[i], text = told(parameters[i], drive);
     const slips = facts.contacts.map((name) => [name, observed[`${name}.slip_rate`]]).filter(([, v]) => v !== undefined);
@@ -59,7 +59,7 @@ export class Banner {
     return `of ${each}${many && !same ? ", …" : ""} (drive ${text})`;
   }
 
-  /** What edges decide: the reason of a machine with the nearest, and the bar. @param {any} answer @param {any} [first] */
+  /** Update what depends on edges: the reason for the verdict on a machine, and the bar. @param {any} answer @param {any} [first] */
   follow(answer, first) {
     if (this.data.phrases) tell(this.reason, this.told(answer, first));
     this.choice.value = String(this.page.rig.bar);
@@ -74,7 +74,7 @@ export class Banner {
     return reason({ ...answer, own }, this.data, edge);
   }
 
-  /** What the bar shows, as it is exactly or as the track has it: where it is stable, the own value, a scale from 0 to 1. */
+  /** Contents of the bar, from the exact stable set or from the track: stable intervals, own value, scale to 0 ... 1. */
   drawn(answer) {
     const { page, data } = this, { rig } = page, one = data.parameters[rig.bar], own = answer.stiffness + answer.gain;
     const whole = data.phrases || this.springs(answer);
@@ -94,12 +94,12 @@ export class Banner {
     return { told: one, intervals, ends: parts.slice(0, -1).map(({ at }) => at), own: rig.values[rig.bar], gain: 0, x: (v) => (Number.isFinite(v) ? scale.of(v) : Number(v > 0)), range, logarithmic };
   }
 
-  /** Whether the bar is about a spring, and a gain beside it, rather than about another parameter, or a gain alone. */
+  /** True if the bar shows a spring stiffness, perhaps with a gain added, rather than another parameter or a gain alone. */
   springs({ gain, stiffness }) {
     return this.data.parameters[this.page.rig.bar]?.name === this.data.stiffness && (!gain || stiffness > 0);
   }
 
-  /** Stable values of what is chosen, a controller's gain counted with a stiffness, with the rig's own. */
+  /** Draw the stable values of the chosen parameter (stiffness plus gain of a controller) with the rig's own value. */
   showBar(answer) {
     const found = this.drawn(answer);
     this.bar.hidden = !found;
@@ -107,9 +107,9 @@ export class Banner {
     const { told: one, intervals, ends, own, gain, logarithmic } = found, { phrases, parameters } = this.data, { bar } = this.page.rig;
     const whole = !phrases && this.springs(answer), marks = [...ends, own, gain].filter((v) => v > 0), [factor, name] = unitFor(one, own || marks[0] || 1);
     const together = logarithmic && Math.max(...marks) < ASUNDER * Math.min(...marks);
-    const value = (v) => (together ? `${digits(v / factor)} ${name}`.trim() : told(one, v)); // one unit on one bar, unless decades lie between
+    const value = (v) => (together ? `${digits(v / factor)} ${name}`.trim() : told(one, v)); // one unit for all marks, unless they span decades
     const x = (v) => 100 * Math.min(1, Math.max(0, found.x(v)));
-    const least = gain > 0 ? `M0 0H${x(gain)}V10H0Z` : ""; // less than the gain alone is not to be had
+    const least = gain > 0 ? `M0 0H${x(gain)}V10H0Z` : ""; // total stiffness cannot be below the gain
     const drawn = `M0 0H100V10H0Z|${least}|${intervals.map(({ low, high }) => `M${x(low)} 0H${x(high)}V10H${x(low)}Z`).join("")}`.split("|");
     this.paths.forEach((path, n) => put(path, "d", drawn[n]));
     const [size] = unitFor(one, found.range[1]), scale = ticks(found.range[0] / size, found.range[1] / size, logarithmic, 4).map((v) => v * size).filter((v) => x(v) > 6 && x(v) < 94);
@@ -119,13 +119,13 @@ export class Banner {
     if (own > gain && gain > 0 && !ends.length) labels.push(["", x(gain), `the gain alone ${value(gain)}`]);
     placed(this.marks, marked, "i");
     placed(this.labels, [...this.fitted(scale.map((v) => ["tick", x(v), value(v)])), ...this.fitted([["now", x(own), `${words}now ${value(own)}`]]), ...this.fitted(labels)], "span");
-    const starts = (low) => low > (whole || phrases ? gain : -Infinity) && low > -Infinity; // else it is stable down to the least there is
+    const starts = (low) => low > (whole || phrases ? gain : -Infinity) && low > -Infinity; // otherwise the interval begins at the lowest possible value
     const said = intervals.map(({ low, high }) => (high < Infinity ? (starts(low) ? `${value(low)} to ${value(high)}` : `below ${value(high)}`) : starts(low) ? `above ${value(low)}` : "any"));
     const what = whole ? (gain > 0 ? `stiffness and gain together, of which the gain is ${value(gain)}` : "stiffness") : `values of ${parameters[bar].name}`;
     put(this.bar, "aria-label", `stable ${what}: ${said.join(", or ") || "none"}`);
   }
 
-  /** Labels of one row, the first the most important: within the bar, and those that would lie on others left out. */
+  /** Place the labels of one row within the bar, most important first; labels that would overlap are left out. */
   fitted(labels) {
     const wide = this.page.wide, taken = /** @type {[number, number][]} */ ([]);
     return labels.flatMap(([kind, at, text]) => {

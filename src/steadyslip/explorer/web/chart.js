@@ -1,17 +1,17 @@
-// A chart of stability in two parameters: regions by rows, their outline by marching squares.
+// Stability chart over two parameters: regions filled row by row, outlines by marching squares.
 import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
 
 export const CLASSES = { [ABSENT]: "none", [STABLE]: "stable", [UNSTABLE]: "unstable", [UNKNOWN]: "unknown" };
 
 /**
- * Paths of the regions and of the outline between them.
+ * SVG paths of the regions and of the outlines between them.
  * @param {(x: number, y: number) => number} status of positions from 0 to 1
  * @param {number} rows
  */
 export function regions(status, rows, width, height) {
   const columns = Math.round(rows * 1.3), grid = [];
   const paths = { stable: "", unstable: "", none: "", unknown: "" };
-  const cut = (at, a, b, first) => { // between two positions of different status
+  const cut = (at, a, b, first) => { // boundary point between two positions of different status, by bisection
     for (let step = 0; step < 10; step++) {
       const middle = 0.5 * (a + b);
       if (at(middle) === first) a = middle;
@@ -33,7 +33,7 @@ export function regions(status, rows, width, height) {
       if (b !== c) points.push([(i + 1) / columns, upColumn(j, i + 1)]);
       if (d !== c) points.push([acrossRow(j + 1, i), (j + 1) / rows]);
       if (a !== d) points.push([i / columns, upColumn(j, i)]);
-      const mean = (which) => points.reduce((sum, point) => sum + point[which], 0) / points.length; // where three regions meet
+      const mean = (which) => points.reduce((sum, point) => sum + point[which], 0) / points.length; // more than two crossings: regions meet in the middle
       const ends = points.length === 3 ? points.flatMap((point) => [point, [mean(0), mean(1)]]) : points;
       for (let k = 0; k + 1 < ends.length; k += 2) outline += `M${left(ends[k][0])} ${top(ends[k][1])}L${left(ends[k + 1][0])} ${top(ends[k + 1][1])}`;
     }
@@ -42,14 +42,14 @@ export function regions(status, rows, width, height) {
   for (let j = 0; j < fine; j++) {
     const y = (j + 0.5) / fine, low = grid[j >> 1], high = grid[(j >> 1) + 1];
     const high_ = top((j + 1) / fine), low_ = top(j / fine);
-    const bar = (a, b, code) => { // half a pixel over the next row, so that no seam shows
+    const bar = (a, b, code) => { // half a pixel into the next row, so that there is no seam
       paths[CLASSES[code]] += `M${left(a)} ${high_}H${left(b)}V${(Number(low_) + 0.5).toFixed(1)}H${left(a)}Z`;
     };
     if (low.every((s, i) => s === low[0] && high[i] === low[0])) {
       bar(0, 1, low[0]);
       continue;
     }
-    // a cell of one status at all its corners is taken to be of that status
+    // a cell whose corners have one status is filled with it
     let from = 0, code = low[0] === high[0] ? low[0] : status(0, y);
     for (let i = 0; i < columns; i++) {
       const same = low[i + 1] === high[i + 1], next = same ? low[i + 1] : status((i + 1) / columns, y);

@@ -1,12 +1,12 @@
-// A slider and a typed value for each parameter; every slider's track is painted with what would be.
+// Controls of parameters: a slider and a text field each; the slider track has the colour of the status at each value.
 import { CLASSES } from "./chart.js";
 import { make, put, tell } from "./dom.js";
 import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
 import { named } from "./words.js";
 
-const THIN = 0.006; // share of a track below which a colour cannot be seen
-const ROOM = 15; // letters that a field has room for
+const THIN = 0.006; // least share of a track for a visible colour
+const ROOM = 15; // letters that fit into a field
 const STEPS = 1000, NEAR = 0.005, FAR = 0.05;
 const KEYS = { ArrowRight: NEAR, ArrowUp: NEAR, ArrowLeft: -NEAR, ArrowDown: -NEAR, PageUp: FAR, PageDown: -FAR };
 
@@ -26,7 +26,7 @@ export class Controls {
   }
 
   row(one, i) {
-    const label = `${one.name}: ${named(one.doc, one.unit)}`, { page } = this, id = `taken-${Math.random().toString(36).slice(2)}`; // several pages may share a document
+    const label = `${one.name}: ${named(one.doc, one.unit)}`, { page } = this, id = `taken-${Math.random().toString(36).slice(2)}`; // unique: a document may have several pages
     const slider = make("input", { type: "range", min: "0", max: String(STEPS), step: "any", "aria-label": label });
     const text = make("input", { type: "text", "aria-label": `${label}, value with unit`, spellcheck: false, autocomplete: "off", "aria-describedby": id });
     const fault = make("span", { className: "fault", role: "alert" }), taken = make("span", { className: "taken hint", id });
@@ -37,7 +37,7 @@ export class Controls {
       const step = KEYS[event.key];
       if (step === undefined) return;
       event.preventDefault();
-      event.stopPropagation(); // notebooks take keys away from sliders
+      event.stopPropagation(); // notebooks would use the keys themselves
       page.slide(i, Number(slider.value) / STEPS + step, false);
     });
     text.addEventListener("change", () => this.typed(i));
@@ -53,13 +53,13 @@ export class Controls {
     return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
   }
 
-  /** The unit that a bare number counts in. @param {number} i */
+  /** Unit assumed for a typed number without unit. @param {number} i */
   unit(i) {
     const { rig } = this.page;
     return unitFor(rig.data.parameters[i], rig.values[i])[1] || "1";
   }
 
-  /** What a number without a unit is taken for. @param {number} i */
+  /** Hint text on the meaning of a number without unit. @param {number} i */
   taken(i) {
     const { value } = this.rows[i].text, unit = this.unit(i);
     return unit === "1" || unitIn(value) || !unitIn(`${value} s`) ? "" : `taken as ${value.trim()} ${unit}`;
@@ -80,7 +80,7 @@ export class Controls {
     }
   }
 
-  /** What was refused makes room for the value of now. @param {number} i */
+  /** Replace a refused entry by the present value. @param {number} i */
   forget(i) {
     const { text, fault } = this.rows[i];
     this.rows[i].refused = NaN;
@@ -88,7 +88,7 @@ export class Controls {
     tell(fault, "");
   }
 
-  /** Values and tracks as they are now. */
+  /** Update the shown values and tracks. */
   show() {
     const { rig, tracks } = this.page;
     this.rows.forEach(({ slider, text, name, refused }, i) => {
@@ -107,7 +107,7 @@ export class Controls {
   }
 }
 
-/** Parts of a track, the thinnest wide enough to be seen, but not over the place where the rig is. @param {{from: number, to: number, status: number}[]} parts @param {number} own */
+/** Parts of a track, thin ones widened to be visible, but never over the position of the rig. @param {{from: number, to: number, status: number}[]} parts @param {number} own */
 function visible(parts, own) {
   const found = parts.map(({ from, to, status }) => ({ from, to, status }));
   found.forEach((part, n) => {

@@ -1,4 +1,4 @@
-// What the rig does after a disturbance: curves over time, phase plane, events, the mechanism; one time for all of them.
+// Motion after a disturbance: curves over time, phase plane, events and moving sketch, with one time cursor for all.
 import { DISTURBANCES, Refused, asked, called } from "./disturbances.js";
 import { button, copy, make, svg, tell } from "./dom.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
@@ -8,21 +8,21 @@ import { shown, unitIn } from "./quantities.js";
 import { MachineSketch, Sketch } from "./sketch.js";
 import { dropped, outcome, slow } from "./words.js";
 
-/** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; those of the phase plane */
+/** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; indices of those of the phase plane */
 
-const AWAY = 1e6; // times the velocity of steady sliding, beyond which a run away is not drawn
-const STILL = 1e-15, LOOSE = 1e-3; // shares of the slip rate and of the normal force of steady sliding, below which it stands still and nothing presses
-const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // ms of the whole when it is played
+const AWAY = 1e6; // velocity over that of steady sliding above which a run-away is not drawn
+const STILL = 1e-15, LOOSE = 1e-3; // slip rate and normal force over those of steady sliding below which the contact counts as stuck and as open
+const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // HIGH: height of a strip and PLANE: box of the phase plane, SVG units; LISTED: most events in the list; FILM: duration of replay, ms
 
 export class Course {
-  /** @type {any} */ course; // what the rig did last
+  /** @type {any} */ course; // result of the last run
   /** @type {any} */ before;
-  /** @type {any} */ now; // its series as they are drawn
+  /** @type {any} */ now; // series of the last run as drawn
   /** @type {any[]} */ boxes;
   /** @type {any[]} */ dots;
-  choose = () => {}; // names of what the disturbance can act on
+  choose = () => {}; // updates the choice of bodies or contacts that a disturbance acts on
   playing = 0;
-  units = { size: "", length: "" }; // of what was typed last
+  units = { size: "", length: "" }; // units of the last typed size and length
 
   /** @param {import("./page.js").Page} page @param {() => any} library */
   constructor(page, library) {
@@ -32,7 +32,7 @@ export class Course {
     this.mover = motion && new Mover(library, motion);
     this.box = make("section", { className: "motion", "aria-label": "motion" }, make("h2", { textContent: "What does it do?" }));
     this.told = make("p", { className: "told", role: "status" });
-    this.done = make("p", { className: "hint" }); // to the rig, and when
+    this.done = make("p", { className: "hint" }); // text: disturbance and time
     this.sketch = /** @type {any} */ (page.rig.data.phrases ? new MachineSketch(sketch, motion?.bodies ?? []) : new Sketch(sketch));
     if (!this.mover) {
       this.box.append(make("p", { className: "told", textContent: `No motion on this page: ${still}.` }), this.sketch.canvas);
@@ -93,25 +93,25 @@ export class Course {
       make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", { className: motion.bodies.length ? "wide" : "" }, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)), this.list, this.same);
   }
 
-  /** What is shown, by name. */
+  /** Name of the contact or body that is shown. */
   viewed() {
     return this.view.selectedOptions[0]?.textContent ?? "";
   }
 
-  /** Show a contact or body, if there is one of that name. @param {string} name */
+  /** Show the contact or body of the given name, if there is one. @param {string} name */
   look(name) {
     const found = [...this.view.options].find((one) => one.textContent === name);
     if (found) this.view.value = found.value;
   }
 
-  /** Something else is done to the rig: sizes and curves are not those of before. */
+  /** Apply a change of disturbance: reset sizes and drop the old curves. */
   forget() {
     this.size.value = this.size.placeholder = this.units.size = "";
     this.course = null;
     this.soon();
   }
 
-  /** A bare number counts in the unit that the field shows, or showed before, and is written with it. */
+  /** Add the unit shown in a field, now or before, to a number typed without one. */
   typed(name) {
     const field = this[name], unit = unitIn(field.value);
     if (!field.value) this.units[name] = "";
@@ -122,12 +122,12 @@ export class Course {
 
   // -- running
 
-  /** What was moved last becomes the curve of before. */
+  /** Keep the last run as the faint curve for comparison. */
   keep() {
     this.before = this.course ?? this.before;
   }
 
-  /** Move the rig once the page is drawn and values rest. */
+  /** Start a run once the page is drawn and values no longer change. */
   soon() {
     if (!this.mover) return;
     clearTimeout(this.waiting);
@@ -167,7 +167,7 @@ export class Course {
     this.halt.disabled = true;
   }
 
-  /** No motion belongs to what is asked for: why, without the curves of another. @param {string} why */
+  /** Show why there is no motion, and remove the curves of other runs. @param {string} why */
   none(why) {
     this.mover.forget();
     this.halt.disabled = true;
@@ -192,7 +192,7 @@ export class Course {
 
   // -- drawing
 
-  /** What is shown of a course, of a contact or a body, without what follows once it has run away. @returns {View} */
+  /** Series of a run to show for a contact or body, cut where it runs away. @returns {View} */
   series(course) {
     const { area, phrases } = this.page.rig.data, { sliding } = this.mover.own, n = Number(this.view.value || 0);
     const end = course.status === "blow-up" ? Math.min(...course.contacts.map((one, i) => one.v.findIndex((v) => v > AWAY * sliding[i].rate)).filter((at) => at >= 0), course.times.length) : course.times.length;
@@ -202,7 +202,7 @@ export class Course {
       return { times, shown: [[cut(v), `${unit}/s`, "velocity"], [cut(x), unit, "ahead"]], plane: [1, 0] };
     }
     const { v, tau, sigma, floor, pressed } = course.contacts[n], friction = cut(tau).map((one, i) => (sigma[i] > pressed ? one / sigma[i] : NaN)), normal = area ? cut(sigma).map((one) => one * area) : cut(sigma);
-    const moving = cut(v).map((one) => (Math.abs(one) < floor ? floor : one)), si = area === null && !phrases ? "Pa" : "N"; // what is slower stands still
+    const moving = cut(v).map((one) => (Math.abs(one) < floor ? floor : one)), si = area === null && !phrases ? "Pa" : "N"; // slower velocities are drawn at the floor
     return { times, shown: [[moving, "m/s", "velocity"], [friction, "1", "friction"], [normal, si, `normal ${si === "N" ? "force" : "stress"}`]], plane: [0, 1] };
   }
 
@@ -245,7 +245,7 @@ export class Course {
     }));
   }
 
-  // -- the time that all of it shows
+  // -- time cursor
 
   point(event) {
     if (!this.course) return;
@@ -254,7 +254,7 @@ export class Course {
     this.show(((event.clientX - place.left) * unit - left) / width);
   }
 
-  /** @param {number} share of the run */
+  /** Show the run at a time. @param {number} share of its duration, 0 to 1 */
   show(share) {
     if (!this.course || !this.now.times.length) return;
     const at = Math.min(1, Math.max(0, share)) * this.course.until, { times, shown: series, strips, drawn, plane: [across, up] } = this.now, { left, width } = this.page.size;

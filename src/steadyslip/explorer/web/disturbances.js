@@ -1,4 +1,4 @@
-// What can be done to a rig: in words, where, in which unit, and how much of it shows.
+// Disturbances of a rig: text, place, unit and usual size of each kind.
 import { digits, parse, shown } from "./quantities.js";
 import { named } from "./words.js";
 
@@ -7,10 +7,10 @@ import { named } from "./words.js";
  * @typedef {{words: string, many?: string, kind: string, unit: (unit: string) => string, usual: (known: Known) => number, ratio?: boolean, positive?: boolean}} Disturbance
  */
 
-const PERIODS = 12, BEFORE = 20; // of the run, and its share before the disturbance
+const PERIODS = 12, BEFORE = 20; // PERIODS: length of a run in periods; BEFORE: the disturbance comes after 1/BEFORE of the run
 const force = ({ answer, sliding }) => sliding.map((one, i) => answer.observed[`${one.name}.friction_force`] ?? answer.observed.shear_stress ?? answer.sigmas[i]);
 
-/** @type {Record<string, Disturbance>} `many` are the words of machines, before what it acts on if that has a name */
+/** @type {Record<string, Disturbance>} `many` is the text for machines, followed by the name of the body or contact */
 export const DISTURBANCES = {
   velocity: { words: "step of the drive velocity", kind: "velocity-step", unit: () => "1", usual: () => 2, ratio: true },
   hold: { words: "hold of the load point", many: "hold of the drive", kind: "hold", unit: () => "s", usual: ({ period }) => period, positive: true },
@@ -21,7 +21,7 @@ export const DISTURBANCES = {
   },
   pull: {
     words: "pull on the block", many: "pull on", kind: "disturbance-step", unit: () => "Pa",
-    usual: (known) => { // a share of friction, as the body feels it
+    usual: (known) => { // a share of the friction force on the body
       const { on, answer, sliding } = known, forces = force(known), speed = on ? answer.observed[`${on}.v`] : sliding[0].rate;
       return 0.01 * (speed > 0 ? forces.reduce((sum, one, i) => sum + one * sliding[i].rate, 0) / speed : Math.max(...forces));
     },
@@ -29,13 +29,13 @@ export const DISTURBANCES = {
   blow: { words: "blow on the block, its velocity", many: "blow that multiplies the velocity of", kind: "", unit: () => "1", usual: () => 10, ratio: true },
 };
 
-/** What a disturbance of a rig is called. @param {string} kind @param {any} data */
+/** Text of a kind of disturbance. @param {string} kind @param {any} data */
 export function called(kind, { phrases, area }) {
   const { words, many } = DISTURBANCES[kind];
   return phrases ? many ?? words : named(words, area === null ? "Pa" : "N");
 }
 
-/** The unit of a size: forces of machines and of rigs with an area. @param {any} data @param {string} kind @param {string} on */
+/** Unit of the size of a disturbance; forces instead of stresses for machines and rigs with an area. @param {any} data @param {string} kind @param {string} on */
 function unitOn(data, kind, on) {
   const speed = data.parameters.find((one) => one.name === data.speed).unit, own = DISTURBANCES[kind].unit(speed.replace(/\/s$/, ""));
   if (own !== "Pa") return own;
@@ -44,7 +44,7 @@ function unitOn(data, kind, on) {
 }
 
 /**
- * Size, begin and length of what is asked for, as it stands in the fields or as it shows most, with what is usual.
+ * Size, begin and duration of a disturbance (SI units) from the typed texts, with usual values for empty fields.
  * @param {import("./page.js").Page} page @param {any} motion @param {{kind: string, on: string, size: string, length: string}} given
  */
 export function asked(page, motion, { kind, on, size: text, length }) {
@@ -65,7 +65,7 @@ export function asked(page, motion, { kind, on, size: text, length }) {
   };
 }
 
-/** An entry that is refused, and in which field it stands. */
+/** Error for a refused entry, with the field it was typed in. */
 export class Refused extends Error {
   /** @param {"size" | "length"} field @param {string} words */
   constructor(field, words) {
@@ -82,10 +82,10 @@ function read(field, text, si) {
   }
 }
 
-/** The same run for a command line: the table that a rig file needs, or, for a blow, what it starts from. */
+/** Text that repeats a run on the command line: the table [protocol] of a rig file, or the starting values of a blow. */
 function asFile(page, { kind, on, size, si, at, until }) {
   const { answer, rig: { data, values } } = page, drive = data.parameters.findIndex((one) => one.name === data.speed), one = data.parameters[drive];
-  const table = `[protocol]\nuntil = "${until} s"\n`, plain = (product) => Number(product.toPrecision(15)); // no tail of rounding
+  const table = `[protocol]\nuntil = "${until} s"\n`, plain = (product) => Number(product.toPrecision(15)); // 15 digits: without the tail of rounding
   if (kind === "blow") return `${table}\n# steadyslip simulate ${data.title}.toml --initial ${on ? `${on}.` : ""}v=${plain(size * (on ? answer.observed[`${on}.v`] : values[drive]))}\n`;
   const much = kind === "velocity" ? ["to", `"${plain(size * values[drive])} ${one.unit}"`] : [kind === "hold" ? "duration" : "by", `"${size} ${si}"`];
   return `${table}\n[[protocol.pieces]]\nkind = "${DISTURBANCES[kind].kind}"\nat = "${at} s"\n${much.join(" = ")}\n${on ? `on = "${on}"\n` : ""}`;

@@ -1,4 +1,4 @@
-// Steady sliding in numbers, eigenvalues with their locus, and the list of nearest edges.
+// Tables of steady sliding and eigenvalues, root locus, and list of nearest edges.
 import { make, put, svg, tell } from "./dom.js";
 import { BESIDE } from "./edges.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
@@ -8,14 +8,14 @@ import { digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
 import { beyondWords, named, quantity } from "./words.js";
 
-/** What the marks of the locus mean, beside the mark itself: its path and class. */
+/** Legend of the root locus: meaning, path and class of each mark. */
 const MARKS = [
   ["M2 2l10 10m0 -10l-10 10", "own grows", "now, grows"], ["M2 2l10 10m0 -10l-10 10", "own", "now, dies out"],
   ["M2 7l5 -5l5 5l-5 5z", "crossing", "at the edge of stability"],
 ];
 const DOTS = "M2 7h0", LARGER = "M11 7h0";
 
-/** Rows of words in a list: elements are made where their number changes, and else told what is new. */
+/** Update the rows of a list: new elements only if their number changes, otherwise new text. */
 function rewrite(list, rows, row, many) {
   if (list.children.length !== many * rows.length) list.replaceChildren(...rows.flatMap(row));
   rows.forEach((words, n) => words.forEach((text, k) => tell(many === 1 ? list.children[n].children[k] : list.children[many * n + k], text)));
@@ -44,7 +44,7 @@ export class Facts {
         this.shape = make("p", { className: "mode" }), legend()));
   }
 
-  /** Numbers. @param {any} answer */
+  /** Update the numbers. @param {any} answer */
   show(answer) {
     const { rig } = this.page, { area, phrases } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
     this.sliding.hidden = this.swings.hidden = absent;
@@ -56,14 +56,14 @@ export class Facts {
     rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
       const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
-      return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // a number stays with its unit
+      return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // no line break between number and unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
     const linear = answer.intervals && (rig.data.phrases || rig.data.parameters[rig.bar]?.name === rig.data.stiffness);
     this.locus.show(answer, linear || !this.page.tracks ? undefined : this.page.others());
   }
 
-  /** The list, as the tracks are now. */
+  /** Update the list of nearest edges from the tracks. */
   showEdges() {
     const { page } = this;
     const rows = (edges) => edges.map((edge) => {

@@ -1,10 +1,10 @@
-// What leaves the page: links, rig files, tables, pictures.
+// Export from the page: links, rig files, tables, images.
 import { button, copy, make } from "./dom.js";
 
 const LOOK = ["fill", "stroke", "stroke-width", "font-size", "font-family", "opacity", "stroke-opacity", "stroke-dasharray", "display"];
-const PIXELS = 2; // of a picture to one of the page
+const PIXELS = 2; // pixels of an image for one pixel of the page
 
-/** The buttons. @param {import("./page.js").Page} page */
+/** Export buttons of a page. @param {import("./page.js").Page} page */
 export function leaving(page) {
   const { title } = page.rig.data;
   const save = (name, type, content) => {
@@ -27,7 +27,7 @@ function link(page) {
   copy(text).then(() => page.say("The link is copied."), () => (notice.textContent = text));
 }
 
-/** An SVG with its colours written out. @param {any} canvas */
+/** Text of an SVG with computed colours, independent of style sheets. @param {any} canvas */
 function drawing(canvas) {
   const copy = canvas.cloneNode(true), live = canvas.querySelectorAll("*");
   copy.querySelectorAll("*").forEach((element, n) => {
@@ -41,7 +41,7 @@ function drawing(canvas) {
   return new XMLSerializer().serializeToString(copy);
 }
 
-/** The same as pixels. @param {any} canvas @returns {Promise<Blob>} */
+/** PNG image of an SVG. @param {any} canvas @returns {Promise<Blob>} */
 async function picture(canvas) {
   const image = new Image(), [, , width, height] = canvas.getAttribute("viewBox").split(" ").map(Number);
   image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(drawing(canvas))}`;

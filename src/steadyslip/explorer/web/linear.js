@@ -1,4 +1,4 @@
-// What a rig's linear equations say at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
+// Linear stability of a rig at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
 // The equations themselves are generated (steadyslip/explorer/equations.py).
 import { modeOf } from "./modes.js";
 import { dampingOfPairs, roots } from "./polynomials.js";
@@ -9,16 +9,16 @@ import { dampingOfPairs, roots } from "./polynomials.js";
 /** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, degree: number, squares: number, closed: boolean, gain?: string | null, edge: number, grid: [number, number, number], solved: number,
  *   observed: [string, string, string][], coordinates?: string[], matrix?: any, stores?: any, shape?: any}} Facts */
 
-const NEARLY_REAL = 1e-6; // imaginary part of a root that is tried as real
-export const SAME = 1e-9; // relative distance of two edges that are one
-const HUGE = 1e150, SIGNED = 1e4; // sizes whose products are numbers; more than the logarithm of any product of coefficients
-const FORMULA = 4, REAL = 1e-9; // numbers that `steady` gives of a contact; imaginary part of a gain that is real but for rounding
-const APART = [1e-6, 1, 1e6]; // factors on a parameter at which the polynomial is looked at
-const SIZED_APART = 1e12; // times a parameter's size, and its inverse, beyond which rounding decides where it has an edge
+const NEARLY_REAL = 1e-6; // imaginary part over |s| of a root below which it is also tried as real
+export const SAME = 1e-9; // relative distance below which two edges count as one
+const HUGE = 1e150, SIGNED = 1e4; // HUGE: sizes whose products do not overflow; SIGNED: above the logarithm of any product of coefficients
+const FORMULA = 4, REAL = 1e-9; // FORMULA: values of `steady` for each contact; REAL: relative imaginary part of a gain that is rounding
+const APART = [1e-6, 1, 1e6]; // factors on a parameter for the test that it enters linearly
+const SIZED_APART = 1e12; // ratio of an edge to the size of a parameter above which the edge is rounding of 0 or infinity
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
 
 export class Linear {
-  bar = -1; // of a machine, the parameter whose stable values are told
+  bar = -1; // index of the parameter on the bar of a machine
 
   /**
    * @param {Programs} programs
@@ -30,25 +30,25 @@ export class Linear {
     this.count = facts.parameters.length;
     this.mixed = facts.searched.some(Boolean) && !facts.searched.every(Boolean);
     const contacts = facts.contacts.length, many = facts.degree + 1;
-    this.many = 3 + (facts.joint ? 1 + contacts : facts.searched.some(Boolean) ? 0 : 2 * contacts); // of `functions`
+    this.many = 3 + (facts.joint ? 1 + contacts : facts.searched.some(Boolean) ? 0 : 2 * contacts); // number of values of `functions`
     this.R = new Float64Array(this.count + contacts);
     this.y = new Float64Array(Math.max(8, 2 * many + 4, facts.squares + 2, facts.observed.length, FORMULA * contacts, ...(facts.matrix ? [facts.matrix[1].length, 2 + contacts + facts.stores.length * 4 + 2 * many] : [])));
-    this.c = new Float64Array(2 * facts.degree + 4); // behind coefficients: whether all roots are on the left, it is ill-posed, and what changes sign with that
+    this.c = new Float64Array(2 * facts.degree + 4); // coefficients, 1 if stable, 1 if ill-posed, then functions that change sign with the status
   }
 
-  /** What a program gives. @param {string} name @param {number} many @param {Float64Array} [from] @param {number} [number] */
+  /** Values of a program. @param {string} name @param {number} many @param {Float64Array} [from] @param {number} [number] */
   ask(name, many, from = this.R, number = 0) {
     this.programs[name](from, number, this.y);
     return Array.from(this.y.subarray(0, many));
   }
 
-  /** Parameters in the Model's order. @param {ArrayLike<number>} values */
+  /** Set the parameters, in the order of the Model. @param {ArrayLike<number>} values */
   set(values) {
     this.R.set(values);
     return this;
   }
 
-  /** Roots of the balance of a contact over the grid of stresses, each bracketed by a change of sign. */
+  /** Steady normal stresses of a contact: roots of its residual, bracketed by sign changes on the grid of stresses. */
   sought(contact) {
     const { grid: [many, first, last], solved } = this.facts, found = [], program = this.programs[`residual${contact}`], at = (sigma) => {
       this.R[this.count + contact] = sigma;
@@ -61,20 +61,20 @@ export class Linear {
       if (above === 0) found.push(high);
       else if (below * above < 0) {
         const root = bracketed(at, low, high, below);
-        if (Math.abs(at(root)) <= solved * root) found.push(root); // a pole changes sign too
+        if (Math.abs(at(root)) <= solved * root) found.push(root); // otherwise it is a pole
       }
       [low, below] = [high, above];
     }
     return found;
   }
 
-  /** Put the steady normal stresses into R: ABSENT or UNKNOWN where there are none, STABLE where there are. */
+  /** Write the steady normal stresses into R; returns STABLE, or ABSENT or UNKNOWN if there are none. */
   settle(branch = 0) {
     const { R, y, count, programs, facts: { contacts, searched, joint } } = this;
     if (joint) return this.together();
     if (!searched.every(Boolean)) programs.steady(R, 0, y);
     let status = STABLE;
-    const from = this.mixed ? y.slice(0, FORMULA * contacts.length) : y; // a search writes there, too
+    const from = this.mixed ? y.slice(0, FORMULA * contacts.length) : y; // copy: the search overwrites y
     for (let i = 0; i < contacts.length; i++) {
       let sigma = NaN;
       if (searched[i]) sigma = this.sought(i)[branch];
@@ -89,7 +89,7 @@ export class Linear {
     return status;
   }
 
-  /** The same where contacts press on each other. */
+  /** Write the steady normal stresses of contacts that press on each other into R; returns STABLE, ABSENT or UNKNOWN. */
   together() {
     const { R, y, count, programs, facts: { contacts: { length: many } } } = this;
     programs.steady(R, 0, y);
@@ -102,15 +102,15 @@ export class Linear {
     return status;
   }
 
-  /** The largest real gain with which contacts press on each other. */
+  /** Largest real eigenvalue of the matrix with which contacts press on each other; lock-up at 1. */
   gain() {
     const many = this.facts.contacts.length;
-    if (this.y.subarray(many, 2 * many).every((one) => one === 0)) return 0; // one presses on the other, and that is all
+    if (this.y.subarray(many, 2 * many).every((one) => one === 0)) return 0; // nilpotent: one contact presses on the other only
     const real = roots(this.y.subarray(many, 2 * many + 1)).filter((s) => Math.abs(s.im) <= REAL * Math.hypot(s.re, s.im));
     return real.reduce((most, s) => Math.max(most, s.re), -Infinity);
   }
 
-  /** ABSENT, STABLE, UNSTABLE (ill-posed too) or UNKNOWN: what charts and tracks are painted with, so it makes no arrays. */
+  /** Status ABSENT, STABLE, UNSTABLE (also ill-posed) or UNKNOWN; called for each point of a chart, so it makes no arrays. */
   status(branch = 0) {
     const { R, c, y, programs } = this;
     programs.allowed(R, 0, y);
@@ -124,15 +124,15 @@ export class Linear {
   }
 
   /**
-   * Functions of which one changes its sign wherever the status does, once that has been asked for: the logarithm of each
-   * one's size, and `SIGNED` more, with its sign.
+   * Functions of which one changes sign wherever the status does; call `status` before. Each is coded as
+   * sign * (ln|value| + SIGNED).
    * @param {number} status
    */
   functions(status) {
     const { y, c, facts: { contacts: { length: many }, searched, joint, degree } } = this, found = /** @type {number[]} */ ([]);
     if (status === UNKNOWN) return found;
     if (joint) {
-      let left = 0; // det(1 − A), of which that with the gains A has the coefficients
+      let left = 0; // det(1 − A), from the coefficients of the characteristic polynomial of A
       for (let i = many; i <= 2 * many; i++) left += y[i];
       found.push(signedLog(left));
       for (let i = 0; i < many; i++) found.push(signedLog(left * y[i]));
@@ -147,7 +147,7 @@ export class Linear {
     return found;
   }
 
-  /** The whole answer at the parameters that are set. */
+  /** Complete answer at the parameters that are set: status, steady sliding, stable values, eigenvalues. */
   assess(branch = 0) {
     const { facts, R, count } = this, status = this.status(branch);
     const answer = { status, sigma: R[count], sigmas: Array.from(R.subarray(count)) };
@@ -170,19 +170,19 @@ export class Linear {
     };
   }
 
-  /** Eigenvalues alone; none where there is no steady sliding. */
+  /** Eigenvalues; empty without steady sliding. */
   roots(branch = 0) {
     return this.settle(branch) === STABLE ? roots(this.ask("coefficients", this.facts.degree + 1)) : [];
   }
 
-  /** Whether rounding decides on the status. */
+  /** True if the status depends on rounding. */
   onEdge(branch = 0) {
     if (this.settle(branch) !== STABLE) return false;
     const { facts: { degree, edge } } = this, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1;
     return !illPosed && this.edgeDecides(roots(c), this.ask("statics", 1)[0] <= edge);
   }
 
-  /** Why there is no steady sliding: the contact, and the numbers that say so. */
+  /** Reason why there is no steady sliding: contact and numbers. */
   absence(status) {
     const { facts: { contacts, searched, joint }, R, y, count } = this;
     if (status === UNKNOWN) return {};
@@ -198,7 +198,7 @@ export class Linear {
   }
 
   /**
-   * p + θ q, the own θ, and where that is stable: θ is a slider's stiffness, or of a machine what its bar shows.
+   * Characteristic polynomial p + θ q, own θ and its stable intervals; θ is the stiffness of a slider, or the bar's parameter.
    * @returns {{p: number[], q: number[], own: number, share: number, gain: number, intervals: Interval[] | null, ends: number[]}}
    */
   varied(c, branch) {
@@ -211,7 +211,7 @@ export class Linear {
     return { ...(found ?? { p: c, q: c.map(() => 0), intervals: null, ends: [] }), own, share: 1, gain: 0 };
   }
 
-  /** Stable values of a parameter that enters linearly, their ends, p and q; null of others. @param {number} place */
+  /** Stable values of a parameter that enters linearly, their ends, p and q; null for other parameters. @param {number} place */
   valuesOf(place, branch) {
     const own = this.R[place], split = own > 0 ? this.linearIn(place, branch) : null;
     if (!split) return null;
@@ -222,7 +222,7 @@ export class Linear {
     };
   }
 
-  /** p and q of p + f q, f a factor on a parameter; null where it does not enter so. @param {number} place */
+  /** p and q of the characteristic polynomial p + f q, f a factor on a parameter; null if not linear in it. @param {number} place */
   linearIn(place, branch) {
     const { R, facts: { degree }, count } = this, many = degree + 1, told = new Float64Array(3 * many), own = R[place], sigmas = R.slice(count);
     const known = APART.every((factor, n) => {
@@ -244,20 +244,20 @@ export class Linear {
     return q.some((slope) => slope !== 0) ? { p, q } : null;
   }
 
-  /** Positive factors on a parameter at which a root is on the axis, rising; null where it does not enter linearly. @param {number} place */
+  /** Positive factors on a parameter, rising, with a root on the imaginary axis; null if it does not enter linearly. @param {number} place */
   crossings(place, branch) {
     const split = this.R[place] > 0 ? this.linearIn(place, branch) : null;
     return split && this.cuts(split.p, split.q);
   }
 
-  /** Whether a root on the axis decides: no other grows. @param {Complex[]} found @param {boolean} neutral whether one is zero */
+  /** True if a root on the axis decides stability, because no other root grows. @param {Complex[]} found @param {boolean} neutral true if one root is zero */
   edgeDecides(found, neutral) {
     const { edge } = this.facts, least = Math.min(...found.map((s) => Math.hypot(s.re, s.im)));
     const grows = found.some(({ re, im }) => re > edge * Math.hypot(re, im) && !(neutral && Math.hypot(re, im) <= least));
     return (neutral || Math.abs(0.5 * dampingOfPairs(found)) <= edge) && !grows;
   }
 
-  /** Stable k > 0, and the ends where stability changes; the closed form where there is one, which keeps its digits. */
+  /** Stable intervals of k > 0 and their ends; in closed form where there is one, which loses no digits. */
   stableStiffness(p, q) {
     if (!this.facts.closed) return this.stableSet(p, q);
     const [low, high] = this.ask("interval", 2), intervals = low < high ? [{ low, high }] : [];
@@ -265,7 +265,7 @@ export class Linear {
     return { intervals, ends };
   }
 
-  /** All k > 0 at which a root of p + k q may be on the axis, rising. */
+  /** All k > 0, rising, at which a root of p + k q may be on the imaginary axis. */
   cuts(p, q) {
     const both = Float64Array.of(...p, ...q), [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2, both), cuts = [still, infinite];
     for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, both, re)[0]);
@@ -273,7 +273,7 @@ export class Linear {
     return found.filter((k, i) => i === 0 || k > found[i - 1] * (1 + SAME));
   }
 
-  /** The same by trial: between all k at which a root may cross the axis, the verdict is one. */
+  /** Stable intervals of k > 0 without closed form: between the k of possible crossings the verdict is constant. */
   stableSet(p, q) {
     const both = Float64Array.of(...p, ...q), apart = [0, ...this.cuts(p, q), Infinity];
     const ratios = p.map((v, i) => Math.abs(v / q[i])).filter((r) => r > 0 && Number.isFinite(r)), natural = ratios.length ? Math.max(...ratios) : 1;
@@ -297,21 +297,21 @@ const NOTHING = {
   observed: /** @type {Record<string, number>} */ ({}),
 };
 
-/** The size of k in p + k q: 1, its own value, unless p and k q are alike in size only far from there. @param {number[]} p @param {number[]} q */
+/** Size of k in p + k q: 1 (its own value), or that at which p and k q have equal size if it is far from 1. @param {number[]} p @param {number[]} q */
 function sizeOfFactor(p, q) {
   const ratios = p.map((v, i) => Math.log(Math.abs(v)) - Math.log(Math.abs(q[i]))).filter(Number.isFinite);
   const alike = Math.exp(ratios.reduce((a, b) => a + b, 0) / Math.max(ratios.length, 1));
   return alike < APART[0] || alike > APART[2] ? alike : 1;
 }
 
-/** A stable set whose ends are 0 or infinity where they are rounding of these. @param {{intervals: Interval[], ends: number[]}} found @param {number} size */
+/** Stable set with ends that are rounding of 0 or infinity replaced by these. @param {{intervals: Interval[], ends: number[]}} found @param {number} size */
 function resolved({ intervals, ends }, size) {
   const end = (k) => (k < size / SIZED_APART ? 0 : k > size * SIZED_APART ? Infinity : k);
   const known = intervals.map(({ low, high }) => ({ low: end(low), high: end(high) })).filter(({ low, high }) => low < high);
   return { intervals: known, ends: ends.filter((k) => end(k) === k) };
 }
 
-/** The end nearest to a value, and on which side of it is what is stable. @param {Interval[] | null} intervals @param {number[]} ends */
+/** End of a stable set nearest to a value, and its stable side. @param {Interval[] | null} intervals @param {number[]} ends */
 function nearestEnd(intervals, ends, own) {
   if (!ends.length) return { critical: null, side: null };
   const critical = ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a));
@@ -320,7 +320,7 @@ function nearestEnd(intervals, ends, own) {
 
 const signedLog = (value, size = SIGNED) => Math.sign(value) * (size + Math.log(Math.abs(value)));
 
-/** A root between two values of different sign: regula falsi (Illinois), then bisection while it does not narrow. */
+/** Root between two points of different sign: regula falsi (Illinois), and bisection if that is slow. */
 function bracketed(at, low, high, below) {
   let above = at(high), side = 0;
   for (let i = 0; i < 200 && high - low > 1e-15 * low; i++) {

@@ -1,13 +1,13 @@
-// Eigenvalues in the complex plane, and how they move with the stiffness.
+// Root locus: eigenvalues in the complex plane as the stiffness varies.
 import { make, put, svg, tell } from "./dom.js";
 import { axis, straight } from "./plot.js";
 import { roots } from "./polynomials.js";
 
-const POINTS = 90, DECADES = 2, VIEW = 1.8; // half the width of the view at least, in sizes of the eigenvalues that decide
-const SIZES = [1.8, 2.6, 3.4, 4.2]; // of dots, as the stiffness rises
+const POINTS = 90, DECADES = 2, VIEW = 1.8; // POINTS: stiffnesses, over DECADES to each side; VIEW: half the width over the largest |s| at the edge
+const SIZES = [1.8, 2.6, 3.4, 4.2]; // radii of dots, SVG units, by rising stiffness
 const BOX = { left: 62, top: 8, width: 290, height: 220 };
 
-/** Stiffnesses around those that matter, or none where there is nothing to start from. */
+/** Stiffnesses of the locus, around the critical or own one; empty if there is neither. */
 function stiffnesses(answer) {
   const known = [answer.stiffness, ...answer.ends].filter((k) => k > 0);
   if (!known.length) return [];
@@ -15,7 +15,7 @@ function stiffnesses(answer) {
   return Array.from({ length: POINTS }, (_, i) => 10 ** (low + ((high - low) * i) / (POINTS - 1)));
 }
 
-/** The next larger of a few round numbers, so that axes stay while eigenvalues move. */
+/** Next larger round number, so that axes stay unchanged while eigenvalues move a little. */
 function rounded(size) {
   const power = 10 ** Math.floor(Math.log10(size));
   return power * ([1, 1.5, 2, 3, 4, 5, 7].find((one) => one * power >= size) ?? 10);

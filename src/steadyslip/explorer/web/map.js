@@ -1,23 +1,23 @@
-// The chart of stability over two parameters, with the rig's point in it.
+// Stability chart over two parameters with the point of the rig.
 import { CLASSES, regions } from "./chart.js";
 import { make, put, svg } from "./dom.js";
 import { axis } from "./plot.js";
 import { told } from "./quantities.js";
 
-const ROWS = 60, ROWS_SEARCHED = 24; // where steady sliding has to be searched for, each point takes long
+const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
 const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Chart {
   /** @type {Record<string, any>} */ regions;
 
-  /** @param {import("./page.js").Page} page @param {[number, number]} axes which parameters at first */
+  /** @param {import("./page.js").Page} page @param {[number, number]} axes indices of the parameters at first */
   constructor(page, axes) {
     this.page = page;
     this.axes = axes;
-    this.rows = 0; // of the regions that are painted, and for which values
+    this.rows = 0; // rows of the painted regions (0: none)
     this.painted = "";
-    this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // several pages may share a document
+    this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // unique: a document may have several pages
     const { parameters } = page.rig.data;
     this.choices = [0, 1].map((which) => {
       const select = make("select", { "aria-label": which ? "parameter upwards" : "parameter across" },
@@ -43,7 +43,7 @@ export class Chart {
       this.canvas, make("p", { className: "key" }, ...this.key));
   }
 
-  /** A parameter on an axis; where it is on the other, they change places. @param {number} which @param {number} chosen */
+  /** Put a parameter on an axis; if it is on the other axis, swap the two. @param {number} which @param {number} chosen */
   put(which, chosen) {
     if (chosen === this.axes[1 - which]) this.axes[1 - which] = this.axes[which];
     this.axes[which] = chosen;
@@ -65,20 +65,20 @@ export class Chart {
   }
 
   show() {
-    if (this.page.root.dataset.width === "narrow" && this.page.part !== "chart") return; // nobody sees it
+    if (this.page.root.dataset.width === "narrow" && this.page.part !== "chart") return; // not visible
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
     this.choices.forEach((select, which) => (select.value = String(this.axes[which])));
-    const rows = (facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? 2 : 1); // finer once the hand rests
+    const rows = (facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? 2 : 1); // half the rows while a slider moves
     const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
-    if (others !== this.painted || rows > this.rows) { // the point alone may move: then the regions stay
+    if (others !== this.painted || rows > this.rows) { // regions are painted anew only if other values change or more rows are wanted
       [this.painted, this.rows] = [others, rows];
       const { paths, outline } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
       this.frame(i, j, x, y);
       for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);
       put(this.hatched, "d", paths.none);
       const seen = new Set(this.page.tracks.flatMap((track) => track.map((part) => CLASSES[part.status])));
-      for (const one of this.key) one.hidden = !paths[one.className] && !seen.has(one.className); // what is nowhere to be seen needs no words
+      for (const one of this.key) one.hidden = !paths[one.className] && !seen.has(one.className); // no legend for regions that are not in the chart
       put(this.outline, "d", outline);
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
@@ -88,7 +88,7 @@ export class Chart {
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
   }
 
-  /** Everything that only axes, ranges and size decide. */
+  /** Draw axes and labels, which depend on axes, ranges and size only. */
   frame(i, j, x, y) {
     const { size: box, ranges, rig: { data: { parameters } } } = this.page, known = [i, j, ...ranges[i], ...ranges[j], box.width].join();
     if (known === this.framed) return;

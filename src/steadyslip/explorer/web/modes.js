@@ -1,4 +1,4 @@
-// How a machine moves in a mode: the null vector of its characteristic matrix, what holds the energy, and its words.
+// Modes of a machine: null vector of the characteristic matrix, shares of energy, and sentences.
 // Matrix, speeds and energies are generated (steadyslip/explorer/modes.py), words are those of steadyslip/linear/modes.py.
 
 /** @typedef {{re: number, im: number}} Complex */
@@ -11,8 +11,8 @@ const over = (a, b) => {
 const sizeOf = (a) => Math.hypot(a.re, a.im);
 
 /**
- * The vector that a singular matrix takes to zero, by elimination with complete pivoting of what is balanced first.
- * @param {Complex[][]} given @param {number[][]} sizes of the terms of each entry: rounding of a row that is zero must not count
+ * Null vector of a singular matrix, by Gaussian elimination with complete pivoting after balancing.
+ * @param {Complex[][]} given @param {number[][]} sizes of the terms of each entry, so that rounding in a row of zeros is not taken for an entry
  */
 function nullVector(given, sizes) {
   const n = given.length, order = Array.from({ length: n }, (_, i) => i), columns = new Float64Array(n).fill(1);
@@ -51,7 +51,7 @@ function nullVector(given, sizes) {
   return vector;
 }
 
-/** Amplitudes of all coordinates as shares of the largest, and shares of the energy, of the mode of an eigenvalue. @param {any} linear @param {Complex} given */
+/** Mode of an eigenvalue: amplitudes of all coordinates over the largest, and shares of the energy. @param {any} linear @param {Complex} given */
 export function modeOf(linear, given) {
   const { coordinates, matrix: [size, entries], stores } = linear.facts, s = { re: given.re, im: Math.abs(given.im) };
   const found = linear.ask("matrix", entries.length), matrix = Array.from({ length: size }, () => Array.from({ length: size }, () => ({ re: 0, im: 0 })));
@@ -82,16 +82,16 @@ export function modeOf(linear, given) {
   };
 }
 
-/** A template with its places filled. @param {string} template @param {Record<string, string>} values */
+/** Template text with its {names} replaced by values. @param {string} template @param {Record<string, string>} values */
 export const fill = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => values[name]);
 
-/** A share in per cent, with as many digits as tell it from 0 and 100. @param {number} share */
+/** Share in per cent, with enough digits to differ from 0 and 100. @param {number} share */
 export function percent(share) {
   const text = Number((100 * share).toPrecision(3));
   return `${share > 0 && share < 1 && (text === 0 || text === 100) ? Number((100 * share).toPrecision(8)) : text} %`;
 }
 
-/** The shape of a mode as a sentence. @param {any} mode @param {any} shape words and limits */
+/** Sentence on the shape of a mode. @param {any} mode @param {any} shape words and limits */
 export function words(mode, { moves, hardly, suffix, words: said }) {
   const sizes = Object.entries(mode.amplitudes).map(([name, one]) => /** @type {[string, number]} */ ([name, sizeOf(one)]));
   const named = (test) => sizes.filter(([, size]) => test(size)).map(([name]) => name), called = (name) => name.replace(suffix, said.normal);

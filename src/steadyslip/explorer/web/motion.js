@@ -1,23 +1,23 @@
-// What a rig does after a disturbance: the generated kernel under the transpiled driver, in slices, so that it can be
-// stopped. What it starts from, scales, settings and segments, is generated too (steadyslip/explorer/motion.py).
+// Simulated motion after a disturbance: the generated kernel under the transpiled driver, in slices, so that it can be
+// stopped. Starting values, scales, settings and segments are generated too (steadyslip/explorer/motion.py).
 import { zeros } from "../../kernels/printers/runtime.js";
 
-const SLICE = 2000, HEAR = 20; // ms between looks at what the page says
+const SLICE = 2000, HEAR = 20; // SLICE: steps of a slice; HEAR: ms between checks for messages of the page
 
 export class Motion {
   /** @type {{x: number, posed: boolean, share: number}} */ scales;
   /** @type {number[]} */ settings;
   /** @type {number} */ drive;
-  /** @type {{name: string, rate: number, area: number}[]} */ sliding; // contacts, in steady sliding
+  /** @type {{name: string, rate: number, area: number}[]} */ sliding; // contacts with slip rate and area in steady sliding
 
   /** @param {any} machine @param {any} facts @param {any} driver */
   constructor(machine, facts, driver) {
     this.machine = machine;
     this.facts = facts;
     this.driver = driver;
-    this.behind = facts.parameters.length + facts.contacts.length; // where shares of disturbances begin
+    this.behind = facts.parameters.length + facts.contacts.length; // index of the first share of a disturbance in R
     this.R = new Float64Array(this.behind + facts.behind);
-    this.log = []; // rows to write on, kept from run to run
+    this.log = []; // log buffers, reused from run to run
     this.recorded = [];
     this.points = [];
     this.grow();
@@ -29,7 +29,7 @@ export class Motion {
     return Array.from(this.y.subarray(0, many));
   }
 
-  /** Parameters and steady normal stresses. @param {ArrayLike<number>} values @param {ArrayLike<number>} sigmas */
+  /** Set parameters and steady normal stresses. @param {ArrayLike<number>} values @param {ArrayLike<number>} sigmas */
   set(values, sigmas) {
     const { contacts, parameters, settings } = this.facts, many = contacts.length;
     this.R.set(values);
@@ -43,7 +43,7 @@ export class Motion {
     return this;
   }
 
-  /** Where a disturbance acts. @param {string} disturbance @param {string} on @param {number} size */
+  /** Set where a disturbance acts, and the size of a blow. @param {string} disturbance @param {string} on @param {number} size */
   share(disturbance, on, size) {
     for (const [kind, places] of Object.entries(this.facts.shares)) {
       for (const [name, place] of Object.entries(places)) this.R[this.behind + place] = kind === "blow" ? 1 : 0;
@@ -51,12 +51,12 @@ export class Motion {
     }
   }
 
-  /** Whether it would be an infinite force at these values: nobody can do that. @param {string} disturbance */
+  /** True if a disturbance would be an infinite force at these values. @param {string} disturbance */
   infinite(disturbance) {
     return disturbance === "push" && this.ask("dashpot", 1)[0] !== 0;
   }
 
-  /** Why the rig cannot be moved so at these values; empty if it can. @param {string} disturbance */
+  /** Reason why the run is impossible at these values; empty if it is possible. @param {string} disturbance */
   refusal(disturbance) {
     if (this.infinite(disturbance)) return "a sudden push through a dashpot is an infinite force";
     if (disturbance === "blow" && !Object.keys(this.facts.shares.blow).length) return "a blow needs a mass: without it the block takes any velocity at once";
@@ -65,7 +65,7 @@ export class Motion {
     return "";
   }
 
-  /** The arrays that the driver takes: constants, start, settings, segments. */
+  /** Arrays of a run for the driver: constants, start, settings, segments. */
   tables(disturbance, on, size, at, until) {
     const { facts } = this, constants = zeros(1, facts.all), start = zeros(1, facts.kept), settings = zeros(1, facts.settings);
     this.share(disturbance, on, size);
@@ -79,7 +79,7 @@ export class Motion {
     return [constants, start, settings, segments];
   }
 
-  /** Segments of a disturbance: begin and end are first in each; what lies behind the run is cut off. */
+  /** Segments of a disturbance (begin and end are the first two numbers of each), cut at the end of the run. */
   rows(disturbance, size, at, until) {
     const { facts: { segment }, y } = this, rows = [];
     y.fill(-1);
@@ -89,11 +89,11 @@ export class Motion {
   }
 
   /**
-   * Move the rig, slice by slice. Stopped, there is what there was; where it is not wanted any more, nothing.
+   * Simulate slice by slice. A run that is stopped returns what it has; one that is unwanted returns nothing.
    * @param {{disturbance: string, on?: string, size: number, at: number, until: number}} asked
    * @param {() => string} stopped empty, "stopped" or "unwanted"; asked between slices
    * @param {() => Promise<void>} pause between slices
-   * @param {(time: number) => void} [told] how far it has come
+   * @param {(time: number) => void} [told] called with the time reached
    */
   async run({ disturbance, on = "", size, at, until }, stopped, pause, told = () => {}) {
     const { facts, machine, driver } = this, { layout, routines } = machine, c = facts.cursor;
@@ -116,7 +116,7 @@ export class Motion {
     }
   }
 
-  /** More room for what is written down. */
+  /** Enlarge the log buffers. */
   grow() {
     const { logged, recorded, point } = this.facts;
     for (const row of zeros(Math.max(128, this.log.length), logged)) this.log.push(row);
@@ -126,7 +126,7 @@ export class Motion {
     }
   }
 
-  /** Series over time, slip events and how it ended. */
+  /** Result of a run: time series, slip events and status. */
   observed(tables, many, log, status, end) {
     const { facts, machine, recorded } = this, o = facts.out, own = zeros(many), each = o.W_SLOPE, values = zeros(each * facts.contacts.length + facts.kept + facts.further, many);
     const points = this.points.slice(0, many), segment = zeros(many), times = zeros(many);
@@ -152,26 +152,26 @@ export class Motion {
       return { name, v: own(o.V), sigma: scaled(area, own(o.SIGMA)), tau: scaled(area, own(o.TAU)), way: own(o.ADVANCE) };
     });
     const bodies = facts.bodies.map(([name, unit, x, v]) => ({ name, unit, x: values[x], v: values[v] })), [{ v, sigma, tau, way }] = contacts;
-    const x = values[each * contacts.length]; // of what follows the outputs, the slip of a slider is first
+    const x = values[each * contacts.length]; // displacement of a slider: first value after the outputs
     return { times, v, sigma, tau, x, load: way, contacts, bodies, ratio: this.sliding[0].rate / this.drive, events, status, end };
   }
 }
 
-/** A series in place, so many times as large. @param {number} factor @param {any} series */
+/** Multiply a series in place by a factor. @param {number} factor @param {any} series */
 function scaled(factor, series) {
   if (factor !== 1) for (let i = 0; i < series.length; i++) series[i] *= factor;
   return series;
 }
 
 /**
- * Wait for what is to be moved, from the page that this worker belongs to.
+ * Serve a page as its worker: run each simulation that it asks for.
  * @param {any} scope @param {(facts: any) => Motion} begin
  */
 export function serve(scope, begin) {
   let motion = /** @type {any} */ (null), wanted = 0, halted = false, heard = 0;
   const pause = async () => {
     if (Date.now() < heard + HEAR) return;
-    await new Promise((done) => setTimeout(done)); // then the page is heard
+    await new Promise((done) => setTimeout(done)); // let messages of the page arrive
     heard = Date.now();
   };
   scope.onmessage = async ({ data: { facts, stop, id, values, sigmas, asked } }) => {
@@ -187,7 +187,7 @@ export function serve(scope, begin) {
       };
       try {
         const course = await motion.set(values, sigmas).run(asked, () => (wanted !== id ? "unwanted" : halted ? "stopped" : ""), pause, told);
-        if (course) scope.postMessage({ id, course }, [course.times.buffer, course.v.buffer]); // of which the other series are parts
+        if (course) scope.postMessage({ id, course }, [course.times.buffer, course.v.buffer]); // buffers that all series share
       } catch (error) {
         scope.postMessage({ id, fault: error instanceof Error ? error.message : String(error) });
       }

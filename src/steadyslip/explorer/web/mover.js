@@ -1,8 +1,8 @@
-// Runs motions away from the page, in a worker made of this page's own text; in slices here where there is none.
-const LATEST = "unwanted", HERE = 8; // ms that the page computes at a time where it has to do it itself
+// Runs simulations in a worker made from the text of the page; in slices on the page if workers are not allowed.
+const LATEST = "unwanted", HERE = 8; // HERE: ms of computation at a time without a worker
 
 export class Mover {
-  /** @param {() => any} library what makes the functions that a worker needs @param {any} facts */
+  /** @param {() => any} library returns the functions that a worker needs @param {any} facts */
   constructor(library, facts) {
     this.own = library().begin(facts);
     this.id = 0;
@@ -12,7 +12,7 @@ export class Mover {
       const address = URL.createObjectURL(new Blob([`"use strict";\nconst made = (${library})();\nmade.serve(self, made.begin);\n`], { type: "text/javascript" }));
       this.worker = new Worker(address);
       this.worker.onmessage = ({ data }) => this.hear(data);
-      this.worker.onerror = (event) => { // a policy that allows none
+      this.worker.onerror = (event) => { // a security policy forbids workers
         event.preventDefault();
         this.worker = null;
         if (this.last) this.here(this.last);
@@ -32,7 +32,7 @@ export class Mover {
   }
 
   /**
-   * What comes of a disturbance; never, where another has been asked for since.
+   * Promise of the result of a disturbance, which never resolves if another one is requested meanwhile.
    * @param {ArrayLike<number>} values @param {ArrayLike<number>} sigmas @param {any} asked @param {(time: number) => void} told
    */
   run(values, sigmas, asked, told) {
@@ -46,7 +46,7 @@ export class Mover {
     });
   }
 
-  /** What was asked for is not wanted any more. */
+  /** Cancel the present run. */
   forget() {
     this.id++;
     this.heard = null;

@@ -1,4 +1,4 @@
-// The page: what stands on it, the values that it shows, and how they change.
+// The page of a rig: its parts, its values, and their changes.
 import { Banner } from "./banner.js";
 import { Controls } from "./controls.js";
 import { Course } from "./course.js";
@@ -13,36 +13,36 @@ import { changes } from "./search.js";
 import { all, choose, chosen, chosenIn } from "./view.js";
 import { kindOf } from "./words.js";
 
-/** Where the chart's axes are, on a narrow page and on a wide one: its letters stay as large as the others. */
+/** Boxes of the chart axes on a narrow and a wide page, SVG units; letters have one size on both. */
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
-const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
-const OTHERS = 40; // values of the bar at which eigenvalues are drawn
-const SOUGHT = 1e3; // times beyond a range in which a change is worth to be reached
-const OPENED = { values: "values", chart: "chart", motion: "motion", numbers: "numbers" }; // parts of a narrow page, one of which is seen
-const SAID = 4000, NAMED = 4; // ms for which a word stands; parts of a link that are named
+const MIDDLE = 720, WIDE_FROM = 1280; // page widths (px) from which there are two and three columns
+const OTHERS = 40; // values of the bar parameter at which eigenvalues are drawn
+const SOUGHT = 1e3; // factor beyond a slider range within which it is widened to reach a change of status
+const OPENED = { values: "values", chart: "chart", motion: "motion", numbers: "numbers" }; // parts of a narrow page, shown one at a time
+const SAID = 4000, NAMED = 4; // SAID: ms for which a notice is shown; NAMED: most parts of a refused link that it lists
 const WORDS = { stable: "stable", unstable: "unstable", edge: "on the edge", none: "no steady sliding", unknown: "no such rig" };
-const DRAWN = 1e150; // numbers beyond that, and below its inverse, lie off every scale
+const DRAWN = 1e150; // larger numbers, and those below its inverse, are on no scale
 
 export class Page {
   /** @type {any} */ answer;
-  // furnished once the verdict is to be seen
-  /** @type {[number, number][]} */ home; // ranges of the rig of the file
-  /** @type {[number, number][]} */ ranges; // those of now
-  /** @type {(import("./search.js").Found & {values: number[], coarse: boolean})[]} */ found = []; // of each parameter, with what it is found for
-  /** @type {{from: number, to: number, at: number, status: number}[][]} */ tracks; // position and value of each end
+  // parts that are made after the verdict is shown
+  /** @type {[number, number][]} */ home; // slider ranges of the rig of the file
+  /** @type {[number, number][]} */ ranges; // present slider ranges
+  /** @type {(import("./search.js").Found & {values: number[], coarse: boolean})[]} */ found = []; // changes of status for each parameter, with the values they were found for
+  /** @type {{from: number, to: number, at: number, status: number}[][]} */ tracks; // track of each slider: positions, value and status of its pieces
   /** @type {Controls} */ controls;
   /** @type {Chart} */ chart;
   /** @type {Facts} */ facts;
   /** @type {Course} */ course;
   /** @type {any} */ tools;
   size = WIDE;
-  wide = 0; // of the bar, in pixels
-  part = OPENED.values; // what a narrow page shows
-  first = /** @type {Record<string, string>} */ ({}); // what is chosen before anybody has
+  wide = 0; // width of the bar, px
+  part = OPENED.values; // part shown on a narrow page
+  first = /** @type {Record<string, string>} */ ({}); // initial choices of the page
 
   /**
    * @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library
-   * @param {((values: number[]) => void) | null} [told] whom to tell of new values; then the address is not the page's own
+   * @param {((values: number[]) => void) | null} [told] called with new values; then the page does not change its address
    */
   constructor(root, data, programs, library, told = null) {
     this.root = root;
@@ -61,10 +61,10 @@ export class Page {
     root.replaceChildren(this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, ...this.tabs));
     this.open(this.part);
     this.judge();
-    requestAnimationFrame(() => setTimeout(() => this.furnish(library))); // the verdict is to be seen first
+    requestAnimationFrame(() => setTimeout(() => this.furnish(library))); // let the browser show the verdict first
   }
 
-  /** Everything below the verdict. @param {() => any} library */
+  /** Make everything below the verdict. @param {() => any} library */
   furnish(library) {
     const { rig, root } = this, { data } = rig, values = rig.values;
     rig.values = data.parameters.map((one) => one.value);
@@ -72,7 +72,7 @@ export class Page {
     this.home = data.parameters.map((one, i) => rangeOf(one, one.value, this.found[i].edges.map(({ at }) => at)));
     this.fit(rig.values);
     const near = this.edges().filter((edge) => !edge.far && edge.at).map((edge) => edge.i);
-    if (data.phrases && near.length) [rig.bar] = near; // the parameter whose edge is nearest
+    if (data.phrases && near.length) [rig.bar] = near; // show the parameter with the nearest edge
     const k = Math.max(0, rig.bar), across = near.find((i) => i !== k) ?? (k === 0 ? 1 % data.parameters.length : 0);
     rig.values = values;
     this.fit(values);
@@ -95,7 +95,7 @@ export class Page {
       this.course.draw();
     }).observe(root);
     window.addEventListener("hashchange", (event) => {
-      const link = new URL(event.newURL).hash; // the address may have been written over since
+      const link = new URL(event.newURL).hash; // not location.hash, which may have changed since
       if (this.told || link === this.hash()) return;
       const values = this.fromAddress(link);
       choose(this, chosenIn(link));
@@ -105,7 +105,7 @@ export class Page {
     root.dataset.ready = "yes";
   }
 
-  /** Another part, where one is seen at a time. @param {string} part */
+  /** Show a part of a narrow page. @param {string} part */
   open(part) {
     this.part = part in OPENED ? part : OPENED.values;
     this.root.dataset.part = this.part;
@@ -115,27 +115,27 @@ export class Page {
     this.note();
   }
 
-  /** A word that needs no answer, over the page for some seconds. @param {string} words */
+  /** Show a notice over the page for some seconds. @param {string} words */
   say(words) {
     this.said.textContent = words;
     clearTimeout(this.unsaid);
     this.unsaid = setTimeout(() => (this.said.textContent = ""), SAID);
   }
 
-  /** Values of the address, or of a link; what of it this rig cannot take is said. */
+  /** Values from the address or a link, with a notice on the parts that do not fit this rig. */
   fromAddress(link = location.hash) {
     const { values, left } = this.rig.fromHash(link), { notice } = this.banner, many = left.length - NAMED;
-    if (this.differs.length) return values; // what is said of that is to stay
+    if (this.differs.length) return values; // keep the notice on differences from Python
     notice.textContent = left.length ? `The link has what this rig cannot take; it is left out: ${left.slice(0, NAMED).join(", ")}${many > 0 ? `, and ${many} more` : ""}.` : "";
     return values;
   }
 
-  /** How wide the page is, which need not be the window's width; true if its charts are to be drawn anew. */
+  /** Measure the width of the page (it may be part of a window); true if charts must be drawn anew. */
   measure() {
     const width = this.root.clientWidth, before = this.size;
     this.root.dataset.width = width < MIDDLE ? "narrow" : width < WIDE_FROM ? "middle" : "wide";
     this.size = width < 600 ? NARROW : WIDE;
-    this.wide = width < MIDDLE ? width - 60 : 0.38 * Math.min(width, 1500); // of the bar
+    this.wide = width < MIDDLE ? width - 60 : 0.38 * Math.min(width, 1500); // width of the bar, px
     return this.size !== before;
   }
 
@@ -163,31 +163,31 @@ export class Page {
     return scaleOf(this.rig.data.parameters[i], ...this.ranges[i]);
   }
 
-  /** Widen the range of a parameter to hold a value, if that can be drawn. */
+  /** Widen the slider range of a parameter to contain a value that can be drawn. */
   reach(i, value) {
     const [low, high] = this.ranges[i], size = Math.min(DRAWN, Math.max(1 / DRAWN, Math.abs(value)));
     if (value > 0 && (value < low || value > high)) this.ranges[i] = [Math.min(low, size / 3), Math.max(high, size * 3)];
     else if (value < 0 && value < low) this.ranges[i] = [-size * 3, high];
   }
 
-  /** Ranges for values that no hand has set: those of the rig of the file, widened where the values lie outside. */
+  /** Set slider ranges for values not set by sliders: those of the rig of the file, widened to contain the values. */
   fit(values) {
     if (!this.home) return;
     this.ranges = this.home.slice();
     values.forEach((value, i) => this.reach(i, value));
   }
 
-  /** A range within which nothing changes is widened to the nearest change outside, if there is one within some decades. */
+  /** Widen a slider range without any change of status to the nearest change outside, within `SOUGHT`. */
   seek(i) {
     const one = this.rig.data.parameters[i], [low, high] = this.ranges[i], all = this.found[i].edges.map(({ at }) => at);
-    if ((one.low !== null && one.high !== null) || all.some((at) => at >= low && at <= high)) return; // it is all there is
+    if ((one.low !== null && one.high !== null) || all.some((at) => at >= low && at <= high)) return; // the domain is bounded, or a change is in the range
     const above = nearestOf(all.filter((at) => at > high || (at < low && at > 0)), low > 0 ? Math.sqrt(low * high) : high), far = low > 0 ? low / SOUGHT : 0;
     const below = all.filter((at) => at < low && low < 0).at(-1);
     if (above !== undefined && above > far && above < high * SOUGHT) this.reach(i, above);
     else if (below !== undefined && below > low * SOUGHT) this.reach(i, below);
   }
 
-  /** The slider of the stiffness reaches to the critical one, which other parameters move. */
+  /** Widen the range of the stiffness slider to the critical stiffness, which depends on other parameters. */
   follow() {
     const { answer, rig: { data, values, bar } } = this, i = data.phrases ? bar : data.parameters.findIndex((one) => one.name === data.stiffness);
     if (i < 0 || answer.critical === null) return;
@@ -195,12 +195,12 @@ export class Page {
     const { critical, share, gain, stiffness } = answer, { name } = data.parameters[i];
     if (i === data.axial) this.reach(i, critical / share);
     else if (name === "slider.stiffness") this.reach(i, critical);
-    else if (gain > 0) this.reach(i, (values[i] * (critical + gain - stiffness)) / gain); // the gain takes part as a spring does
+    else if (gain > 0) this.reach(i, (values[i] * (critical + gain - stiffness)) / gain); // a gain acts as a stiffness
   }
 
-  // -- changes
+  // -- changes of values
 
-  /** New values, to be undone. @param {number[]} values @param {boolean} [same] whether it goes on with the last change */
+  /** Set new values, with undo. @param {number[]} values @param {boolean} [same] true if it continues the last change (one undo for both) */
   change(values, same = false) {
     if (this.rig.has(values)) return;
     if (!same) {
@@ -212,7 +212,7 @@ export class Page {
     this.redraw();
   }
 
-  /** New values that no hand on a slider has set. @param {number[]} values */
+  /** Set new values that do not come from a slider. @param {number[]} values */
   put(values) {
     if (this.rig.has(values)) return;
     this.fit(values);
@@ -235,7 +235,7 @@ export class Page {
     return values;
   }
 
-  /** A value that was typed. */
+  /** Set a value that was typed. */
   place(i, value) {
     this.put(this.with(i, value));
     this.redraw();
@@ -249,7 +249,7 @@ export class Page {
     this.change(this.with(i, value), same);
   }
 
-  /** Two parameters at positions of their scales. @param {number[]} which @param {number[]} positions */
+  /** Set two parameters from positions (0 to 1) on their scales. @param {number[]} which @param {number[]} positions */
   move(which, positions, same) {
     const values = this.rig.values.slice();
     which.forEach((i, n) => {
@@ -260,28 +260,28 @@ export class Page {
     this.change(values, same);
   }
 
-  /** A hand has let go. */
+  /** End of a drag of a slider or chart point. */
   rest() {
     if (!this.sliding) return;
     this.sliding = false;
     this.redraw();
   }
 
-  /** Four digits are enough for what a hand sets. */
+  /** Value from a slider, rounded to four digits. */
   tidy(i, value) {
     const round = this.rounded(i, value, 4);
     return inside(this.rig.data.parameters[i], round) ? round : value;
   }
 
-  /** A value of so many digits in the unit in which it is shown. */
+  /** Value rounded to so many digits in the unit in which it is shown. */
   rounded(i, value, many) {
     const one = this.rig.data.parameters[i], [unit] = unitFor(one, value);
     return one.whole ? Math.round(value) : Number((Number((value / unit).toPrecision(many)) * unit).toPrecision(15));
   }
 
-  // -- what follows from the values
+  // -- results that depend on the values
 
-  /** All edges of every parameter for the values of now; those of one parameter stay while it alone varies. */
+  /** Update the changes of status along every parameter; those of a parameter stay while only it changes. */
   search() {
     const { rig, sliding, ranges } = this, { values } = rig;
     rig.data.parameters.forEach((_, i) => {
@@ -290,21 +290,21 @@ export class Page {
     });
   }
 
-  /** Edges, and tracks that show them. */
+  /** Update the changes of status, and the tracks that show them. */
   trace() {
     this.search();
     if (!this.sliding) this.found.forEach((_, i) => this.seek(i));
     this.tracks = this.found.map((_, i) => this.track(i));
   }
 
-  /** Positions between 0 and 1 where a track changes, and values, with what is between. */
+  /** Pieces of a track: positions (0 to 1) and values of the ends, and status between. */
   track(i) {
     const scale = this.scale(i), [low, high] = [scale.at(0), scale.at(1)], { edges, status } = this.found[i], inner = edges.filter(({ at }) => at > low && at < high);
     const first = inner[0]?.below ?? edges.filter(({ at }) => at <= low).at(-1)?.above ?? status, at = (n) => (n < inner.length ? scale.of(inner[n].at) : 1);
     return Array.from({ length: inner.length + 1 }, (_, n) => ({ from: n ? at(n - 1) : 0, to: at(n), at: inner[n]?.at ?? high, status: n ? inner[n - 1].above : first }));
   }
 
-  /** The nearest change of every parameter inside its range, the most urgent first. */
+  /** Nearest edge of every parameter, nearest first. */
   edges() {
     return edgesOf(this);
   }
@@ -317,18 +317,18 @@ export class Page {
     this.word.textContent = WORDS[kind];
   }
 
-  /** Values, and what is chosen, as a link has them. */
+  /** Text of a link with the values and choices of the page. */
   hash() {
     return this.rig.hash(this.course ? chosen(this) : []);
   }
 
-  /** Eigenvalues at other values of what the bar shows, where they follow from no formula: over its range, and at its edges. */
+  /** Eigenvalues at other values of the bar parameter, over its range and at its edges, if it does not enter linearly. */
   others() {
     const { rig } = this, i = rig.bar, at = (value) => rig.set(this.with(i, value)).roots(rig.data.branch), scale = this.scale(i), many = this.sliding ? OTHERS / 4 : OTHERS;
     return { along: Array.from({ length: many }, (_, n) => at(scale.at((n + 0.5) / many))), beyond: this.tracks[i].slice(0, -1).map((part) => at(part.at)) };
   }
 
-  /** The same in the address, soon: browsers take long over it. */
+  /** Put the link into the address, with a delay, as browsers are slow at that. */
   note() {
     clearTimeout(this.addressed);
     if (this.told || this.sliding) return;
@@ -339,7 +339,7 @@ export class Page {
     }, 100);
   }
 
-  /** Another parameter on the bar. @param {number} i */
+  /** Show another parameter on the bar. @param {number} i */
   tell(i) {
     this.rig.bar = i;
     this.chart.put(1, i);
@@ -364,14 +364,14 @@ export class Page {
   }
 }
 
-/** Fill an element with the page of one rig. @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library */
+/** Make the page of a rig inside an element. @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library */
 export function mount(root, data, programs, library) {
   return new Page(root, data, programs, library);
 }
 
 /**
- * The same as a widget of a notebook: values go to Python and come from there, by name.
- * @param {any} model anywidget's @param {HTMLElement} element @param {any} data @param {any} programs @param {() => any} library
+ * Make the page of a rig as a notebook widget that shares its values with Python, by name.
+ * @param {any} model of anywidget @param {HTMLElement} element @param {any} data @param {any} programs @param {() => any} library
  */
 export function render(model, element, data, programs, library) {
   const root = element.appendChild(make("div", {})), names = data.parameters.map((one) => one.name);

@@ -9,9 +9,9 @@ import { NEW } from "./rig.js";
  * @typedef {{scale: Scale, range: [number, number], logarithmic: boolean}} Span
  */
 
-const LETTER = 7.5, MARGIN = 40; // width of one in a label, and how much longer than its axis that may be
+const LETTER = 7.5, MARGIN = 40; // LETTER: width of a letter of a label; MARGIN: how much a label may be longer than its axis, SVG units
 
-/** Round numbers between two, positions of ticks. */
+/** Round numbers between two numbers, for ticks. */
 export function ticks(low, high, logarithmic, most) {
   const found = [];
   if (logarithmic && low > 0 && high < Infinity) {
@@ -32,13 +32,13 @@ export function ticks(low, high, logarithmic, most) {
   return found;
 }
 
-/** One axis: lines, numbers and label, in a unit that reads well, or that `one` has of its own. @param {any} one with its unit and factor */
+/** Axis with ticks, numbers and label, in the unit of `one` or a readable one. @param {any} one name, unit and factor */
 export function axis(box, scale, [low, high], one, label, upright) {
   const logarithmic = low > 0 && high / low > 30 && scale.of(0.5 * (low + high)) > 0.6;
   const [factor, name] = unitFor({ factor: 1, own: NEW, ...one }, Math.max(Math.abs(low), Math.abs(high)) / (logarithmic ? Math.sqrt(high / low) : 1));
   const group = svg("g", { class: "axis" }), length = upright ? box.height : box.width;
   const marks = ticks(low / factor, high / factor, logarithmic, length / (upright ? 40 : 80));
-  const many = Math.min(12, Math.max(3, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (Math.abs(high - low) || 1))) + 3)); // digits that tell marks apart
+  const many = Math.min(12, Math.max(3, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (Math.abs(high - low) || 1))) + 3)); // digits that distinguish the ticks
   for (const value of marks) {
     const at = scale.of(value * factor);
     if (at < -1e-9 || at > 1 + 1e-9) continue;
@@ -50,14 +50,14 @@ export function axis(box, scale, [low, high], one, label, upright) {
   }
   let own = label;
   const whole = () => (name ? `${own} (${name})` : own);
-  while (whole().length * LETTER > length + MARGIN && own.includes(".")) own = own.slice(own.indexOf(".") + 1); // a long name is told by its end
+  while (whole().length * LETTER > length + MARGIN && own.includes(".")) own = own.slice(own.indexOf(".") + 1); // a long name loses its first parts
   const text = whole();
   const where = upright ? { transform: `translate(13 ${box.top + box.height / 2}) rotate(-90)` } : { x: box.left + box.width / 2, y: box.top + box.height + 34 };
   group.append(svg("text", { ...where, "text-anchor": "middle", class: "label" }, text));
   return group;
 }
 
-/** Lowest and highest of several series. @param {ArrayLike<number>[]} all @returns {[number, number]} */
+/** Lowest and highest value of several series, without NaN; [0, 1] if there are none. @param {ArrayLike<number>[]} all @returns {[number, number]} */
 export function extent(...all) {
   let low = Infinity, high = -Infinity;
   for (const values of all) {
@@ -69,7 +69,7 @@ export function extent(...all) {
   return low <= high ? [low, high] : [0, 1];
 }
 
-/** A scale on which values from low to high fill the box with some room: of velocities logarithmic where they span decades. @returns {Span} */
+/** Scale for values from low to high with a margin; logarithmic for positive velocities that span decades. @returns {Span} */
 export function spanning([low, high], label) {
   if (label === "velocity" && low > 0 && high / low > 30) {
     const a = low / 1.15, b = high * 1.15;
@@ -84,7 +84,7 @@ export const straight = (a, b) => ({ at: (t) => a + t * (b - a), of: (v) => (v -
 
 const frame = (box) => svg("rect", { x: box.left, y: box.top, width: box.width, height: box.height, class: "frame" });
 
-/** The path of a series over rising times: of many points, the lowest and highest of each column of the box. */
+/** SVG path of a series over rising times; of many points only the lowest and highest of each pixel column. */
 export function pathOver(box, times, values, along, up) {
   let path = "", column = -1, least = 0, most = 0, pen = "M";
   const put = (x, y) => {
@@ -111,7 +111,7 @@ export function pathOver(box, times, values, along, up) {
   return path;
 }
 
-/** One strip of series over time: axes and, from the faint to the strong, curves. @param {{times: any, values: any}[]} curves */
+/** Strip chart over time: axes and curves, faint ones first. @param {{times: any, values: any}[]} curves */
 export function strip(box, curves, until, unit, label, last) {
   const up = spanning(extent(...curves.map((one) => one.values)), label), along = straight(0, until);
   const group = svg("g", {}, axis(box, up.scale, up.range, { unit }, label, true));
@@ -121,11 +121,11 @@ export function strip(box, curves, until, unit, label, last) {
   return { group, up: up.scale };
 }
 
-/** The path of one series over another: points closer than half a unit, and ways over places all drawn before, are left out. */
+/** SVG path of one series over another, without points closer than half a unit or pieces drawn before. */
 export function pathThrough(box, xs, ys, across, up) {
-  const wide = 2 * Math.ceil(box.width) + 3, drawn = new Uint8Array(wide * (2 * Math.ceil(box.height) + 3)); // places of half a unit
-  let path = "", lastX = NaN, lastY = NaN, down = false; // whether the pen is where the last point was
-  const isNew = (x, y) => { // whether the way there goes over a place that has nothing yet
+  const wide = 2 * Math.ceil(box.width) + 3, drawn = new Uint8Array(wide * (2 * Math.ceil(box.height) + 3)); // cells of half a unit, 1 where something is drawn
+  let path = "", lastX = NaN, lastY = NaN, down = false; // true if the path ends at the last point
+  const isNew = (x, y) => { // true if the segment to a point crosses an empty cell
     const steps = Math.ceil(2 * Math.max(Math.abs(x - lastX), Math.abs(y - lastY)));
     let found = false;
     for (let k = 0; k <= steps; k++) {
@@ -148,7 +148,7 @@ export function pathThrough(box, xs, ys, across, up) {
   return path;
 }
 
-/** Series over series: the phase plane. @param {{x: any, y: any}[]} curves @param {[string, string]} upIs */
+/** Phase plane: axes and curves of one series over another. @param {{x: any, y: any}[]} curves @param {[string, string]} upIs */
 export function plane(box, curves, [unit, label], upIs) {
   const across = spanning(extent(...curves.map((one) => one.x)), label), up = spanning(extent(...curves.map((one) => one.y)), upIs[1]);
   const group = svg("g", {}, axis(box, across.scale, across.range, { unit }, label, false), axis(box, up.scale, up.range, { unit: upIs[0] }, upIs[1], true), frame(box));

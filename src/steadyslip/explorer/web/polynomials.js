@@ -1,10 +1,10 @@
-// Roots of real polynomials, coefficients lowest power first: what NumPy's LAPACK is to Python. What polynomials mean for
-// a rig is generated (steadyslip/explorer/equations.py).
+// Roots of real polynomials, coefficients lowest power first, by Aberth's iteration. The polynomials of a rig are
+// generated (steadyslip/explorer/equations.py).
 
 /** @typedef {{re: number, im: number}} Complex */
 
 const CLOSE = 1e-3, EPS = 2.220446049250313e-16;
-const SETTLED = 1e-10; // relative step from which on a root that is not double would be found in one step more
+const SETTLED = 1e-10; // relative step below which a simple root converges in one more step
 
 /** Value and slope of a polynomial at x + iy: [re, im, slope re, slope im]. @param {number[]} c */
 function valueAndSlope(c, x, y) {
@@ -20,7 +20,7 @@ function valueAndSlope(c, x, y) {
   return [pr, pi, qr, qi];
 }
 
-/** Roots of c0 + c1 s + c2 s² without cancellation; a pair that is double to within rounding is real. */
+/** Roots of c0 + c1 s + c2 s² without cancellation; a double pair (to rounding) is made real. */
 function quadratic(c0, c1, c2) {
   let d = c1 * c1 - 4 * c0 * c2;
   if (Math.abs(d) <= 16 * EPS * c1 * c1) d = 0;
@@ -33,7 +33,7 @@ function quadratic(c0, c1, c2) {
   return [{ re: large / c2, im: 0 }, { re: large !== 0 ? c0 / large : 0, im: 0 }];
 }
 
-/** Where Aberth's iteration starts: on circles whose radii are slopes of the upper hull of ln|c| (Bini 1996). */
+/** Starting points of Aberth's iteration: on circles with radii from the upper hull of ln|c| (Bini 1996). */
 function circles(c) {
   const size = c.map((v) => (v === 0 ? -Infinity : Math.log(Math.abs(v)))), hull = [], n = c.length - 1;
   for (let i = 0; i <= n; i++) {
@@ -82,7 +82,7 @@ function aberth(c) {
       x[k] -= wx;
       y[k] -= wy;
       const step = Math.hypot(wx, wy) / (Math.hypot(x[k], y[k]) || 1e-300);
-      const still = step < 4e-16 || (step < SETTLED && step > 0.5 * steps[k]); // or rounding alone moves it
+      const still = step < 4e-16 || (step < SETTLED && step > 0.5 * steps[k]); // converged, or moved by rounding only
       steps[k] = still ? 0 : step;
       if (still) left--;
     }
@@ -90,7 +90,7 @@ function aberth(c) {
   return [x, y];
 }
 
-/** Points that are conjugate, or real, to within rounding made so exactly; two that are close found as a factor. */
+/** Roots made exactly real or conjugate where they are so to rounding; close pairs are found as quadratic factors. */
 function paired(c, x, y) {
   const found = [], real = [], left = new Set(x.keys());
   for (const k of x.keys()) {
@@ -121,12 +121,12 @@ function paired(c, x, y) {
   return found;
 }
 
-/** Two roots close to each other, of mean `middle`, from their common factor s² + u s + w by Bairstow's iteration. */
+/** Two close roots of mean `middle`, from their factor s² + u s + w by Bairstow's iteration. */
 function factor(c, middle, times) {
   const size = Math.abs(middle), scaled = c.map((v, i) => v * size ** i);
   let u = (-2 * middle) / size, w = times / (size * size);
   for (let pass = 0; pass < 5; pass++) {
-    const b = [0, 0], slope = [0, 0]; // of the polynomial over the factor, and of that once more
+    const b = [0, 0], slope = [0, 0]; // remainders of the division by the factor, and of the quotient by it
     for (let i = scaled.length - 1; i >= 0; i--) {
       b.push(scaled[i] - u * b[b.length - 1] - w * b[b.length - 2]);
       slope.push(b[b.length - 1] - u * slope[slope.length - 1] - w * slope[slope.length - 2]);

@@ -1,4 +1,4 @@
-// Text such as "9 GPa/m" to SI numbers and back: the counterpart of core/quantities.py and core/format.py for a page.
+// Text such as "9 GPa/m" to SI numbers and back: as core/quantities.py and core/format.py do in Python.
 
 /** @type {Record<string, [number, number[]]>} factor, and exponents of kilogram, metre, second and radian */
 const TABLE = {
@@ -17,14 +17,14 @@ for (const [name, exponents] of BASES) {
 }
 const WORD = /\s*([/*·])?\s*([A-Za-z%°]+|1)\s*(?:\^\s*(-?\d)|(\d))?/y;
 const NUMBER = /^\s*([-+−]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+−]?\d+)?)\s*(.*?)\s*$/;
-const EITHER = /^[-+−]?[1-9]\d{0,2},\d{3}$/; // a comma that may be a decimal one or part thousands
+const EITHER = /^[-+−]?[1-9]\d{0,2},\d{3}$/; // ambiguous comma: decimal or thousands separator
 const PREFIXED = /^(?:[TGMkcmunp]?(?:Pa|N|m|s|rad)(?:\^?\d)?[\s*/·]*)+$/, SCALED = /^(Pa|N|m|s(?!\/))(?![a-z^])/;
 /** @type {[number, string][]} */
 const SHOWN = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 /** @type {[number, string][]} */
 const LONG = [[31557600, "yr"], [86400, "days"], [3600, "h"], [60, "min"]];
 
-/** Factor and exponents of a unit. @param {string} text @returns {[number, number[]]} */
+/** SI factor and exponents of a unit. @param {string} text @returns {[number, number[]]} */
 export function unitOf(text) {
   const plain = text.replace(/[µμ]/g, "u").replace(/²/g, "^2").replace(/³/g, "^3").trim();
   let factor = 1, at = 0;
@@ -41,13 +41,13 @@ export function unitOf(text) {
   return [factor, exponents];
 }
 
-/** Mantissa and power of ten of a number that is written out. @param {string} text @returns {[bigint, number]} */
+/** Mantissa and power of ten of a decimal number. @param {string} text @returns {[bigint, number]} */
 function decimal(text) {
   const [, sign, whole, part = "", power = "0"] = /^([-+]?)(\d*)\.?(\d*)(?:e([-+]?\d+))?$/i.exec(text) ?? [];
   return [BigInt((sign === "-" ? sign : "") + (whole + part || "0")), Number(power) - part.length];
 }
 
-/** Digits times a factor, rounded once, as Python reads a quantity: "10 um" is 1e-05. @param {string} digits @param {number} factor */
+/** Decimal number times a factor, rounded once as in Python: "10 um" is 1e-05. @param {string} digits @param {number} factor */
 export function exactly(digits, factor) {
   const [a, m] = decimal(digits), [b, n] = decimal(factor.toExponential());
   return Number(`${a * b}e${m + n}`);
@@ -69,13 +69,13 @@ export function parse(text, si, unit, own = ["", 1]) {
   return exactly(found[1].replace(/−/g, "-").replace(",", "."), factor);
 }
 
-/** A unit as it is set in print: µm, m². @param {string} name */
+/** Unit with print typography: µm, m². @param {string} name */
 export const printed = (name) => name.replace(/(?<![A-Za-z])[uμ](?=[A-Za-z])/g, "µ").replace(/\^?2(?!\d)/g, "²").replace(/\^?3(?!\d)/g, "³");
 
-/** The unit in a text of a number and a unit; empty where there is none. @param {string} text */
+/** Unit in a text of number and unit; empty if it has none. @param {string} text */
 export const unitIn = (text) => NUMBER.exec(text.slice(0, 200))?.[2] ?? "";
 
-/** A number with few digits. @param {number} value */
+/** Text of a number with few digits. @param {number} value */
 export function digits(value, many = 4) {
   const size = Math.abs(value);
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "–" : value > 0 ? "∞" : "−∞";
@@ -83,7 +83,7 @@ export function digits(value, many = 4) {
   return text.replace("-", "−").replace(/e([+-−]?)(\d+)/, (_, sign, power) => `e${sign === "+" ? "" : "−"}${power}`);
 }
 
-/** Factor and name of the unit in which a value reads best. @param {number} value @param {string} si @returns {[number, string]} */
+/** Factor and name of the most readable unit for a value. @param {number} value @param {string} si @returns {[number, string]} */
 export function display(value, si) {
   if (si === "1") return [1, ""];
   if (si === "rad") return [Math.PI / 180, "deg"];
@@ -108,13 +108,13 @@ export function unitFor({ unit, factor, own: [name, own] }, value) {
   return [best / factor, printed(found)];
 }
 
-/** A parameter's value for people. @param {any} one @param {number} value */
+/** Text of the value of a parameter with its unit. @param {any} one @param {number} value */
 export function told(one, value, many = 4) {
   const [size, name] = unitFor(one, value);
   return `${digits(value / size, many)} ${name}`.trim();
 }
 
-/** A value for people, with its unit. @param {number} value @param {string} si */
+/** Text of an SI value with a readable unit. @param {number} value @param {string} si */
 export function shown(value, si, many = 4) {
   const [factor, name] = display(value, si);
   return `${digits(value / factor, many)} ${printed(name)}`.trim();

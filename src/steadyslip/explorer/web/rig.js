@@ -1,19 +1,19 @@
-// The rig of a page: its values, where they may lie, what follows from them, and how they leave the page.
+// Rig of a page: values and their domains, status, checks against Python, links and rig files.
 import { Linear, UNKNOWN } from "./linear.js";
 import { exactly } from "./quantities.js";
 
 /**
  * @typedef {{name: string, group: string, label: string, unit: string, factor: number, value: number, natural: number, doc: string,
  *   low: number | null, high: number | null, lowAllowed: boolean, highAllowed: boolean, whole: boolean,
- *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its size and the text in the user's file
+ *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its SI size and the text of the value in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
  *   stiffness: string | null, remote: number, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
-export const NEW = /** @type {[string, number, string]} */ (["", 1, ""]); // of what the user's file leaves out
-const USUAL = { own: NEW, factor: 1, low: null, high: null, lowAllowed: false, highAllowed: false, whole: false }; // unless a parameter says otherwise
+export const NEW = /** @type {[string, number, string]} */ (["", 1, ""]); // source of a parameter that the user's file leaves out
+const USUAL = { own: NEW, factor: 1, low: null, high: null, lowAllowed: false, highAllowed: false, whole: false }; // entries that the data of a parameter leave out
 
 export class Rig {
   /** @param {Data} data @param {any} programs */
@@ -28,7 +28,7 @@ export class Rig {
     this.bar = data.parameters.findIndex((one) => one.name === data.stiffness);
   }
 
-  /** The Model's parameters for some values of the page's. @param {ArrayLike<number>} values */
+  /** Parameters of the Model for values of the page. @param {ArrayLike<number>} values */
   set(values) {
     const { places, fixed, axial } = this.data, model = this.vector;
     for (let k = 0; k < model.length; k++) model[k] = places[k] >= 0 ? values[places[k]] : fixed[k];
@@ -40,7 +40,7 @@ export class Rig {
     return this.linear;
   }
 
-  /** The parameter whose stable values are told; of a slider it is the stiffness. */
+  /** Index of the parameter on the bar; the stiffness for sliders. */
   get bar() {
     return this.told;
   }
@@ -56,7 +56,7 @@ export class Rig {
     return this.set(values).assess(this.data.branch);
   }
 
-  /** Status with one value, or two, in place of the rig's own. @param {number} i @param {number} x @param {number} [j] @param {number} [y] */
+  /** Status with one or two values changed. @param {number} i @param {number} x @param {number} [j] @param {number} [y] */
   status(i, x, j = -1, y = 0) {
     const parameter = this.data.parameters[i];
     if (!inside(parameter, x) || (j >= 0 && !inside(this.data.parameters[j], y))) return UNKNOWN;
@@ -66,25 +66,25 @@ export class Rig {
     return this.set(this.trial).status(this.data.branch);
   }
 
-  /** Whether rounding decides on the status with one value in place of the rig's own. @param {number} i @param {number} x */
+  /** True if the status depends on rounding, with one value changed. @param {number} i @param {number} x */
   onEdge(i, x) {
     this.trial.set(this.values);
     this.trial[i] = x;
     return inside(this.data.parameters[i], x) && this.set(this.trial).onEdge(this.data.branch);
   }
 
-  /** Values of a parameter at which a root is on the axis, rising, where they follow from a formula. @param {number} i */
+  /** Values of a parameter, rising, with a root on the imaginary axis; null if it does not enter linearly. @param {number} i */
   crossings(i) {
     const { name, low } = this.data.parameters[i], place = i === this.data.axial ? this.spring : this.data.facts.parameters.indexOf(name);
     return low === null || low < 0 ? null : this.set(this.values).crossings(place, this.data.branch)?.map((factor) => factor * this.values[i]) ?? null;
   }
 
-  /** Whether these are the values of now. @param {number[]} values */
+  /** True if these are the present values. @param {number[]} values */
   has(values) {
     return values.every((value, i) => Object.is(value, this.values[i]));
   }
 
-  /** Answers of Python that travel with the page, compared: what differs, in words. */
+  /** Differences from the answers of Python stored in the page, in words. */
   differences() {
     const found = /** @type {string[]} */ ([]);
     for (const check of this.data.checks) {
@@ -101,7 +101,7 @@ export class Rig {
     return found;
   }
 
-  /** The rig file with the values of now: that of the user, of which only they are written anew (see own_file.py). */
+  /** Text of the rig file with the present values; the rest of the user's file is kept (see own_file.py). */
   toml() {
     const line = ([i, before, behind, end = ""]) => (end && Object.is(this.values[i], this.data.parameters[i].value) ? "" : before + this.values[i] + behind + end);
     return this.data.toml.map((piece) => {
@@ -112,7 +112,7 @@ export class Rig {
     }).join("");
   }
 
-  /** A value as the user's file has it: in the unit there if that brings it back to the last digit. @param {number} i */
+  /** Text of a value in the unit of the user's file, or in SI units if only these keep all digits. @param {number} i */
   written(i) {
     const one = this.data.parameters[i], { own: [unit, size, text], factor, si, was = one.value } = one, value = this.values[i];
     if (Object.is(value, was)) return text;
@@ -123,17 +123,17 @@ export class Rig {
     return one.whole || (si ?? one.unit) === "1" ? String(value) : `"${value} ${si ?? one.unit}"`;
   }
 
-  /** What differs from the rig that the page was made of, for a link, and what else is chosen. @param {string[]} [chosen] */
+  /** Text of a link: changed values and choices. @param {string[]} [chosen] */
   hash(chosen = []) {
     const changed = this.data.parameters.flatMap((one, i) => (Object.is(this.values[i], one.value) ? [] : [`${encodeURIComponent(one.name)}=${this.values[i]}`]));
     return changed.length + chosen.length ? `#${[...changed, ...chosen].join("&")}` : "";
   }
 
-  /** Values from a link: only names that the rig has, numbers, and inside their domains; the rest is left, in words. */
+  /** Values from a link (known names, numbers within their domains), and the refused parts in words. */
   fromHash(text) {
     const values = this.data.parameters.map((one) => one.value), left = /** @type {string[]} */ ([]);
     for (const part of text.slice(0, 10000).replace(/^#/, "").split("&")) {
-      if (part.startsWith("~")) continue; // what is chosen, see view.js
+      if (part.startsWith("~")) continue; // choices, see view.js
       const [name, number, ...more] = part.split("=");
       const i = this.data.parameters.findIndex((one) => encodeURIComponent(one.name) === name);
       const value = number && /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(number) ? Number(number) : NaN;
@@ -146,16 +146,16 @@ export class Rig {
 
 const near = (a, b) => a !== null && Math.abs(a - b) <= 1e-11 * Math.abs(b);
 
-/** Whether a parameter may have a value. @param {Parameter} one @param {number} value */
+/** True if a value is in the domain of a parameter. @param {Parameter} one @param {number} value */
 export function inside(one, value) {
   if (!Number.isFinite(value) || (one.whole && !Number.isInteger(value))) return false;
   const above = one.low === null || (one.lowAllowed ? value >= one.low : value > one.low);
   return above && (one.high === null || (one.highAllowed ? value <= one.high : value < one.high));
 }
 
-const ZERO = 0.04; // share of a logarithmic scale that is zero
+const ZERO = 0.04; // share of a logarithmic scale that stands for zero
 
-/** Positions from 0 to 1 for values between two, even in what is natural for the parameter. */
+/** Scale with positions 0 to 1 for the values of a range: logarithmic or linear, as suits the parameter. */
 export function scaleOf(one, low, high) {
   if ((one.low !== null && one.high !== null) || low < 0) {
     return { at: (t) => low + t * (high - low), of: (v) => (v - low) / (high - low) };
@@ -168,7 +168,7 @@ export function scaleOf(one, low, high) {
 }
 
 /**
- * The range that a slider has at first: its whole domain if that is bounded, else some decades, and its nearest edge.
+ * Initial range of a slider: the domain if bounded, otherwise some decades that contain the nearest edge.
  * @param {Parameter} one @param {number} value @param {number[]} edges
  * @returns {[number, number]}
  */
@@ -184,7 +184,7 @@ export function rangeOf(one, value, edges) {
   return [Math.min(size / 30, nearest / 3), Math.max(size * 30, nearest * 3)];
 }
 
-/** Of values above zero that which is nearest to another, by their ratio. @param {number[]} values @param {number} size */
+/** Positive value nearest to a size, by ratio. @param {number[]} values @param {number} size */
 export function nearestOf(values, size) {
   const far = (x) => Math.abs(Math.log(x / size));
   return values.length ? values.reduce((a, b) => (far(b) < far(a) ? b : a)) : undefined;

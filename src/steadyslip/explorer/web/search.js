@@ -1,27 +1,27 @@
-// Where the status changes along one parameter, as steadyslip/linear/search.py finds it: the parameter is sampled over its
-// range, functions that pass through zero at every edge are followed where they dip between samples, and what enters
-// linearly has its edges exactly. These functions are generated (steadyslip/explorer/equations.py, sliding.py).
+// Changes of status along one parameter, found as in steadyslip/linear/search.py: the parameter is sampled over its range,
+// functions that vanish at every edge are searched where they dip between samples, and parameters that enter linearly
+// have exact edges. These functions are generated (steadyslip/explorer/equations.py, sliding.py).
 import { ABSENT, SAME, UNKNOWN } from "./linear.js";
 import { inside } from "./rig.js";
 
 /** @typedef {{x: number, status: number, functions: number[], edge?: boolean}} Sample `functions` as `Linear.functions` has them */
-/** @typedef {{at: number, below: number, above: number}} Edge where the status changes, and what it is on both sides */
-/** @typedef {{edges: Edge[], status: number, low: number, high: number}} Found the status at `low`, where there is no edge */
+/** @typedef {{at: number, below: number, above: number}} Edge place of a change of status, and the status below and above */
+/** @typedef {{edges: Edge[], status: number, low: number, high: number}} Found `status` is that at `low`, for a range without edges */
 
-const PER_DECADE = 40, FURTHEST = 1e6, LINEAR = 720; // the samples of Python
-const AT_MOST = 2000; // samples where a range is absurd
-const COARSE = 6, COARSER = 20; // times fewer while a hand moves a slider, or where edges follow from a formula; while or where both do, or steady sliding is searched for
-const BEND = 1; // of the logarithm of a function over three samples: two zeros between them leave 2 ln 3 at least, powers hardly any
-const DIPS = 16, PIECES = 8, DEEP = 14; // dips that are looked into; pieces of a bracket; times that it is cut, a quarter of it left
-const BESIDE_EDGE = 24, PER_TEN = 4; // samples beside an edge, even in the logarithm of the distance
-const EXACT = 1e-13, SEEN = 1e-5; // to which an edge is narrowed, and while a hand moves a slider
-const ROUNDED = 1e-12, END = 1e-9; // shares of a value that is zero but for rounding, and of the lowest sample that is the end of a domain
+const PER_DECADE = 40, FURTHEST = 1e6, LINEAR = 720; // samples as in Python: per decade; factor to each side of the value; on a linear range
+const AT_MOST = 2000; // most samples, for absurd ranges
+const COARSE = 6, COARSER = 20; // factors of fewer samples: COARSE while a slider moves or if edges are exact; COARSER for both, or if σss must be searched
+const BEND = 1; // bend of ln|function| over three samples that makes a dip: two zeros between them bend it by 2 ln 3 or more, powers hardly
+const DIPS = 16, PIECES = 8, DEEP = 14; // DIPS: most dips searched; PIECES of a bracket; DEEP: refinements, each to a quarter
+const BESIDE_EDGE = 24, PER_TEN = 4; // samples beside an edge, PER_TEN for each decade of distance
+const EXACT = 1e-13, SEEN = 1e-5; // relative precision of an edge, and while a slider moves
+const ROUNDED = 1e-12, END = 1e-9; // ROUNDED: relative size of rounding; END: a change below this share of the lowest sample is the end of the domain
 
 /**
- * All changes of the status along a parameter, the others as they are.
+ * All changes of status along a parameter, the others fixed.
  * @param {import("./rig.js").Rig} rig @param {number} i
- * @param {[number, number]} [range] that is searched beside that of Python
- * @param {boolean} [coarse] whether fewer samples will do
+ * @param {[number, number]} [range] searched besides the range of Python
+ * @param {boolean} [coarse] true if fewer samples are enough
  * @returns {Found}
  */
 export function changes(rig, i, range, coarse = false) {
@@ -58,7 +58,7 @@ class Search {
     return { edges, status: edges.length ? edges[0].below : own.status, low, high };
   }
 
-  /** The range, and stretches of it: values at places 0 to `count`. @param {[number, number]} [range] */
+  /** Search range and its sample values, as a function of the index 0 to `count`. @param {[number, number]} [range] */
   whole(range) {
     const { one, rig: { values }, i, fewer } = this, value = Math.abs(values[i]) || one.natural;
     if (one.high !== null) {
@@ -74,7 +74,7 @@ class Search {
     return { low: both ? -high : one.lowAllowed ? 0 : low, high, stretches };
   }
 
-  /** Samples at even places, and those in narrow windows between them. @param {(n: number) => number} at @param {number} count @returns {Sample[]} */
+  /** Samples at all indices, and samples inside narrow windows between them. @param {(n: number) => number} at @param {number} count @returns {Sample[]} */
   swept(at, count) {
     const row = Array.from({ length: count + 1 }, (_, n) => this.sample(at(n))), dips = [];
     for (let f = this.rig.linear.many - 1; f >= 0; f--) {
@@ -89,7 +89,7 @@ class Search {
     return row.concat(...dips.slice(0, DIPS).map(({ n, f }) => this.descended(at, n - 1, n + 1, f)));
   }
 
-  /** Samples behind the zeros to which a function dips between two places, none where it does not reach zero. */
+  /** Samples behind the zeros of a function that dips between two places; empty if it does not reach zero. */
   descended(at, low, high, f) {
     for (let pass = 0; pass < DEEP; pass++) {
       const place = (n) => low + ((high - low) * n) / PIECES, row = Array.from({ length: PIECES + 1 }, (_, n) => this.sample(at(place(n))));
@@ -102,7 +102,7 @@ class Search {
     return [];
   }
 
-  /** Samples on both sides of an edge, ever closer: of three changes between two samples one alone has been seen. */
+  /** Samples ever closer to an edge on both sides, as three changes between two samples look like one. */
   beside(at, row) {
     return [-1, 1].flatMap((side) => {
       const next = side < 0 ? row.filter(({ x }) => x < at - SAME * Math.abs(at)).at(-1) : row.find(({ x }) => x > at + SAME * Math.abs(at));
@@ -110,7 +110,7 @@ class Search {
     });
   }
 
-  /** With a sample between the zeros of two functions that lie between two samples. @param {Sample[]} row */
+  /** Samples with one more between the zeros of two functions, where both lie between neighbours. @param {Sample[]} row */
   divided(row) {
     const further = /** @type {Sample[]} */ ([]);
     for (let n = 1; n < row.length; n++) {
@@ -123,7 +123,7 @@ class Search {
     return further.length ? ordered([...row, ...further]) : row;
   }
 
-  /** The zero of a function between two samples. */
+  /** Zero of a function between two samples. */
   zero(low, high, f) {
     while (high.x - low.x > EXACT * Math.max(Math.abs(low.x), Math.abs(high.x))) {
       const middle = this.sample(halfway(low.x, high.x));
@@ -134,7 +134,7 @@ class Search {
     return high.x;
   }
 
-  /** Without the samples beside a change whose status is a matter of rounding. @param {Sample[]} row */
+  /** Samples without those beside a change whose status depends on rounding. @param {Sample[]} row */
   certain(row) {
     const found = /** @type {Sample[]} */ ([]), doubtful = (one) => (one.edge ??= this.rig.onEdge(this.i, one.x));
     for (const one of row) {
@@ -144,21 +144,21 @@ class Search {
     return found;
   }
 
-  /** Changes between samples, narrowed; what is too narrow to be gone to is left out. @param {Sample[]} row @returns {Edge[]} */
+  /** Edges between samples to full precision, without windows too narrow to hold a value. @param {Sample[]} row @returns {Edge[]} */
   edges(row) {
     const { one, exact } = this, found = /** @type {Edge[]} */ ([]);
     row.slice(1).forEach((high, n) => {
       const low = row[n], inner = exact.filter((x) => x > low.x && x < high.x), known = inner.length === 1 && [low, high].every(({ status }) => status !== ABSENT && status !== UNKNOWN);
       if (low.status === high.status) return;
       const at = known ? inner[0] : this.narrowed(low, high), size = Math.max(Math.abs(one.value), one.natural);
-      if (one.low === 0 && low.x === 0 && at < END * high.x) return; // the end of the domain is no edge
+      if (one.low === 0 && low.x === 0 && at < END * high.x) return; // the end of the domain is not an edge
       const zero = (one.low === null || one.low < 0) && Math.abs(at) < ROUNDED * size;
       found.push({ at: zero ? 0 : at, below: low.status, above: high.status });
     });
     return merged(found);
   }
 
-  /** Where the status changes between two samples. @param {Sample} first @param {Sample} last */
+  /** Edge between two samples of different status. @param {Sample} first @param {Sample} last */
   narrowed(first, last) {
     let [low, high] = [first.x, last.x];
     const share = this.coarse ? SEEN : EXACT, least = low === 0 ? ROUNDED * high : 0;
@@ -173,22 +173,22 @@ class Search {
 
 const halfway = (low, high) => (low > 0 && high > 4 * low ? Math.sqrt(low) * Math.sqrt(high) : 0.5 * (low + high));
 
-/** Values between neighbours. @param {number[]} row rising */
+/** Midpoints of neighbours. @param {number[]} row rising */
 const middles = (row) => row.slice(1).map((high, n) => halfway(row[n], high));
 
-/** Samples that rise, each once. @param {Sample[]} row */
+/** Samples in rising order, without duplicates. @param {Sample[]} row */
 function ordered(row) {
   return row.sort((a, b) => a.x - b.x).filter(({ x }, n, all) => n === 0 || x !== all[n - 1].x);
 }
 
-/** How far a sample lies below the line through its neighbours, in the logarithm of a function of one sign and status. @param {Sample[]} row */
+/** Depth of a sample below the line through its neighbours, in ln|function|, where sign and status are the same. @param {Sample[]} row */
 function bend(row, n, f) {
   const { status, functions } = row[n], own = functions[f], low = row[n - 1], high = row[n + 1], sign = own > 0 ? 1 : -1;
   if (low.status !== status || high.status !== status || !(sign * low.functions[f] > 0) || !(sign * high.functions[f] > 0)) return 0;
   return sign * (low.functions[f] + high.functions[f] - 2 * own);
 }
 
-/** Without states that nobody can go to, between two edges in the same place; rounding decides which of them is met first. @param {Edge[]} edges */
+/** Edges with those in one place joined; the status between them depends on rounding and has no width. @param {Edge[]} edges */
 function merged(edges) {
   const found = /** @type {Edge[]} */ ([]);
   for (const edge of edges) {

@@ -1,8 +1,8 @@
-// The sketch of the mechanism, which moves with time: the block, the load point, the ground under them.
-const SHIFT = 16, MOVING = ".ground, .body, .link"; // how far the block goes in the drawing at most
+// Moving sketches: block, load point and ground of a slider, bodies and links of a machine.
+const SHIFT = 16, MOVING = ".ground, .body, .link"; // SHIFT: largest displacement of the block in the sketch, SVG units
 
 export class Sketch {
-  gain = 0; // how far parts move for a metre of slip
+  gain = 0; // SVG units for a metre of slip
   first = 0;
   caption = "The mechanism, seen from the load point";
 
@@ -20,7 +20,7 @@ export class Sketch {
     this.first = x;
   }
 
-  /** Where everything is: slip against the load point, and the way of that, m. @param {(series: any) => number} now @param {any} course */
+  /** Move all parts to a time: slip relative to the load point and displacement of that, m. @param {(series: any) => number} now @param {any} course */
   place(now, course) {
     const x = now(course.x), load = now(course.load), shift = this.gain * (x - this.first), passed = this.gain * load;
     for (const part of this.parts) {
@@ -36,15 +36,15 @@ export class Sketch {
   }
 }
 
-/** Put a link, drawn so many units long, between two points. */
+/** Place a link, drawn with a given length, between two points. */
 function between(part, x1, y1, x2, y2, unit) {
   const dx = x2 - x1, dy = y2 - y1, angle = (Math.atan2(dy, dx) * 180) / Math.PI;
   part.setAttribute("transform", `translate(${x1} ${y1}) rotate(${angle}) scale(${Math.hypot(dx, dy) / unit} 1)`);
 }
 
-const TURN = 40, LINK = 62; // degrees that a wheel turns at most; length that a link is drawn with
+const TURN = 40, LINK = 62; // TURN: largest rotation of a wheel, degrees; LINK: length with which a link is drawn, SVG units
 
-/** The sketch of a machine: bodies shift and turn by as much as they are ahead of steady sliding. */
+/** Moving sketch of a machine: bodies shift or turn in proportion to their lead over steady sliding. */
 export class MachineSketch {
   caption = "The machine, as seen by who moves with it";
   /** @type {number[]} */ gain = [];
@@ -59,7 +59,7 @@ export class MachineSketch {
 
   /** @param {any} course */
   take(course) {
-    const most = [0, 0]; // of what slides, of what turns
+    const most = [0, 0]; // largest lead of sliding and of turning bodies
     course.bodies.forEach(({ x }, n) => (most[Number(this.bodies[n].turns)] = x.reduce((a, b) => Math.max(a, Math.abs(b - x[0])), most[Number(this.bodies[n].turns)])));
     const gain = [most[0] > 0 ? SHIFT / most[0] : 0, most[1] > 0 ? TURN / most[1] : 0];
     this.gain = this.bodies.map(({ turns }) => gain[Number(turns)]);

@@ -1,9 +1,9 @@
-// What is chosen on a page beside values: the bar, the chart's axes, the disturbance, what is shown; links bring it back.
+// Choices of a page besides values (bar, chart axes, disturbance, body shown), and their text in links.
 
-const MOST = 40; // letters of a size in a link
-const FIELDS = { do: "disturbance", on: "on", of: "size", for: "length", show: "view" }; // of the motion, by their words in a link
+const MOST = 40; // most letters of a size in a link
+const FIELDS = { do: "disturbance", on: "on", of: "size", for: "length", show: "view" }; // fields of the motion by their key in a link
 
-/** What a link says of it, beginning with ~, which no parameter does. @param {string} hash @returns {Record<string, string>} */
+/** Choices in a link by key; they begin with ~, unlike parameters. @param {string} hash @returns {Record<string, string>} */
 export function chosenIn(hash) {
   const found = /** @type {Record<string, string>} */ ({});
   for (const part of hash.slice(0, 10000).replace(/^#/, "").split("&")) {
@@ -15,13 +15,13 @@ export function chosenIn(hash) {
   return found;
 }
 
-/** What differs from what the page has at first. @param {import("./page.js").Page} page @returns {string[]} */
+/** Link text of the choices that differ from the initial ones. @param {import("./page.js").Page} page @returns {string[]} */
 export function chosen(page) {
   const now = all(page);
   return Object.keys(now).filter((name) => now[name] !== page.first[name]).map((name) => `~${name}=${encodeURIComponent(now[name])}`);
 }
 
-/** @param {import("./page.js").Page} page @returns {Record<string, string>} */
+/** Present choices by key. @param {import("./page.js").Page} page @returns {Record<string, string>} */
 export function all(page) {
   const { rig: { data: { parameters }, bar }, chart, course } = page, named = (i) => parameters[i]?.name ?? "";
   const found = { bar: named(bar), across: named(chart.axes[0]), up: named(chart.axes[1]), part: page.part };
@@ -29,7 +29,7 @@ export function all(page) {
   return found;
 }
 
-/** Choose what a link says; what it does not say is as at first. @param {import("./page.js").Page} page @param {Record<string, string>} given */
+/** Apply the choices of a link; the others become the initial ones. @param {import("./page.js").Page} page @param {Record<string, string>} given */
 export function choose(page, given) {
   const { rig, chart, course, first } = page, wanted = { ...first, ...given }, at = (name) => rig.data.parameters.findIndex((one) => one.name === name);
   const known = (name) => (at(wanted[name]) >= 0 ? at(wanted[name]) : at(first[name]));
@@ -45,7 +45,7 @@ export function choose(page, given) {
   }
 }
 
-/** A field's value, if it may have it; of a list, one that is there. */
+/** Set the value of a field if it is allowed; of a list, if it has it. */
 function pick(field, value, other) {
   field.value = value;
   if (field.tagName === "SELECT" && field.selectedIndex < 0) field.value = other;

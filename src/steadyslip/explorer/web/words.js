@@ -1,28 +1,28 @@
-// What answers and motions are called: the sentences of the page.
+// Sentences of the page about verdicts and motions.
 import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
 import { fill } from "./modes.js";
 import { digits, shown, told } from "./quantities.js";
 import { NEW } from "./rig.js";
 
-/** A stress, or a force where the rig has an area. */
+/** Text of a stress, or of a force for rigs with an area. */
 export function quantity(value, unit, area, many = 4) {
   if (area !== null && unit === "Pa/m") return shown(value * area, "N/m", many);
   return area !== null && unit === "Pa" ? shown(value * area, "N", many) : shown(value, unit, many);
 }
 
-/** A name or a meaning with the word that fits: of what is given as a force, no stress. @param {string} text @param {string} unit */
+/** Name or meaning with "force" for "stress" if the unit is one of force. @param {string} text @param {string} unit */
 export const named = (text, unit) => (unit[0] === "N" ? text.replace(/stress(es)?/g, (_, many) => (many ? "forces" : "force")) : text);
 
-/** What the mechanism gives back in a slip event, which is less than nothing where it slides backwards. */
+/** Text of the drop of stress or force in a slip event; "(rises)" for a negative drop. */
 export const dropped = (value, unit, area = /** @type {number | null} */ (null)) => (value < 0 ? `${quantity(-value, unit, area)} (rises)` : quantity(value, unit, area));
 
-/** How a stiffness along the sliding is told: in the unit of the user's file, where that gives one. @param {any} data */
+/** Parameter data with which a stiffness along the slide is shown: in the unit of the user's file if it has one. @param {any} data */
 export function asStiffness({ parameters, stiffness, area }) {
   const unit = area === null ? "Pa/m" : "N/m", given = parameters.find((one) => one.name === stiffness);
   return { unit, factor: area ?? 1, own: given?.unit === unit ? given.own : NEW };
 }
 
-/** What an answer is, in a word that style sheets know. */
+/** Kind of an answer, as a word used by the style sheet. */
 export function kindOf(answer) {
   if (answer.status === ABSENT) return "none";
   if (answer.status === UNKNOWN) return "unknown";
@@ -30,12 +30,12 @@ export function kindOf(answer) {
 }
 
 const UNFIT = "A number leaves its range, or breaks a condition that several obey together.";
-const NEXT_TO_IT = 1e-6; // as in steadyslip/verdict/reasons.py, whose phrases these functions fill
+const NEXT_TO_IT = 1e-6; // relative distance from the edge that counts as on it; as in steadyslip/verdict/reasons.py, whose phrases are used here
 
-/** The first line. @param {string} speed "at" or "of" what */
+/** Headline of the verdict. @param {string} speed velocity with its preposition, "at" or "of" */
 export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)] ?? "Numbers outside what a rig can have", { speed });
 
-/** Why, as Python says it. @param {any} answer @param {any} data @param {any} [edge] the nearest, of a machine */
+/** Reason for the verdict, with the phrases of Python. @param {any} answer @param {any} data @param {any} [edge] nearest edge of a machine */
 export function reason(answer, data, edge) {
   if (answer.status === UNKNOWN) return UNFIT;
   const { phrases, reasons } = data, words = phrases ?? reasons;
@@ -43,7 +43,7 @@ export function reason(answer, data, edge) {
   return text[0].toUpperCase() + text.slice(1) + ".";
 }
 
-/** Why nothing slides steadily. */
+/** Reason why there is no steady sliding. */
 function absence(answer, { absent, phrases, facts, areas, area }) {
   const name = facts.contacts[answer.contact], at = name ? fill(absent.at, { name }) : "";
   const whole = !phrases ? area : areas[answer.contact] < 0 ? 1 : answer.own[areas[answer.contact]];
@@ -54,7 +54,7 @@ function absence(answer, { absent, phrases, facts, areas, area }) {
   return fill(absent["lift-off"], { at, force, load: size(answer.had), taken: size(answer.had - answer.load), left: size(answer.load) });
 }
 
-/** What holds a slider beside its critical value. */
+/** Reason for the verdict on a slider away from its critical value. */
 function ofSlider({ onEdge, eigenvalues, stiffness, gain, held, intervals, critical, side }, data) {
   const { reasons } = data, say = (k) => told(asStiffness(data), k), own = stiffness + gain, name = held ? reasons.name : "stiffness";
   if (onEdge && !own && eigenvalues.some(({ re, im }) => !re && !im)) return reasons.free;
@@ -67,30 +67,30 @@ function ofSlider({ onEdge, eigenvalues, stiffness, gain, held, intervals, criti
   return text + (alone ? fill(reasons["one edge"], { side }) : reasons.several) + (onEdge ? `; ${reasons["on edge"]}` : "");
 }
 
-/** What a slider does at its critical value, and that along the axis. */
+/** Reason for the verdict on a slider at its critical value. */
 export function besides({ critical, illPosed, frequency, gain, stiffness, share }, data) {
   if (critical === null || illPosed) return "";
   const by = gain && !stiffness ? "gain" : "stiffness", along = data.axial >= 0 ? ` Along the axis the critical stiffness is ${told(asStiffness(data), (critical + gain) / share)}.` : "";
   return along + (frequency ? ` At the critical ${by} a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / frequency, "s").replace(" ", "\u00a0")}.` : "");
 }
 
-/** What becomes of disturbances of a machine, and the nearest edge. */
+/** Reason for the verdict on a machine: growth or decay, and the nearest edge. */
 function ofMachine(answer, { phrases, beyond }, edge) {
   if (answer.onEdge) return phrases["on edge"];
   const what = answer.status === STABLE ? phrases["dies out"] : beyond[kindBeyond(answer)];
   return edge ? `${what}; ${fill(phrases.nearest, edge)}` : what;
 }
 
-/** What kind of change an edge is, by what is behind it where that is not stable. @param {any} answer there */
+/** Kind of an edge, from the answer on its unstable side. @param {any} answer on that side */
 function kindBeyond(answer) {
   if (answer.status === ABSENT) return answer.searched ? "no solution" : (answer.pressing ?? answer.slope) < 1 ? "lift-off" : "lock-up";
   return answer.illPosed ? "ill-posed" : answer.eigenvalues[0]?.im ? "oscillatory" : "divergence";
 }
 
-/** "it lifts off" of a machine: which contact does. @param {string} words @param {any} answer @param {any} facts */
+/** Phrase such as "it lifts off" with the name of the contact of a machine. @param {string} words @param {any} answer @param {any} facts */
 const ofContact = (words, answer, { contacts }) => (answer.status === ABSENT && contacts[answer.contact] ? words.replace(/^it /, `${contacts[answer.contact]} `) : words);
 
-/** What happens beyond an edge, in the words of Python; where nothing slides steadily before it, what does behind. @param {any} edge @param {any} page */
+/** Phrase for what happens beyond an edge, as in Python. @param {any} edge @param {any} page */
 export function beyondWords({ i, beyond, behind }, page) {
   if (beyond === STABLE) return "becomes stable";
   if (beyond !== ABSENT && page.answer.status === ABSENT) return "slides steadily, but unstable";
@@ -98,19 +98,19 @@ export function beyondWords({ i, beyond, behind }, page) {
   return ofContact(words[kindBeyond({ ...answer, status: beyond })], answer, facts);
 }
 
-/** How many times something is something else: with as many digits as tell it from once. */
+/** Text of a ratio, with enough digits to differ from 1. */
 const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math.log10(Math.abs(many - 1) || 1)))));
 
-/** How a motion ends before its time, where the driver has a word of its own for it. @type {Record<string, string>} */
+/** Phrases for the early end of a motion, by status of the driver. @type {Record<string, string>} */
 const ENDED = {
   "no velocity": "no velocity balances the forces", "contact lost": "the contact is lost, its normal force has fallen to zero",
   stuck: "no step is small enough, as the equations have no solution beyond", "too many steps": "more steps than a page takes; ask for a shorter time, or steadyslip simulate, which takes more",
 };
 
-/** A velocity, unless it is so small that nothing moves. @param {number} v @param {number} floor */
+/** Text of a velocity; "0 (stuck)" below the floor. @param {number} v @param {number} floor */
 export const slow = (v, floor) => (Math.abs(v) < floor ? "0 (stuck)" : shown(v, "m/s", 3));
 
-/** What came of a motion. @param {any} course @param {any} data */
+/** Sentence on the result of a motion. @param {any} course @param {any} data */
 export function outcome({ events, status, end, contacts, at }, { area, phrases }) {
   if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: neither mass nor damping limits the velocity.`;
   const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;

@@ -15,6 +15,7 @@ from steadyslip.nonlinear.orbits.cycle import End
 from steadyslip.nonlinear.orbits.doublings import doubled_sheets
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
 from steadyslip.nonlinear.orbits.search import seed_at
+from steadyslip.nonlinear.orbits.tracer import orbit_of
 from steadyslip.nonlinear.orbits.values import tracer_of
 
 
@@ -182,6 +183,9 @@ def test_doubled_cycles_are_followed_through_reversals_of_slip():
     assert last.lowest_velocity < 0
     assert last.multiplier_error < 1e-6
     assert closing(machine.with_values({ALONG: last.value}), last) < 1e-5  # deviations grow 18-fold in a period
+    follower = tracer_of(branch.onset, 0, None)
+    follower.flow.led = True  # as after one run that needed it
+    assert follower.resumed(orbit_of(last), 1.0).cycle.multiplier_error < 1e-6
 
 
 @pytest.mark.campaign

@@ -133,6 +133,10 @@ class Shooting:
         """∂(end)/∂(start) of every segment, in natural scales, (K, n, n)."""
         return np.asarray(self._run(u)[1] * self.flow.scales[None, :] / self.flow.scales[:, None])
 
+    def forget(self) -> None:
+        """Run anew, even for the same unknowns."""
+        self._last = None
+
     def _run(self, u: Array) -> tuple[Array, Array]:
         """Ends and sensitivities, kept for the latest unknowns."""
         if self._last is None or self._last[0] != u.tobytes():

@@ -454,6 +454,10 @@ class Tracer:
         away = np.abs(orbit.states - self.flow.steady(orbit.value)) / self.flow.scales
         shooting.amplitude = float(min(1.0, away.max()))
         found = measured(shooting, point.u)
+        if self.flow.led and found.cycle.multiplier_error > LOST:  # may be for one trial that the motion leads
+            self.flow.led = False
+            shooting.forget()
+            found = measured(shooting, point.u)
         if found.turns > 1:
             raise Failure(f"a shorter cycle, run through {found.turns} times")
         cycle = replace(found.cycle, stable=self._attracts(found.cycle))

@@ -110,6 +110,39 @@ def test_one_stiff_link_among_many_hides_no_other():
     assert rates[1] == pytest.approx(rates[0], rel=1e-6)
 
 
+def late_servo(joint):
+    """A late controller pushes a motor whose joint to a carriage is stiff; the joint hides the oscillation below."""
+    return ss.Machine(
+        bodies={
+            "motor": ss.SlidingBody(mass=1.0),
+            "carriage": ss.SlidingBody(mass=0.1),
+            "table": ss.SlidingBody(mass=0.6),
+        },
+        links={
+            "joint": ss.Spring(between=("motor", "carriage"), stiffness=joint),
+            "belt": ss.Spring(between=("carriage", "table"), stiffness=1e5, damping=1.0),
+        },
+        contacts={"guide": surface("carriage", ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.1, v_stribeck=1e-3))},
+        drive=ss.PositionPD(velocity=1e-3, body="motor", kp=1e4, kd=30.0, delay=1e-3),
+    )
+
+
+@pytest.mark.parametrize("joint", [1e13, 1e17])
+def test_roots_under_a_delay_that_fail_are_found_by_newton_with_many_digits(joint, monkeypatch):
+    """As they are with the joint rigid; where nothing else was tried they were withheld."""
+    machine = late_servo(joint)
+    right = checked(ss.joined(machine, "joint"))
+    assert right.decided
+    found = checked(machine)
+    assert found.refined
+    assert found.decided
+    assert found.growing == right.growing
+    for root in right.values:
+        assert np.min(np.abs(found.values - root)) < 1e-6 * abs(root)
+    monkeypatch.setattr(pencil, "precise_root", lambda *_: None)
+    assert not checked(machine).decided
+
+
 def test_roots_under_a_delay_are_counted_by_the_argument(monkeypatch):
     late = ss.Machine(
         bodies={"block": ss.SlidingBody(mass=1.0)},

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import PreciseFunction
 from steadyslip.core.questions import question
 from steadyslip.linear.roots import ComplexArray
 from steadyslip.model import Model
@@ -22,6 +23,8 @@ _SHARE = 0.3  # of the digits: decades beyond the machine's own rate from which 
 _PLACE = 1.2345678  # in units of that rate, where the matrix is inverted: no eigenvalue
 _SAME = 1e-13  # relative difference of an eigenvalue at a number of digits and at half of them,
 _NEARLY = 1e-9  # and from what another route found, within which they agree
+_NEWTON_DIGITS, _MOST_STEPS = 60, 30
+_ARRIVED = 1e-20  # relative size of a step of Newton's method, after which the next changes nothing in floating point
 
 
 def precise_eigenvalues(point: OperatingPoint, rough: ComplexArray) -> ComplexArray | None:
@@ -45,6 +48,61 @@ def precise_eigenvalues(point: OperatingPoint, rough: ComplexArray) -> ComplexAr
             return found
         before = found
     return None
+
+
+def precise_root(point: OperatingPoint, near: complex) -> complex | None:
+    """The eigenvalue (1/s) of a single rig, with delays or without, to which Newton's method leads; None if to none.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Of a single rig.
+    near : complex
+        1/s; where it starts.
+    """
+    import mpmath  # slow to import
+
+    powers, entries, delays = _precise_matrix(point.model)
+    with mpmath.workdps(_NEWTON_DIGITS):
+        numbers = [mpmath.mpf(float(np.asarray(a))) for a in (*point.arguments, *point.steady)]
+        table, late = entries(*numbers), delays(*numbers)
+        lags = [sum(h * many for h, many in zip(late, own[1:], strict=True)) for own in powers]
+        size = len(characteristic_rows(point.model))
+        s = mpmath.mpc(near)
+        for _ in range(_MOST_STEPS):
+            terms = [s ** own[0] * mpmath.exp(-s * lag) for own, lag in zip(powers, lags, strict=True)]
+            slopes = [
+                (own[0] * s ** (own[0] - 1) if own[0] else 0) * mpmath.exp(-s * lag) - lag * term
+                for own, lag, term in zip(powers, lags, terms, strict=True)
+            ]
+            whole, slope = (_summed(table, of, size) for of in (terms, slopes))
+            try:
+                inner = mpmath.inverse(whole) * slope
+            except ZeroDivisionError:
+                return complex(s)
+            step = 1 / sum(inner[i, i] for i in range(size))
+            s -= step
+            if abs(step) <= _ARRIVED * abs(s):
+                return complex(s)
+    return None
+
+
+def _summed(table: list[Any], terms: list[Any], size: int) -> Any:
+    """The matrix whose entries, row by row, are sums of `terms` with the numbers of a table before them."""
+    import mpmath
+
+    many = len(terms)
+    rows = [table[i : i + many] for i in range(0, len(table), many)]
+    entries = [mpmath.fdot(row, terms) for row in rows]
+    return mpmath.matrix([entries[i : i + size] for i in range(0, len(entries), size)])
+
+
+@question
+def _precise_matrix(model: Model) -> tuple[list[tuple[int, ...]], PreciseFunction, PreciseFunction]:
+    """Powers in the characteristic matrix, and functions of mpmath's numbers: what stands before each, and delays."""
+    powers, entries = matrix_entries(model)
+    arguments = list(model.arguments)
+    return powers, PreciseFunction(arguments, entries), PreciseFunction(arguments, list(model.delays))
 
 
 def _alike(some: ComplexArray, others: ComplexArray, share: float) -> bool:
@@ -77,10 +135,12 @@ def _parts(point: OperatingPoint, rate: Any) -> list[Any] | None:
     """The coefficients of s^0, s^1 and s² in the characteristic matrix, in units of time of 1/rate."""
     import mpmath
 
-    function = _function(point.model)
+    powers, entries, _ = _precise_matrix(point.model)
+    size = len(characteristic_rows(point.model))
     try:
-        numbers = function(*(mpmath.mpf(float(np.asarray(a))) for a in (*point.arguments, *point.steady)))
-        return [mpmath.matrix(part) * rate**power for power, part in enumerate(numbers)]
+        numbers = entries(*(mpmath.mpf(float(np.asarray(a))) for a in (*point.arguments, *point.steady)))
+        terms = [[rate ** own[0] * (own[0] == power) for own in powers] for power in range(3)]
+        return [_summed(numbers, of, size) for of in terms]
     except (ZeroDivisionError, TypeError, ValueError):
         return None
 
@@ -103,18 +163,8 @@ def _pencil(p0: Any, p1: Any, p2: Any) -> tuple[Any, Any]:
 
 
 @question
-def _function(model: Model) -> Any:
-    """A function of mpmath's numbers that gives the three parts of the characteristic matrix."""
-    rows = list(characteristic_rows(model).values())
-    names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(model.arguments)}
-    parts = [
-        [[sp.sympify(entry.get((power,), 0)).xreplace(names) for entry in row] for row in rows] for power in range(3)
-    ]
-    own = {"asinh_exp": _asinh_exp}
-    return sp.lambdify(list(names.values()), parts, modules=[own, "mpmath"], cse=True)
-
-
-def _asinh_exp(x: Any, y: Any) -> Any:
-    import mpmath  # slow to import
-
-    return mpmath.asinh(x * mpmath.exp(y))
+def matrix_entries(model: Model) -> tuple[list[tuple[int, ...]], list[sp.Expr]]:
+    """Powers of s and of exp(−s delay) in the characteristic matrix, and row by row what stands before each."""
+    entries = [entry for row in characteristic_rows(model).values() for entry in row]
+    powers = sorted({own for entry in entries for own in entry})
+    return powers, [entry.get(own, sp.Integer(0)) for entry in entries for own in powers]

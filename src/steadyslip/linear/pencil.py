@@ -5,7 +5,7 @@ machine's matrix pencil; delays add factors exp(−s h). An eigenvalue that was 
 least singular value of M(s), in units in which rows and columns are alike, over what M(s) changes with s: how far the
 eigenvalue of that matrix is, rounding of its entries included. Whether all are there is asked of the determinant along
 the imaginary axis, whose argument must turn as that of Π(s − s_i) does; with delays, of the argument principle itself.
-What fails is computed anew with many digits, from the eigenvalues of the same matrix.
+What fails is computed anew with many digits, from the eigenvalues of the same matrix; with delays by Newton's method.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.linear.argument import count_by_argument
-from steadyslip.linear.digits import precise_eigenvalues
+from steadyslip.linear.digits import matrix_entries, precise_eigenvalues, precise_root
 from steadyslip.linear.quasi import in_own_time, outweighed
 from steadyslip.linear.roots import Array, ComplexArray
 from steadyslip.linear.spectrum import spectrum
@@ -94,13 +93,33 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
     if not found.size or not matrix.finite:
         return CheckedSpectrum(found, np.full(found.shape, np.inf), -1, False, False)
     first = _checked(point, matrix, found, matrix.errors(found), False)
-    if first.decided or point.model.delays:
+    if first.decided:
         return first
+    if point.model.delays:
+        return _checked(point, matrix, *_by_newton(point, first), True)
     better = precise_eigenvalues(point, found)
     if better is None:
         return first
     errors = np.maximum(_coefficient_errors(point, better), _NOISE * np.abs(better))
     return _checked(point, matrix, better, errors, True)
+
+
+def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexArray, Array]:
+    """Eigenvalues under delays and their errors, those not known well enough computed with many digits."""
+    values, errors = first.values.copy(), first.errors.copy()
+    last = 1 + _LAST * np.random.default_rng(0).choice([-0.5, 0.5], (_TRIALS, len(point.arguments)))
+    others = [point.with_arguments([a * own for a, own in zip(point.arguments, row, strict=True)]) for row in last]
+    for i in np.flatnonzero(~_is_good(values, errors) & (values.imag >= 0)):
+        near, pair = complex(values[i]), np.abs(values - values[i].conjugate()) <= errors[i]
+        apart = np.min(np.abs(np.delete(values, i) - near), initial=np.inf)
+        found = [precise_root(one, near) for one in (point, *others)]
+        if all(one is not None and abs(one - near) < 0.5 * apart for one in found):
+            right = complex(found[0] or 0)
+            error = _FIRST * max(abs((one or 0) - right) for one in found) + _NOISE * abs(right)
+            values[pair], errors[pair] = right.conjugate(), error
+            values[i], errors[i] = right, error
+    order = np.lexsort((-values.imag, -values.real))
+    return values[order], errors[order]
 
 
 def best_spectrum(point: OperatingPoint) -> ComplexArray:
@@ -275,12 +294,5 @@ def _spread(s: ComplexArray, errors: Array) -> Array:
 @question
 def matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
     """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
-    powers, entries = _written(model)
+    powers, entries = matrix_entries(model)
     return powers, model.function(entries)
-
-
-@question
-def _written(model: Model) -> tuple[list[tuple[int, ...]], list[sp.Expr]]:
-    entries = [entry for row in characteristic_rows(model).values() for entry in row]
-    powers = sorted({own for entry in entries for own in entry})
-    return powers, [entry.get(own, sp.Integer(0)) for entry in entries for own in powers]

@@ -13,8 +13,8 @@ import numpy as np
 
 import steadyslip as ss
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
+from steadyslip.laws.friction.law import State
 from steadyslip.laws.friction.normal_memory import NoMemory
-from steadyslip.laws.friction.state import State
 from steadyslip.linear.state_space import jacobian
 from steadyslip.verdict.causes import why_none
 

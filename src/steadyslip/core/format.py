@@ -87,7 +87,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
         return f"{_few(value / units.deg, digits)} deg"
     if si_unit == "m/rad":
         value, si_unit = value * 2 * math.pi, "m/rev"
-    if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:  # shorter times than 10 min in s
+    if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:  # times below 10 min stay in s
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
                 return f"{_few(value / size, digits)} {name}"

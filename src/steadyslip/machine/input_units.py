@@ -27,7 +27,8 @@ def turns(machine: Machine, piece: Piece) -> bool:
 def turns_on(machine: Machine, body: str | None) -> bool:
     """True if the named body rotates; None names the only body of a machine that has one."""
     name = body or (next(iter(machine.bodies)) if len(machine.bodies) == 1 else "")
-    meant = [name] if name in machine.bodies else get_close_matches(name, machine.bodies, 1)  # misspelling: see targets
+    # a misspelt name is reported later, by motion/targets.py
+    meant = [name] if name in machine.bodies else get_close_matches(name, machine.bodies, 1)
     return any(machine.bodies[one].turns for one in meant)
 
 

@@ -243,6 +243,7 @@ class Forces:
         return self._at_drive() * pull / self._force_area()
 
     def _at_drive(self) -> sp.Expr:
+        """Coefficient with which the elements of the drive act on the load point."""
         return sp.sympify(self.drive_elements[0].acts.get(LOAD_POINT, -1))
 
     @cached_property
@@ -304,6 +305,7 @@ class Forces:
         return self._simplified(total - self._integrated(name, self.statics.integral))
 
     def _integrated(self, name: str, integral: sp.Expr) -> sp.Expr:
+        """Force of integral action on a coordinate; the steady part only if the drive's force is imposed."""
         acting = self.mechanism.integral
         if acting is None or (self.imposed and integral is INTEGRAL):
             return sp.Integer(0)

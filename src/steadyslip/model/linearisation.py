@@ -15,9 +15,15 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
-from steadyslip.model.determinant import Polynomial, TooManyTerms, determinant, machine_determinant, sum_of_terms
+from steadyslip.model.determinant import (
+    Placeholders,
+    Polynomial,
+    TooManyTerms,
+    determinant,
+    machine_determinant,
+    sum_of_terms,
+)
 from steadyslip.model.equations import Model
-from steadyslip.model.placeholders import Placeholders
 
 Gradient = dict[sp.Symbol, sp.Expr]
 

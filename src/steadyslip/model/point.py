@@ -211,6 +211,7 @@ def _cached_point(rig: Rig, branch: int) -> OperatingPoint:
 
 
 def _make_point(model: Model, rig: Rig, arrays: BroadcastArrays, branch: int, scan: bool) -> OperatingPoint:
+    """Check the conditions between parameters, and order the values as in ``model.parameters``."""
     varied, valid = arrays.values, True
     if varied and scan:
         valid = valid_together(rig, "", varied)
@@ -220,7 +221,7 @@ def _make_point(model: Model, rig: Rig, arrays: BroadcastArrays, branch: int, sc
     if model.axial_share is not None:
         for name, other in rig.replaces.items():
             values[other] = values[name] * _axial_share(model)(values)
-    values |= {name: 0.0 for name in rig.always_symbols if values[name] is None}  # a controller alone
+    values |= {name: 0.0 for name in rig.always_symbols if values[name] is None}  # a controller without a spring
     arguments = tuple(values[name] for name in model.parameters)
     return OperatingPoint(model, arguments, arrays.shape, arrays.wrap, branch, valid)
 

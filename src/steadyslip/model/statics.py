@@ -23,9 +23,8 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
-from steadyslip.model.determinant import TooManyTerms, determinant
+from steadyslip.model.determinant import Placeholders, TooManyTerms, determinant
 from steadyslip.model.equations import Carried, Entries
-from steadyslip.model.placeholders import Placeholders
 
 MAX_TERMS = 8
 """Largest number of terms of the determinant for which the statics are solved symbolically; chosen by trial."""

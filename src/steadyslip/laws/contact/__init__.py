@@ -19,22 +19,7 @@ USUAL = Constant.name
 """Default contact law of rig files."""
 
 __all__ = [
-    "USUAL",
-    "Compliant",
-    "Constant",
-    "ContactLaw",
-    "DilatingLayer",
-    "InclinedSpring",
-    "LeadScrew",
-    "Lift",
-    "Linear",
-    "Motion",
-    "PoreFluid",
-    "PreloadedContact",
-    "Prescribed",
-    "SelfEnergising",
-    "SliderCrank",
-    "SlopedGuide",
-    "Triaxial",
-    "pressed_at",
-]
+    "USUAL", "Compliant", "Constant", "ContactLaw", "DilatingLayer", "InclinedSpring", "LeadScrew", "Lift", "Linear",
+    "Motion", "PoreFluid", "PreloadedContact", "Prescribed", "SelfEnergising", "SliderCrank", "SlopedGuide",
+    "Triaxial", "pressed_at",
+]  # fmt: skip

@@ -2,28 +2,14 @@
 
 from steadyslip.laws.friction.bristle import CoulombStribeck, LuGre
 from steadyslip.laws.friction.evolution import PRZ, Aging, Evolution, Nagata, Slip
-from steadyslip.laws.friction.law import FrictionLaw
+from steadyslip.laws.friction.law import FrictionLaw, State
 from steadyslip.laws.friction.normal_memory import LinkerDieterich, NoMemory, NormalMemory, PrakashClifton
 from steadyslip.laws.friction.rate_state import RateState
-from steadyslip.laws.friction.state import State
 
 USUAL = RateState.name
 """Default friction law of rig files."""
 
 __all__ = [
-    "PRZ",
-    "USUAL",
-    "Aging",
-    "CoulombStribeck",
-    "Evolution",
-    "FrictionLaw",
-    "LinkerDieterich",
-    "LuGre",
-    "Nagata",
-    "NoMemory",
-    "NormalMemory",
-    "PrakashClifton",
-    "RateState",
-    "Slip",
-    "State",
-]
+    "PRZ", "USUAL", "Aging", "CoulombStribeck", "Evolution", "FrictionLaw", "LinkerDieterich", "LuGre", "Nagata",
+    "NoMemory", "NormalMemory", "PrakashClifton", "RateState", "Slip", "State",
+]  # fmt: skip

@@ -6,7 +6,7 @@ import sympy as sp
 
 from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.records import parameter
-from steadyslip.laws.friction.law import Expression, FrictionLaw
+from steadyslip.laws.friction.law import Expression, Expressions, FrictionLaw
 
 REST = sp.Rational(1, 10**12)
 """Fraction of v_S below which the Stribeck curve is flat, as its slope at rest would be infinite for δ_S < 1.
@@ -50,14 +50,14 @@ class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
         "s", nonnegative, "time δ by which the curve follows velocity late", default=0.0, structural=True, kind="delay"
     )
 
-    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
         return sigma * (self._curve(v) * sp.sign(v) + self.viscous * v)
 
     def lateness(self) -> Expression:
         return self.lag
 
     def late_strength(
-        self, v: Expression, late: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+        self, v: Expression, late: Expression, sigma: Expression, memory: Expressions, tau: Expression
     ) -> Expression:
         return sigma * (self._curve(late) * sp.sign(v) + self.viscous * v)
 
@@ -80,16 +80,14 @@ class LuGre(StribeckCurve, name="lugre"):
     def meanings(self) -> dict[str, str]:
         return {"z": "mean deflection of the bristles"}
 
-    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
         (rate,) = self.rates(v, sigma, memory, tau)
         return sigma * (self.bristle_stiffness * memory[0] + self.bristle_damping * rate + self.viscous * v)
 
-    def rates(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> tuple[Expression, ...]:
+    def rates(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expressions:
         return (v - self.bristle_stiffness * sp.Abs(v) * memory[0] / self._curve(v),)
 
-    def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
+    def steady_memory(self, v: Expression, sigma: Expression) -> Expressions:
         return (self._curve(v) / self.bristle_stiffness,)
 
     def steady_strength(self, v: Expression, sigma: Expression) -> Expression:

@@ -14,9 +14,8 @@ from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import nonnegative
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.laws.friction.law import Expression
+from steadyslip.laws.friction.law import Expression, State
 from steadyslip.laws.friction.normal_memory import NormalMemory
-from steadyslip.laws.friction.state import State
 
 
 class Evolution(FrozenRecord, family="evolution law"):

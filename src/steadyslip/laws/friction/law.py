@@ -8,9 +8,11 @@ from typing import Any, ClassVar
 import sympy as sp
 
 from steadyslip.core.conditions import Condition
-from steadyslip.core.records import FrozenRecord
+from steadyslip.core.domains import nonnegative, positive, real
+from steadyslip.core.records import FrozenRecord, parameter
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
+Expressions = tuple[Expression, ...]  # one for each memory variable or state
 
 
 class FrictionLaw(FrozenRecord, family="friction law"):
@@ -35,20 +37,18 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         """SI units of the memory variables; dimensionless unless overridden."""
         return tuple("1" for _ in self.memory())
 
-    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
         """Friction stress τ (Pa).
 
         `tau` is the friction stress itself, for laws whose state depends on it (Nagata); others ignore it.
         """
         raise NotImplementedError
 
-    def rates(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> tuple[Expression, ...]:
+    def rates(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expressions:
         """Time derivatives of the memory variables (their unit per s)."""
         return ()
 
-    def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
+    def steady_memory(self, v: Expression, sigma: Expression) -> Expressions:
         """Memory variables in steady sliding at velocity `v` > 0 and normal stress `sigma` > 0."""
         return ()
 
@@ -61,7 +61,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         return 0
 
     def late_strength(
-        self, v: Expression, late: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+        self, v: Expression, late: Expression, sigma: Expression, memory: Expressions, tau: Expression
     ) -> Expression:
         """Friction stress (Pa) of a law with a delay; `late` is the velocity (m/s) a time `lateness` ago."""
         return self.strength(v, sigma, memory, tau)
@@ -100,7 +100,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         yield from ()
 
     def observables(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+        self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression
     ) -> dict[str, tuple[Expression, str]]:
         """States in the literature's form as functions of the memory variables: name to (expression, SI unit)."""
         return {
@@ -110,3 +110,19 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     def meanings(self) -> dict[str, str]:
         """Short explanations of `observables`, by name, for readers who do not know the law; may be incomplete."""
         return {}
+
+
+class State(FrozenRecord):
+    """One of several states of a rate-and-state law."""
+
+    b: float = parameter(
+        "1", real, "evolution effect of this state", kind="evolution effect", size=0.01, standing=0.01, idle=0.0
+    )
+    d_c: float = parameter("m", positive, "slip distance of this state", kind="slip distance", standing=1e-5)
+    alpha: float | None = parameter(
+        "1", nonnegative, "this state's part of α", default=None, kind="stress share", size=0.2, idle=0.0
+    )
+    b_cutoff_velocity: float | None = parameter(
+        "m/s", positive, "velocity above which this state's effect fades; infinite unless given", default=None,
+        letter="v_b",
+    )  # fmt: skip

@@ -10,8 +10,7 @@ from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import nonnegative, positive, share
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.laws.friction.law import Expression
-from steadyslip.laws.friction.state import State
+from steadyslip.laws.friction.law import Expression, Expressions, State
 
 
 class NormalMemory(FrozenRecord, family="memory of normal stress"):
@@ -37,20 +36,18 @@ class NormalMemory(FrozenRecord, family="memory of normal stress"):
         """Short explanations of the additional memory variables, by name; may be incomplete."""
         return {}
 
-    def strength(self, sigma: Expression, own: tuple[Expression, ...]) -> Expression:
+    def strength(self, sigma: Expression, own: Expressions) -> Expression:
         """Stress (Pa) that friction is proportional to, from σ and the additional memory variables."""
         return sigma
 
-    def rates(
-        self, speed: Expression, sigma: Expression, own: tuple[Expression, ...], distance: Expression
-    ) -> tuple[Expression, ...]:
+    def rates(self, speed: Expression, sigma: Expression, own: Expressions, distance: Expression) -> Expressions:
         """Time derivatives of the additional memory variables at slip rate `speed` >= 0 (m/s).
 
         `distance` is the slip distance d_c (m) of the friction law, None if it has several.
         """
         return ()
 
-    def steady_memory(self, sigma: Expression) -> tuple[Expression, ...]:
+    def steady_memory(self, sigma: Expression) -> Expressions:
         """Additional memory variables in steady sliding."""
         return ()
 
@@ -68,7 +65,7 @@ class NormalMemory(FrozenRecord, family="memory of normal stress"):
         """Difference Ψ − bΘ of memory variable and state, as a function of σ (Pa)."""
         return sp.Integer(0)
 
-    def parts(self, states: Sequence[State]) -> tuple[Expression, ...]:
+    def parts(self, states: Sequence[State]) -> Expressions:
         """Shares of `offset` for each of several states: proportional to their b by default."""
         total = sum(state.b for state in states)
         return tuple(state.b / total for state in states)
@@ -114,7 +111,7 @@ class LinkerDieterich(NormalMemory, name="linker-dieterich"):
         alpha = 1 if self.alpha is None else self.alpha  # None: `parts` are the states' own alpha
         return alpha * sp.log(sigma / self.sigma_ref)
 
-    def parts(self, states: Sequence[State]) -> tuple[Expression, ...]:
+    def parts(self, states: Sequence[State]) -> Expressions:
         return tuple(state.alpha for state in states) if self.alpha is None else super().parts(states)
 
     def problems(self, states: Sequence[State]) -> Iterator[Problem]:
@@ -155,16 +152,14 @@ class PrakashClifton(NormalMemory, name="prakash-clifton"):
     def meanings(self) -> dict[str, str]:
         return {"sigma_e": "normal stress that friction remembers"}
 
-    def strength(self, sigma: Expression, own: tuple[Expression, ...]) -> Expression:
+    def strength(self, sigma: Expression, own: Expressions) -> Expression:
         return self.direct_share * sigma + (1 - self.direct_share) * own[0]
 
-    def rates(
-        self, speed: Expression, sigma: Expression, own: tuple[Expression, ...], distance: Expression
-    ) -> tuple[Expression, ...]:
+    def rates(self, speed: Expression, sigma: Expression, own: Expressions, distance: Expression) -> Expressions:
         lag = distance if self.slip_distance is None else self.slip_distance
         return (-speed / lag * (own[0] - sigma),)
 
-    def steady_memory(self, sigma: Expression) -> tuple[Expression, ...]:
+    def steady_memory(self, sigma: Expression) -> Expressions:
         return (sigma,)
 
     def steady_strength(self, sigma: Expression) -> Expression:

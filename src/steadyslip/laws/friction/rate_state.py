@@ -16,9 +16,8 @@ from steadyslip.core.errors import InternalError, Problem
 from steadyslip.core.expressions import asinh_exp
 from steadyslip.core.records import option, parameter, part, parts, stand_in
 from steadyslip.laws.friction.evolution import Evolution, Slip
-from steadyslip.laws.friction.law import Expression, FrictionLaw
+from steadyslip.laws.friction.law import Expression, Expressions, FrictionLaw, State
 from steadyslip.laws.friction.normal_memory import NoMemory, NormalMemory
-from steadyslip.laws.friction.state import State
 
 
 class RateState(FrictionLaw, name="rate-state"):
@@ -164,7 +163,7 @@ class RateState(FrictionLaw, name="rate-state"):
         for number, ((b, _), cutoff) in enumerate(zip(self._all_states(), self._state_cutoffs(), strict=True), start=1):
             yield (f"states.{number}.b" if self.states else "b"), b, cutoff
 
-    def _state_cutoffs(self) -> tuple[Expression, ...]:
+    def _state_cutoffs(self) -> Expressions:
         """Cut-off velocity v_b of every state, None if not given."""
         return tuple(s.b_cutoff_velocity for s in self.states) if self.states else (self.b_cutoff_velocity,)
 
@@ -185,25 +184,25 @@ class RateState(FrictionLaw, name="rate-state"):
         """True if the memory variables are Ψ = bΘ + offset, which is also valid for b = 0, rather than Θ."""
         return self.normal_memory.has_offset() or self.evolution.has_offset()
 
-    def _offsets(self, sigma: Expression, tau: Expression) -> tuple[Expression, ...]:
+    def _offsets(self, sigma: Expression, tau: Expression) -> Expressions:
         """Offsets Ψ_i − b_iΘ_i of all states, by which the memory variables stay continuous when stresses jump."""
         whole = self.normal_memory.offset(sigma)
         if not self.states:
             return (whole + self.evolution.offset(sigma, tau),)
         return tuple(part * whole for part in self.normal_memory.parts(self.states))
 
-    def _stress_memory(self, memory: tuple[Expression, ...]) -> tuple[Expression, ...]:
+    def _stress_memory(self, memory: Expressions) -> Expressions:
         """Memory variables of the memory of normal stress, which are the last ones."""
         return memory[len(self._all_states()) :]
 
-    def _b_theta(self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> tuple[Expression, ...]:
+    def _b_theta(self, sigma: Expression, memory: Expressions, tau: Expression) -> Expressions:
         """Products b_iΘ_i of all states, from the memory variables."""
         states = self._all_states()
         if not self._has_offset():
             return tuple(b * theta for (b, _), theta in zip(states, memory, strict=False))
         return tuple(psi - off for psi, off in zip(memory, self._offsets(sigma, tau), strict=False))
 
-    def _effects(self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Iterator[Expression]:
+    def _effects(self, sigma: Expression, memory: Expressions, tau: Expression) -> Iterator[Expression]:
         """Yield the contribution of every state to the coefficient: b_iΘ_i, less with a cut-off velocity."""
         states = zip(self._all_states(), self._state_cutoffs(), strict=True)
         for ((b, _), cutoff), b_theta, stored in zip(
@@ -232,13 +231,11 @@ class RateState(FrictionLaw, name="rate-state"):
     def memory_units(self) -> tuple[str, ...]:
         return ("1",) * len(self._all_states()) + self.normal_memory.memory_units()
 
-    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
         coefficient = self._coefficient(v, sum(self._effects(sigma, memory, tau)))
         return self.normal_memory.strength(sigma, self._stress_memory(memory)) * coefficient
 
-    def rates(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> tuple[Expression, ...]:
+    def rates(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expressions:
         speed = self._slip_rate(v)
         rates: list[Expression] = []
         for (b, d_c), b_theta, stored in zip(
@@ -250,7 +247,7 @@ class RateState(FrictionLaw, name="rate-state"):
                 rates.append(self.evolution.rate(speed, stored, d_c, self.v_ref))
         return (*rates, *self.normal_memory.rates(speed, sigma, self._stress_memory(memory), self.d_c))
 
-    def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
+    def steady_memory(self, v: Expression, sigma: Expression) -> Expressions:
         theta = -sp.log(v / self.v_ref)
         states = self._all_states()
         if self._has_offset():
@@ -274,7 +271,7 @@ class RateState(FrictionLaw, name="rate-state"):
         )
 
     def observables(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+        self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression
     ) -> dict[str, tuple[Expression, str]]:
         """Θ (dimensionless) and θ (s) of every state, and the variables of the memory of normal stress."""
         found: dict[str, tuple[Expression, str]] = {}

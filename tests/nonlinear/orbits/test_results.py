@@ -12,7 +12,8 @@ from rigs_of_theory import rate_state
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits import tracer as tracer_module
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
-from steadyslip.nonlinear.orbits.tracer import ENDS, Tracer
+from steadyslip.nonlinear.orbits.ends import ENDS, Ends
+from steadyslip.nonlinear.orbits.tracer import Tracer
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
@@ -47,11 +48,11 @@ def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
     def stop(*_arguments):
         raise KeyboardInterrupt
 
-    def broken(self, before, now, first, twice):
+    def broken(self, limits, before, now, first, twice):
         return (ENDS["growth"], True) if now.cycle.amplitude > 0.1 else ("", True)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Tracer, "_finished", broken)
+        patched.setattr(Ends, "finished", broken)
         patched.setattr(sys.modules["steadyslip.nonlinear.orbits.search"], "cycle_near", stop)
         partial = ss.cycles(damped.rig, between=between)
     assert (len(partial) > 3, partial.end, partial.gaps) == (True, "interrupted by the user", ())

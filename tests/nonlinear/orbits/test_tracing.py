@@ -14,11 +14,12 @@ from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.kicks.spans import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_module
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
+from steadyslip.nonlinear.orbits.ends import STANDING, retraces, stands, winds
 from steadyslip.nonlinear.orbits.flow import Flow, Runs
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.shooting import Shooting
 from steadyslip.nonlinear.orbits.special import Known, changes
-from steadyslip.nonlinear.orbits.tracer import STANDING, Tracer, _retraces, _stands, _winds
+from steadyslip.nonlinear.orbits.tracer import Tracer
 from steadyslip.nonlinear.orbits.verify import cycle_near
 
 
@@ -54,10 +55,10 @@ def test_windings_that_close_in_on_a_value_are_an_end(damped):
         ]
 
     closing = 1.0 + (-0.5) ** np.arange(8.0)
-    assert _winds(folds(closing, np.arange(1.0, 9.0)))
-    assert not _winds(folds(closing, np.ones(8)))
-    assert not _winds(folds(closing[:4], np.arange(1.0, 5.0)))
-    assert not _winds(folds(1.0 + 0.1 * (-1.0) ** np.arange(8.0), np.arange(1.0, 9.0)))
+    assert winds(folds(closing, np.arange(1.0, 9.0)))
+    assert not winds(folds(closing, np.ones(8)))
+    assert not winds(folds(closing[:4], np.arange(1.0, 5.0)))
+    assert not winds(folds(1.0 + 0.1 * (-1.0) ** np.arange(8.0), np.arange(1.0, 9.0)))
 
 
 def test_parameter_that_stands_still_is_an_end(damped):
@@ -67,10 +68,10 @@ def test_parameter_that_stands_still_is_an_end(damped):
         return [replace(base, value=v, period=p) for v, p in zip(values, periods, strict=True)]
 
     rounding = 1.0 + 1e-12 * (-1.0) ** np.arange(STANDING)
-    assert _stands(along(rounding, np.geomspace(1.0, 1.04, STANDING)))
-    assert not _stands(along(rounding, np.geomspace(1.0, 1.2, STANDING)))  # a canard that goes on
-    assert not _stands(along(1.0 + 1e-9 * np.arange(STANDING), np.ones(STANDING)))
-    assert not _stands(along(rounding[1:], np.ones(STANDING - 1)))
+    assert stands(along(rounding, np.geomspace(1.0, 1.04, STANDING)))
+    assert not stands(along(rounding, np.geomspace(1.0, 1.2, STANDING)))  # a canard that goes on
+    assert not stands(along(1.0 + 1e-9 * np.arange(STANDING), np.ones(STANDING)))
+    assert not stands(along(rounding[1:], np.ones(STANDING - 1)))
 
 
 def test_a_way_back_passes_the_amplitudes_of_the_way_there(damped):
@@ -83,12 +84,12 @@ def test_a_way_back_passes_the_amplitudes_of_the_way_there(damped):
 
     rounding = np.array([-2500, -660, -86, 340, -370, -240, 34, 42, -5.6, -10.5, -8.6, 3]) * 1e-12
     upright = [of(1 + off, 5e-7 * 2**i) for i, off in enumerate(rounding)]
-    assert not _retraces(upright)
+    assert not retraces(upright)
     sizes = [*np.linspace(0.1, 1, 19), *np.linspace(0.975, 0.5, 19)]
     back = [of(1 - 0.1 * size, size) for size in sizes]
-    assert [_retraces(back[:19]), _retraces(back)] == [False, True]
+    assert [retraces(back[:19]), retraces(back)] == [False, True]
     stopping = [replace(cycle, amplitude=np.inf) for cycle in back]
-    assert [_retraces(stopping[:19]), _retraces(stopping)] == [False, True]
+    assert [retraces(stopping[:19]), retraces(stopping)] == [False, True]
 
 
 def test_multipliers_are_not_read_where_the_parameter_stands_still(damped):

@@ -8,9 +8,10 @@ import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
+from steadyslip.nonlinear.orbits.ends import ENDS
 from steadyslip.nonlinear.orbits.search import cut_back, met
 from steadyslip.nonlinear.orbits.special import MET, looks
-from steadyslip.nonlinear.orbits.tracer import ENDS, Sheet, Tracer
+from steadyslip.nonlinear.orbits.tracer import Sheet, Tracer
 
 SIZES = (1e-3, 1e-2, 1e-4, 1e-1)  # of the first cycle's distance from the doubling, in unknowns, one after another
 

@@ -1,66 +1,36 @@
-"""Following one sheet of cycles: a curve of solutions from a first one to where it ends, and why it ends there."""
+"""Following one sheet of cycles: a curve of solutions from a first one to where it ends."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.core.format import format_quantity
-from steadyslip.linear.boundary import boundary
-from steadyslip.machine.machine import Machine
-from steadyslip.machine.slider import Slider
+from steadyslip.core.errors import InternalError
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
+from steadyslip.nonlinear.orbits.ends import ENDS, RETRACED, SHRUNK, STANDING, Ends, retraces, stands, winds
 from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
-from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, Known, changes, lies_between, may_return
+from steadyslip.nonlinear.orbits.special import SMALL, Known, changes, may_return
 
 Array = np.ndarray
 LARGEST_STEP = 0.5
 HALVINGS = 3  # of a step in which something may change twice: to an eighth, a sixteenth of a natural size
 SMALLEST_STEP = 1e-9
-WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
 CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
 SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # so many steps below this share of the largest, and not growing, are slow
 OF_RANGE = 3.0  # in what a state variable goes through: its measure then
-STANDING = 12  # so many cycles within a twentieth of each other, at one value but for rounding, are no progress
-RETRACED = 4  # so many cycles in a row between neighbours that are known are the way back
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
-TOO_UNSTABLE = 1e8
 MOST_STEPS = 4_000_000  # of integration for all sheets of a branch: some seconds
 LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
 HIDDEN = 0.1  # share of a small cycle's distance from the edge that rounding may be
-SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
-LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
 INTERRUPTED = "interrupted by the user"
-ENDS = {
-    "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the {block} a mass or {damping} to "
-    "follow the cycles further",
-    "unbounded": "blow-up: the peak velocity grows without bound as the cycle nears the motions of the massless model "
-    "that reach infinite velocity; give the {block} a mass or {damping} to follow the cycles further",
-    "growth": "the cycle is too unstable to matter: deviations grow 1e8-fold in each period",
-    "contact lost": "contact lost: the normal {force} falls to zero in the cycle",
-    "stuck": "the equations have no solution in part of the cycle",
-    "too many steps": "the integration needs ever smaller steps, as it does where the cycle comes close to states at "
-    "which no velocity balances the forces; mass or damping helps",
-    "no velocity": "the equations have no solution in part of the cycle",
-    "precision": "precision is lost; a smaller rtol may lead further",
-    "steady": "back at steady sliding, at another edge of stability",
-    "doubling": "back at a period doubling, where it joins the branch of half the period",
-    "winds": "folds close in on one value of the parameter while the period grows (a connection of a steady state with "
-    "itself, through ever longer spirals)",
-    "stands": "the parameter stands still in its last digits while the cycles hardly change, as in a canard",
-    "retraces": "rounding turns it back onto itself",
-    "runs away": "the period runs away while the parameter stands still (a connection to another steady state)",
-}
 
 
 @dataclass(eq=False)
@@ -126,6 +96,7 @@ class Tracer:
         progress: Callable[[int, Cycle], None] | None = None,
     ) -> None:  # fmt: skip
         self.flow, self.onset, self.limits, self.most, self.progress = flow, onset, limits, most, progress
+        self.ends = Ends(flow, onset)
         self.logarithmic = flow.domain.low == 0 and onset.value > 0
         self.unit_of_value = abs(onset.value) or 1.0
         self.count, self.interrupted = 0, False
@@ -262,9 +233,9 @@ class Tracer:
                 if met is not None and met(here):
                     sheet.end, sheet.whole, sheet.beyond = "", True, here
                     return sheet
-                sheet.end, keep = self._finished(before, here, sheet.known[0], twice)
+                sheet.end, keep = self.ends.finished(self.limits, before, here, sheet.known[0], twice)
                 if sheet.end == ENDS["steady"]:
-                    sheet.stops = self._other_edge([known.cycle for known in sheet.known[-2:]])
+                    sheet.stops = self.ends.other_edge([known.cycle for known in sheet.known[-2:]])
                 if sheet.end.startswith("end of the range"):
                     here = self._at_limit(before, here)
                     sheet.stops = End("range", here.cycle.value, here.cycle)
@@ -273,13 +244,13 @@ class Tracer:
                     self._add(sheet, here)
                 else:
                     sheet.beyond = here
-                if not sheet.end and _winds(sheet.special):
+                if not sheet.end and winds(sheet.special):
                     sheet.end = ENDS["winds"]
-                if not sheet.end and _retraces([known.cycle for known in sheet.known]):
+                if not sheet.end and retraces([known.cycle for known in sheet.known]):
                     sheet.end = ENDS["retraces"]
                     del sheet.known[-RETRACED:]
                     sheet.special = [one for one in sheet.special if one.index <= len(sheet.known)]
-                if not sheet.end and _stands([known.cycle for known in sheet.known[-STANDING:]]):
+                if not sheet.end and stands([known.cycle for known in sheet.known[-STANDING:]]):
                     sheet.end = ENDS["stands"]
                 if sheet.end:
                     break
@@ -296,7 +267,7 @@ class Tracer:
         except KeyboardInterrupt:
             sheet.end, sheet.whole, self.interrupted = INTERRUPTED, True, True
         except FlowFailure as failure:
-            sheet.end = self._ended(failure.status, failure.contact) or f"broke off: {failure}"
+            sheet.end = self.ends.words(failure.status, failure.contact) or f"broke off: {failure}"
             sheet.whole, sheet.contact = failure.status == "contact lost", failure.contact
         except (Failure, np.linalg.LinAlgError) as failure:
             sheet.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
@@ -361,7 +332,7 @@ class Tracer:
 
             def accept(point: Point, shooting: Shooting = here.shooting, made: dict[int, Known] = made) -> None:
                 made[0] = self.known(shooting, point)
-                if made[0].cycle.amplitude > SHRUNK and self._slows(made[0]):
+                if made[0].cycle.amplitude > SHRUNK and self.ends.slows(made[0]):
                     raise Failure("the cycle begins where slip slows down")
 
             finer = None
@@ -471,76 +442,6 @@ class Tracer:
             return self.onset.kind == "supercritical"
         return cycle.growth < 1
 
-    # -- where it ends
-
-    def _finished(self, before: Known, now: Known, first: Known, twice: bool) -> tuple[str, bool]:
-        """Why a sheet ends at this cycle, or nothing; and whether the cycle is still one of it."""
-        low, high = self.limits
-        cycle = now.cycle
-        if not low < cycle.value < high:
-            end = format_quantity(
-                low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area_of(self.onset.along)
-            )
-            return f"end of the range, {end}", True
-        if cycle.amplitude < SHRUNK and self._slows(now):
-            return ENDS["steady"], False
-        if twice and before.half @ now.half < -0.5 * np.linalg.norm(before.half) * np.linalg.norm(now.half):
-            return ENDS["doubling"], False
-        setting = self.flow.setting(cycle.value)
-        fast = cycle.peak_velocity > LARGE * setting.speed
-        bounded = self.flow.reduction.model.inertial or is_damped(self.flow.rig)
-        if abs(cycle.trivial - 1) > IMPRECISE and cycle.amplitude > SMALL:
-            return self._ended("unbounded" if fast and not bounded else "precision"), True
-        if cycle.growth > TOO_UNSTABLE:
-            return ENDS["growth"], True
-        if self.onset.is_weak and fast and not bounded:
-            return self._ended("unbounded"), True
-        longer = np.log(cycle.period / before.cycle.period)
-        further = abs(cycle.value - before.cycle.value) / (abs(before.cycle.value) or 1.0)
-        if cycle.period > 1e3 * first.cycle.period and longer > 1e3 * further:
-            return ENDS["runs away"], True
-        return "", True
-
-    def _ended(self, status: str, contact: str = "") -> str:
-        """An end in words, where there are any for it; of a machine with the name of the contact."""
-        if status not in ENDS:
-            return ""
-        machine = isinstance(self.flow.rig, Machine)
-        words = {"force": "force", "block": "body", "damping": "a dashpot to the ground"} if machine else {
-            "force": "stress", "block": "slider", "damping": "radiation_damping"}  # fmt: skip
-        head, colon, reason = ENDS[status].format(**words).partition(": ")
-        return f"{head} at {contact}{colon}{reason}" if contact else head + colon + reason
-
-    def _slows(self, now: Known) -> bool:
-        """Whether the block no longer speeds up where the cycle starts: beyond one that has shrunk to nothing.
-
-        With mass rounding in the state is most of the acceleration; what is carried round once is true.
-        """
-        orbit = now.shooting.orbit(now.point.u)
-        setting = self.flow.setting(orbit.value)
-        rates, jacobian, _ = self.flow.field(setting, orbit.states)
-        carried = rates[0]
-        for sensitivity in now.shooting.sensitivities(now.point.u):
-            carried = sensitivity @ (carried / self.flow.scales) * self.flow.scales
-        faster = setting.slip @ jacobian[0]
-        return bool(faster @ rates[0] <= 0 and faster @ carried <= 0)
-
-    def _other_edge(self, last: list[Cycle]) -> End | None:
-        """The edge at which cycles that shrink to nothing end: that to which values of the last two lead."""
-        if len(last) < 2:
-            return None
-        sizes = [cycle.amplitude**2 for cycle in last]
-        slope = (last[1].value - last[0].value) / (sizes[0] - sizes[1])
-        ahead = last[1].value + slope * sizes[1]
-        try:
-            edges = boundary(self.onset.rig, self.onset.along, branch=self.flow.branch)
-        except NotAvailable:
-            return None
-        near = [edge.value for edge in edges if edge.kind == "oscillatory"]
-        edge = min(near, key=lambda value: abs(value - ahead), default=np.inf)
-        reach = abs(ahead - last[1].value) + abs(last[1].value - last[0].value)
-        return End("edge", edge) if abs(edge - ahead) <= reach else None
-
     def _at_limit(self, inside: Known, outside: Known) -> Known:
         """The cycle on the limit of the range."""
         low, high = self.limits
@@ -579,47 +480,3 @@ def orbit_of(cycle: Cycle) -> Orbit:
     if cycle._orbit is None:
         raise InternalError("a cycle without its orbit; please report it")
     return cycle._orbit
-
-
-def is_damped(rig: Slider | Machine) -> bool:
-    """Whether something holds a light block back the more, the faster it is."""
-    if isinstance(rig, Slider):
-        return bool(rig.radiation_damping)
-    return any(bool(np.any(one.damping)) for one in rig.mechanism().elements)
-
-
-def _winds(special: list[SpecialCycle]) -> bool:
-    """Whether the last folds close in on one value while the period grows (Shilnikov)."""
-    folds = [point.cycle for point in special if point.kind == "fold"][-WINDINGS:]
-    if len(folds) < WINDINGS:
-        return False
-    apart = np.abs(np.diff([cycle.value for cycle in folds]))
-    return bool(np.all(apart[1:] < 0.8 * apart[:-1]) and np.all(np.diff([cycle.period for cycle in folds]) > 0))
-
-
-def _retraces(known: list[Cycle]) -> bool:
-    """Whether the last cycles lie between neighbours that were passed before, and are no larger or smaller than these.
-
-    Periods and velocities of small cycles are alike, and where a branch begins upright, as at a degenerate onset, their
-    values are rounding: amplitudes tell that it goes on.
-    """
-    last, passed = known[-RETRACED:], known[: -2 * RETRACED]
-    if len(passed) < 2 or (known[-1].value - known[-2].value) * (known[-2].value - known[-3].value) < 0:
-        return False
-    return all(any(lies_between(a, b, one) and _sized(a, b, one) for a, b in pairwise(passed)) for one in last)
-
-
-def _sized(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
-    """Whether the amplitude of a cycle is one of those between two neighbours."""
-    *ends, size = (float(np.log(min(one.amplitude, LARGE))) for one in (a, b, cycle))
-    spread = MET + 0.3 * (ends[1] - ends[0]) ** 2
-    return min(ends) - spread < size < max(ends) + spread
-
-
-def _stands(last: list[Cycle]) -> bool:
-    """Whether the parameter stands still but for rounding while cycles hardly change."""
-    if len(last) < STANDING:
-        return False
-    value = np.array([cycle.value for cycle in last])
-    looks = [(cycle.period, cycle.peak_velocity, min(cycle.amplitude, LARGE)) for cycle in last]
-    return bool(np.ptp(value) <= ROUNDING * np.abs(value).max() and np.ptp(np.log(looks), axis=0).max() < 0.05)

@@ -6,6 +6,7 @@ from hypothesis import given, strategies as st
 
 import steadyslip as ss
 from cutoff_rigs import ByHand, check_eigenvalues, check_motion
+from explored import Explored, compared
 from friction_laws import EVOLUTIONS, ONE, ROCK, ingredients, modest, rig_with, small, velocities
 
 FAST = 1e30  # m/s, beyond all velocities: the law without cut-offs
@@ -141,20 +142,101 @@ def test_refusals():
     assert law_with(b=0.0, b_cutoff_velocity=1e-3).b == 0
 
 
-def test_a_fit_tells_both_cutoffs():
-    """Steps from 1 to 3000 um/s: where both effects fade, the record says at which velocities."""
-    truth = law_with(v_ref=1e-6, a_cutoff_velocity=1e-3, b_cutoff_velocity=2e-4, d_c=1e-5)
-    rig = rig_of(truth, stiffness=2e10).with_values({"drive.velocity": 1e-6})
+FADING = {"a_cutoff_velocity": 1e-2, "b_cutoff_velocity": 1e-4}
+
+
+@pytest.mark.parametrize("evolution", EVOLUTIONS, ids=lambda one: one.name)
+def test_the_onset_of_creep_is_that_without_cutoffs(evolution):
+    """What cut-offs add to the cubic coefficient goes to zero with v/v_b, in units of v/d_c."""
+
+    def coefficient(v, **own):
+        return ss.hopf(rig_of(law_with(evolution=evolution, **own), drive=ss.Steady(v))).coefficient * 8e-6 / v
+
+    added = [(coefficient(v, **FADING) - coefficient(v)) * 1e-4 / v for v in (1e-30, 1e-20, 1e-12)]
+    if abs(coefficient(1e-30)) < 1e-9:  # without cut-offs neither kind: digits are left to see that it is linear
+        np.testing.assert_allclose(added, added[0], rtol=1e-6)
+    assert coefficient(1e-30, **FADING) == pytest.approx(coefficient(1e-30), rel=1e-9, abs=1e-20)
+
+
+@pytest.mark.parametrize("mass", [0.0, 500.0])
+def test_motion_of_creep_is_that_of_any_other_creep(mass):
+    """Far below the cut-offs only the drive's own velocity counts; at speeds where both have faded runs are finite."""
+    found = []
+    for v in (1e-30, 1e-20, 10.0):
+        own = rig_of(law_with(evolution=ss.Aging(), **FADING), stiffness=5.5e9, mass=mass, drive=ss.Steady(v))
+        times = np.linspace(0, 100e-6 / v, 50)
+        run = ss.simulate(own, ss.VelocityStep(at=8e-6 / v, to=1.2 * v), until=times[-1], times=times)
+        assert run.status == "done"
+        found.append(run["v"] / v)
+    assert np.all(np.isfinite(found))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-5)
+    assert np.ptp(found[0]) > 0.3
+
+
+def test_maps_are_finite_from_creep_to_slip(tmp_path):
+    over = {"drive.velocity": np.logspace(-30, 1, 9), "friction.b_cutoff_velocity": np.array([1e-30, 1e-9, 1e-4, 1.0])}
+    rig = rig_of(law_with(**FADING), mass=500)
+    found = ss.run_map(ss.Map(rig, over, compute=["status", "growth_rate", "critical_stiffness"]), tmp_path / "m.zarr")
+    v, v_b = np.meshgrid(*over.values(), indexing="ij")
+    weakens = 0.010 * v_b / (v_b + v) - 0.006 * 1e-2 / (1e-2 + v)
+    exact = 1e7 * weakens / 8e-6 * (1 + 500 * v**2 / (0.006 * 1e-2 / (1e-2 + v) * 1e7 * 8e-6))
+    data = found.dataset
+    critical = np.asarray(data["critical_stiffness"])
+    assert np.all(np.isfinite(np.asarray(data["growth_rate"])))
+    np.testing.assert_array_equal(np.isfinite(critical), weakens > 0)
+    np.testing.assert_allclose(critical[weakens > 0], exact[weakens > 0], rtol=1e-11)
+
+
+@pytest.mark.campaign
+def test_kicks_of_creep_that_just_run_away():
+    """Cut-offs end slip that runs away: the smallest kick that does reaches them from fifteen decades below."""
+    v = 1e-20
+    own = rig_of(law_with(evolution=ss.Aging(), **FADING), stiffness=6e9, drive=ss.Steady(v))
+    size = ss.threshold(own, "velocity").size
+    steps = [ss.VelocityStep(at=0.0, to=v * np.exp(share * size)) for share in (0.99, 1.01)]
+    ends = [ss.simulate(own, step, until=200 * 8e-6 / step.to).status for step in steps]
+    assert ends == ["done", "blow-up"]
+
+
+@pytest.mark.campaign
+def test_cycles_of_creep_are_those_of_any_other_creep():
+    periods = []
+    for v in (1e-30, 1e-20):
+        rig = rig_of(law_with(evolution=ss.Slip(), **FADING), stiffness=3e9, drive=ss.Steady(v))
+        branch = ss.cycles(rig, "stiffness", between=(2e9, 6e9))
+        assert np.all(np.isfinite(branch["period"]))
+        periods.append(branch["period"][:20] * v)
+    np.testing.assert_allclose(*periods, rtol=1e-3)
+
+
+@pytest.mark.parametrize("mass", [0.0, 500.0])
+def test_pages_from_creep_to_slip_are_those_of_python(mass):
+    kept = {"friction": law_with(evolution=ss.PRZ(), **FADING), "mass": mass}
+    explored = Explored(rig_of(law_with(evolution=ss.PRZ(), **FADING), mass=mass))
+    for v in (1e-30, 1e-12, 1e-5, 1e-3, 10.0):
+        for k in (1e9, 1e10):
+            own = ss.Slider(contact=ss.Constant(preload=1e7), stiffness=k, drive=ss.Steady(v), **kept)
+            apart = compared(explored, own)
+            assert apart.verdicts[0] == apart.verdicts[1]
+            assert max(apart.critical, apart.ends, apart.eigenvalues) < 1e-12
+
+
+@pytest.mark.parametrize("faster", [1.0, 1e-9, 1e3])
+def test_a_fit_tells_both_cutoffs(faster):
+    """Steps over 3000-fold rates: where both effects fade, the record says at which velocities; of creep, slip too."""
+    cutoffs = {"a_cutoff_velocity": 1e-3 * faster, "b_cutoff_velocity": 2e-4 * faster}
+    truth = law_with(v_ref=1e-6 * faster, d_c=1e-5, **cutoffs)
+    rig = rig_of(truth, stiffness=2e10).with_values({"drive.velocity": 1e-6 * faster})
     steps = [
-        ss.VelocityStep(at=20, to=1e-5), ss.VelocityStep(at=40, to=1e-4), ss.VelocityStep(at=44, to=1e-3),
-        ss.VelocityStep(at=44.5, to=3e-3),
-    ]  # fmt: skip
+        ss.VelocityStep(at=at / faster, to=to * faster) for at, to in ((20, 1e-5), (40, 1e-4), (44, 1e-3), (44.5, 3e-3))
+    ]
     times = np.concatenate([np.linspace(0, 40, 400), 40 + np.linspace(0.01, 4, 400), 44 + np.linspace(0.001, 0.7, 400)])
+    times = times / faster
     run = ss.simulate(rig, steps, until=times[-1], times=times)
     noise = np.random.default_rng(1).normal(scale=1e-4, size=len(times))
     record = ss.record_from_arrays(time=times, friction=run["friction"] + noise, source="synthetic")
-    start = rig.with_values({"a_cutoff_velocity": 4e-3, "b_cutoff_velocity": 5e-4})
-    fit = ss.fit(start, record, protocol=steps, free=["friction.a_cutoff_velocity", "friction.b_cutoff_velocity"])
-    for name, value in (("a_cutoff_velocity", 1e-3), ("b_cutoff_velocity", 2e-4)):
+    start = rig.with_values({name: value * 3 for name, value in cutoffs.items()})
+    fit = ss.fit(start, record, protocol=steps, free=[f"friction.{name}" for name in cutoffs])
+    for name, value in cutoffs.items():
         assert abs(fit[name].value - value) < 4 * fit[name].error
         assert fit[name].error < 0.1 * value

@@ -286,7 +286,7 @@ def role_of(item: Field[Any]) -> Declared:
 
 
 def stand_in(law: type[R]) -> R | None:
-    """A record with the values that its parameters declare as `standing`; None if others have no default either."""
+    """Record made of the `standing` values of its parameters; None if another required field has neither."""
     standing = {item.name: getattr(role_of(item), "standing", None) for item in fields(law)}  # type: ignore[arg-type]
     own = {name: value for name, value in standing.items() if value is not None}
     lacking = [item for item in fields(law) if is_required(item) and item.name not in own]  # type: ignore[arg-type]

@@ -34,9 +34,9 @@ from steadyslip.model.steady import out_of_range
 ORDINARY = 1e20
 """Largest size of ordinary numbers, whose inverse is the smallest: products of a dozen stay below 1e308."""
 _LEAST = -700.0
-"""Exponent below which exp underflows, or loses digits."""
+"""Exponent below which exp underflows or loses digits (the smallest normal float is exp(−708))."""
 _REPLACEMENT = -100.0
-"""Exponent in place of smaller ones when testing whether they matter: products of seven do not underflow."""
+"""Replacement of smaller exponents in the test of their influence; products of seven exp(−100) do not underflow."""
 _REDUCED_DECADES = (0.75, 0.5, 0.25, 0.0)
 """Factors on the decimal exponent of a parameter by which its influence on the range is tested; chosen by trial."""
 
@@ -117,7 +117,7 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def _underflows(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the characteristic polynomial loses its highest coefficients only by underflow of exponentials."""
+    """True where the highest coefficients of the characteristic polynomial vanish only by underflow, shape of point."""
     small = np.zeros(point.shape, dtype=bool)
     for one in point.evaluate(_exponents(point.model)):
         small = small | (np.asarray(one) < _LEAST)
@@ -131,7 +131,7 @@ def _underflows(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def _exponentials(model: Model) -> list[sp.Expr]:
-    """Exponentials in the coefficients of the characteristic polynomial; none where these are not written out."""
+    """Exponentials in the symbolic coefficients of the characteristic polynomial; empty if there are none."""
     if model.delays or not is_written_out(model):
         return []
     return [node for node in occurrences(characteristic_coefficients(model)) if isinstance(node, sp.exp)]
@@ -144,7 +144,7 @@ def _exponents(model: Model) -> ArrayFunction:
 
 @question
 def _replaced_function(model: Model) -> ArrayFunction:
-    """Coefficients with the exponents of underflowing exponentials replaced."""
+    """Array function of the coefficients with exponents of exponentials bounded below by `_REPLACEMENT`."""
     least = {node: sp.exp(sp.Max(node.args[0], _REPLACEMENT)) for node in _exponentials(model)}
     return model.function([sp.sympify(e).xreplace(least) for e in characteristic_coefficients(model)])
 

@@ -79,16 +79,16 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         return self
 
     def alternatives(self) -> Mapping[str, Callable[[Any], FrictionLaw]]:
-        """What makes another law of the same kind of one, by word, in the order in which words are obeyed.
+        """Functions that turn a law into an alternative of the same kind, by word, in the order of application.
 
-        Labels are made of words: `aging, two states`. `compared` are the labels that records are compared with unless
-        others are asked for; `decided_by_stress` has, by field, words of which records choose one where their normal
-        stress changes.
+        Labels of laws are lists of such words: `aging, two states`. The class attribute `compared` lists the labels
+        that are fitted by default; `decided_by_stress` has, by field, the words among which records with changing
+        normal stress decide.
         """
         return {}
 
     def forgets_stress(self) -> bool:
-        """Whether it has no memory of normal stress, though others of its kind have."""
+        """True if the law has no memory of normal stress although others of its kind have."""
         return False
 
     def runs_away(self) -> bool:

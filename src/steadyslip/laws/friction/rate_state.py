@@ -110,7 +110,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return self
 
     def alternatives(self) -> Mapping[str, Callable[[RateState], RateState]]:
-        """Every evolution law without parameters of its own, with one state; two states; every memory."""
+        """Alternatives: each evolution law without parameters (one state), two states, each memory of normal stress."""
         found: dict[str, Callable[[RateState], RateState]] = {}
         for name, law in Evolution.registry.items():
             if issubclass(law, Evolution) and not fields(law):
@@ -122,7 +122,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return found
 
     def _one_state(self) -> tuple[float, float]:
-        """b and d_c of the one state, or the first."""
+        """Values of b and d_c of the only or the first state."""
         b, d_c = (self.states[0].b, self.states[0].d_c) if self.states else (self.b, self.d_c)
         if b is None or d_c is None:
             raise InternalError("b and d_c, or states, to be given")
@@ -144,7 +144,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return replace(self, states=states, normal_memory=memory)
 
     def forgets_stress(self) -> bool:
-        """If its memory is `NoMemory`."""
+        """True if the memory of normal stress is `NoMemory`."""
         return isinstance(self.normal_memory, NoMemory)
 
     # parts of the law, valid for numbers and symbols

@@ -117,6 +117,7 @@ def _segment_program(name: str, piece: Callable[[float, float, float], Any] | No
 
 
 def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str, Any]:
+    """Data that `web/motion.js` needs to run a kernel: names, sizes and indices of its arrays."""
     model, layout = reduction.model, kernel.layout
     further, begin = guess_count(layout) - 1, Setting.ATOL + layout.size
     guesses = [int(Setting.GUESS), *range(begin, begin + further)]
@@ -149,7 +150,7 @@ def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str,
 
 
 def _bodies(reduction: Reduction) -> list[list[Any]]:
-    """Of every coordinate its name, the unit of its displacement, and where this and its velocity are observed."""
+    """Name, unit of displacement, and indices of displacement and velocity in the outputs, for every coordinate."""
     first = Out.W_SLOPE * len(reduction.slidings)
     places = {name: first + len(reduction.continuous) + i for i, name in enumerate(reduction.further)}
     kept = {symbol: first + i for i, symbol in enumerate(reduction.continuous)}

@@ -174,7 +174,7 @@ def _scale_values(
 
 
 def _all_eigenvalues_positive(entries: list[Node]) -> Any:
-    """Whether all eigenvalues of a matrix are positive."""
+    """Node that is true if all eigenvalues of a matrix, given by rows, have positive real parts."""
     size = round(len(entries) ** 0.5)
     less: list[list[Value | None]] = [
         [None if _is_zero(e) else -e for e in entries[size * i : size * (i + 1)]] for i in range(size)

@@ -20,7 +20,7 @@ BLOCK_LENGTH, TOP_Y = 80.0, 86.0  # length of the block, height of its top
 SPRING_Y = 108.0  # height at which the spring holds it
 SPRING_LENGTH = 130.0  # of the spring
 MAX_SPRING_ANGLE, MAX_SURFACE_ANGLE = 33.0, 7.0  # degrees that a spring and a surface are drawn at most
-_SPRING_TURNS = 7
+_SPRING_TURNS = 7  # of a spring as it is drawn
 
 
 def sketch(rig: Slider) -> str:
@@ -39,7 +39,7 @@ def sketch(rig: Slider) -> str:
     shape = rig.contact.shape()
     tilt = max(-MAX_SURFACE_ANGLE, min(MAX_SURFACE_ANGLE, math.degrees(shape.tilt)))
     extra = "".join(_EXTRAS[one](rig) for one in (shape.between, shape.part) if one)
-    inside = _ground() + _surface() + extra + _block(rig) + _links(rig) + _load(rig)
+    inside = _ground() + extra + _block(rig) + _links(rig) + _load(rig)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="sketch" viewBox="0 0 {WIDTH} {HEIGHT}" data-period="{PERIOD}" '
         'role="img" aria-label="sketch of the mechanism" fill="none" stroke="currentColor" stroke-width="1.6" '
@@ -71,11 +71,8 @@ def _ground() -> str:
     marks = "".join(_path((x, GROUND_Y), (x - 8, GROUND_Y + 11)) for x in range(0, WIDTH + 30, int(PERIOD)))
     # an <svg> of its own cuts off what is outside it; a clip path would need a name that is unique in the document
     place = f'x="10" y="{GROUND_Y}" width="{WIDTH - 20}" height="12" viewBox="10 {GROUND_Y} {WIDTH - 20} 12"'
-    return f'<svg {place} stroke-width="1"><g class="ground">{marks}</g></svg>'
-
-
-def _surface() -> str:
-    return _path((10, GROUND_Y), (WIDTH - 10, GROUND_Y))
+    surface = _path((10, GROUND_Y), (WIDTH - 10, GROUND_Y))
+    return f'<svg {place} stroke-width="1"><g class="ground">{marks}</g></svg>{surface}'
 
 
 def _gap(rig: Slider) -> float:

@@ -13,7 +13,7 @@ from matplotlib.path import Path
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures import regions
 from steadyslip.figures.axis import ChartAxis, chart_axis
-from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, add_legend_above, axes_or_new
+from steadyslip.figures.style import BLACK, GREY, ORANGE, OWN_RIG, SKY, add_legend_above, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -74,7 +74,8 @@ def stability_chart(
     def draw(code: int, label: str, **style: Any) -> bool:
         path = regions.region_path(lambda a, b: status(a, b) == code, points)
         if len(path):
-            ax.add_patch(PathPatch(_display_path(path, first, second), label=label, linewidth=0, **style))
+            path = Path(np.column_stack(_display_points(path.vertices, first, second)), path.codes)
+            ax.add_patch(PathPatch(path, label=label, linewidth=0, **style))
         return len(path) > 0
 
     draw(STABLE, "stable", facecolor=SKY, alpha=0.55)
@@ -109,10 +110,6 @@ def absence_reasons(rig: Slider | Machine, points: Sequence[dict[str, float]]) -
     return ", ".join(sorted(set(found)))
 
 
-def _display_path(path: Path, x: ChartAxis, y: ChartAxis) -> Path:
-    return Path(np.column_stack(_display_points(path.vertices, x, y)), path.codes)
-
-
 def _display_points(shares: Any, x: ChartAxis, y: ChartAxis) -> tuple[Any, Any]:
     return x.shown(x.at(shares[:, 0])), y.shown(y.at(shares[:, 1]))
 
@@ -121,16 +118,7 @@ def _mark_own(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis) -> None:
     own = [rig.value(x.name), rig.value(y.name)]
     if all(v is not None and a.low <= v <= a.high for v, a in zip(own, (x, y), strict=True)):
         at = [x.shown(own[0])], [y.shown(own[1])]
-        ax.plot(
-            *at,
-            "o",
-            color=VERMILION,
-            markeredgecolor=BLACK,
-            markersize=9,
-            label="this rig",
-            linestyle="none",
-            clip_on=False,
-        )
+        ax.plot(*at, "o", **OWN_RIG)
 
 
 def _set_axes(ax: Axes, x: ChartAxis, y: ChartAxis) -> None:

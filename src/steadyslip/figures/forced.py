@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 _MARKERS = ("o", "s", "^", "D", "v")
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE)
-BESIDE = 0.2  # of a resonance's period to each side: lines are drawn through more points there, closest at its peak
-HALF_TURN = 180.0  # a phase that jumps by more has gone round once
+BESIDE = 0.2  # share of the period of a resonance, to each side, within which curves have more points
+HALF_TURN = 180.0  # degrees; a larger jump of phase is a turn by 360
 
 
 def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
@@ -53,7 +53,7 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
 
 
 def _small(found: FrequencyResponse) -> tuple[np.ndarray, np.ndarray]:
-    """Periods close enough for a smooth line, those of resonances among them, and the answers of small amplitudes."""
+    """Periods (s) for a smooth line, refined at resonances, and the linear response (complex) at them."""
     low, high = found.periods[0], found.periods[-1]
     peaks = np.outer(found.resonances[:, 0], 1 + np.linspace(-BESIDE, BESIDE, 41) ** 3 / BESIDE**2).ravel()
     periods = np.unique(np.concatenate([found.periods, np.geomspace(low, high, 400), peaks]))
@@ -62,7 +62,7 @@ def _small(found: FrequencyResponse) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _styles(found: FrequencyResponse) -> Iterator[tuple[int, float, dict[str, Any]]]:
-    """Of each amplitude: number, size and how it is marked."""
+    """Index, amplitude and marker style of each finite amplitude."""
     for j, amplitude in enumerate(found.amplitudes):
         style = {"color": _COLOURS[j % len(_COLOURS)], "marker": _MARKERS[j % len(_MARKERS)]}
         yield j, amplitude, style | {"linestyle": "none", "fillstyle": "none", "markersize": 5}

@@ -80,19 +80,15 @@ def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
 
 
 def _drawn_margins(found: MachineAnalysis) -> list[Margin]:
-    return [m for m in found.margins if m.edge is not None and m.value > 0 and _in_view(m.edge.value / m.value)][
-        :_MAX_PARAMETERS
-    ]
+    low, high = 1 / _SPAN_FACTOR, _SPAN_FACTOR
+    drawn = [m for m in found.margins if m.edge is not None and m.value > 0 and low < m.edge.value / m.value < high]
+    return drawn[:_MAX_PARAMETERS]
 
 
 def undrawn_edges(found: MachineAnalysis) -> list[str]:
     """Names of parameters with an edge that `stable_ranges` does not draw: too far away, too many, or not positive."""
     drawn = {one.parameter for one in _drawn_margins(found)}
     return [one.parameter for one in found.margins if one.edge is not None and one.parameter not in drawn]
-
-
-def _in_view(ratio: float) -> bool:
-    return 1 / _SPAN_FACTOR < ratio < _SPAN_FACTOR
 
 
 def _label_rows(ax: Axes, labels: list[str]) -> None:

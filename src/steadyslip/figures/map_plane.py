@@ -27,7 +27,7 @@ from steadyslip.figures.map_axes import (
     result_label,
     short_name,
 )
-from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axis_label, display_unit
+from steadyslip.figures.style import BLACK, GREY, ORANGE, OWN_RIG, SKY, VERMILION, axis_label, display_unit
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
@@ -216,8 +216,7 @@ def _mark_own(
     at = [float(scale(value)) for scale, value in zip(scales, own, strict=True)]
     if not all(min(ends) <= value <= max(ends) for value, ends in zip(at, limits, strict=True)):
         return
-    ax.plot(*([v] for v in at), "o", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
-            label="this rig", clip_on=False, zorder=5)  # fmt: skip
+    ax.plot(*([v] for v in at), "o", **OWN_RIG, zorder=5)
     nearest = _nearest(pieces, at, limits, [s.log for s in scales])
     if nearest is None:
         return

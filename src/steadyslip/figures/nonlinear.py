@@ -199,7 +199,7 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
         patch: dict[str, Any] = {"facecolor": _OUTCOME_COLOURS[names[index]], "edgecolor": GREY}
         doubts = np.unique(found.doubt[found.outcome == names[index]])
         for why in doubts:
-            label = _undecided_label(why) if why else names[index]
+            label = fill(f"undecided: {why}", LEGEND_WIDTH) if why else names[index]
             if where := ", ".join(sorted({*found.contact[found.outcome == names[index]].ravel()} - {""})):
                 label = fill(f"{label} at {where}", LEGEND_WIDTH)
             ax.fill_between([], [], label=label, **patch)
@@ -286,7 +286,3 @@ def _missing_regions(found: Any) -> list[tuple[str, Any, str]]:
     doubts = cycle(_UNDECIDED_HATCHES)
     hatches = {word: next(doubts) if word.startswith("undecided") else ".." for word in np.unique(limit[missing])}
     return [(fill(str(word), LEGEND_WIDTH), missing & (limit == word), hatch) for word, hatch in hatches.items()]
-
-
-def _undecided_label(why: str) -> str:
-    return fill(f"undecided: {why}", LEGEND_WIDTH)

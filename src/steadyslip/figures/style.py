@@ -29,6 +29,14 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
 CURVES = (BLUE, SKY, BLACK, ORANGE, VERMILION, GREEN, PURPLE)
 LINES = ("-", "--", "-.", ":")
 GREY = "#BBBBBB"
+OWN_RIG: dict[str, Any] = {
+    "color": VERMILION,
+    "markeredgecolor": BLACK,
+    "markersize": 9,
+    "linestyle": "none",
+    "label": "this rig",
+    "clip_on": False,
+}  # fmt: skip -- style of the marker at the values of the rig itself
 
 
 def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:

@@ -74,9 +74,9 @@ def check_symbols(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS)
     rig = Slider(friction=law, contact=press, stiffness=1.0, drive=Steady(conditions.velocity))
     model = build_model(rig, present=["slider.mass", "slider.damping", "slider.radiation_damping"])
     used = [
-        *((name, symbol) for name, symbol in model.parameters.items()),
+        *model.parameters.items(),
         *((item.name, item.symbol) for item in model.variables),
-        *((name, symbol) for name, symbol in model.inputs.items()),
+        *model.inputs.items(),
         ("acceleration", model.contact.acceleration),
         *((symbol.name, symbol) for symbol in model.definitions),
         ("steady normal stress", model.contact.sigma_ss),

@@ -15,7 +15,7 @@ import sympy as sp
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.records import FrozenRecord, parameters, with_values
 
-DIGITS = 50
+DIGITS = 50  # decimal digits of all evaluations: rounding stays far below `TOLERANCE` after any cancellation
 #: Allowed error relative to the terms that cancel: far above rounding at fifty digits and above constants
 #: that a law's author typed as ordinary floats, far below any real mistake.
 TOLERANCE = mpmath.mpf("1e-9")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, cast
 
 PRIMITIVES = (
@@ -114,14 +114,7 @@ def primitive(name: str, *arguments: Any) -> Node:
     return Node(name, tuple(map(as_node, arguments)))
 
 
-def exp(x: Node) -> Node:
-    """e^x."""
-    return primitive("exp", x)
-
-
-def log(x: Node) -> Node:
-    """ln x."""
-    return primitive("log", x)
+exp, log, sin, cos = (partial(primitive, name) for name in ("exp", "log", "sin", "cos"))
 
 
 def weighted(weights: Iterable[float], terms: Iterable[Value]) -> Value:

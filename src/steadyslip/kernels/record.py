@@ -11,21 +11,11 @@ from steadyslip.kernels.events import EVENTS, Observed
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Row
 from steadyslip.kernels.newton import solved
-from steadyslip.kernels.nodes import Node, Program, Value, as_node, primitive, weighted
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, cos, sin, weighted
 from steadyslip.kernels.source import Formulas
 from steadyslip.protocol.inputs import integral_to, level_at, slope_at
 
 Values = dict[str, Value]
-
-
-def sine(x: Value) -> Node:
-    """sin x of a node."""
-    return primitive("sin", x)
-
-
-def cosine(x: Value) -> Node:
-    """cos x of a node."""
-    return primitive("cos", x)
 
 
 def times(value: Value, share: Value) -> Value:
@@ -73,9 +63,9 @@ class Evaluator:
         layout = self.kernel.layout
         for i in range(layout.inputs):
             value, slope, waves = load(layout.level + i), load(layout.slope + i), self._waves(i)
-            found[f"in{i}"] = value if constant else level_at(moment, value, slope, waves, sine)
+            found[f"in{i}"] = value if constant else level_at(moment, value, slope, waves, sin)
             if not constant:
-                found[f"slope{i}"] = slope_at(moment, slope, waves, cosine)
+                found[f"slope{i}"] = slope_at(moment, slope, waves, cos)
         if self.kernel.reduction.model.imposed:
             found["time"] = load(Row.START) + moment
         return found
@@ -89,7 +79,7 @@ class Evaluator:
     def load_advance(self, moment: Value) -> Value:
         """Displacement of the load point since the start of the segment."""
         load, layout = self.program.load, self.kernel.layout
-        moved: Value = integral_to(moment, load(layout.level), load(layout.slope), self._waves(0), cosine)
+        moved: Value = integral_to(moment, load(layout.level), load(layout.slope), self._waves(0), cos)
         return moved
 
     def state(self) -> list[Node]:

@@ -21,13 +21,12 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.sliding import steady_state
-from steadyslip.motion.ends import BLOWN_UP, LOST, ending_contact
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import AnyEvent, ContactEvent, event_of, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.result import History
-from steadyslip.motion.status import WORDS, remedy
+from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact, remedy
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 

@@ -1,11 +1,18 @@
-"""Statuses of runs, and advice for each."""
+"""Statuses of runs, advice for each, and the contact at which a run ended early."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from steadyslip.core.areas import stress_name
 from steadyslip.kernels.runner import STATUSES
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.weights import slip_rates
 
 WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range")
+LOST, BLOWN_UP = "contact lost", "blow-up"
 
 REMEDIES = {
     "done": "",
@@ -38,3 +45,32 @@ def remedy(word: str, machine: bool, area: float | None = None) -> str:
     """Advice for a status, worded for a machine or for a slider (with forces if it has an area); empty if done."""
     normal = "force" if machine else stress_name("stress", area)
     return REMEDIES[word].format(mass=_MASS[machine], stress=normal)
+
+
+def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any) -> np.ndarray:
+    """Contact that is least pressed relative to steady sliding where contact is lost, the fastest in a blow-up.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        The rigs of k runs, or of one.
+    status : str
+        Status of the runs, one of `WORDS`.
+    stresses, rates : sequence of array_like
+        Normal stress (Pa) and slip rate (m/s) of every contact at the end, (k,) each.
+
+    Returns
+    -------
+    ndarray of int (k,)
+        Index of the contact; −1 for other statuses, and for a block with one contact, which has no name.
+    """
+    count = np.broadcast_shapes((1,), *(np.shape(one) for one in stresses))
+    if status not in (LOST, BLOWN_UP) or not point.model.contacts[0].name:
+        return np.full(count, -1)
+    with np.errstate(all="ignore"):
+        if status == LOST:
+            beside = [np.asarray(own) / sigma for own, sigma in zip(stresses, point.sigmas, strict=True)]
+        else:
+            beside = [-np.abs(own) / np.abs(rate) for own, rate in zip(rates, slip_rates(point), strict=True)]
+    found = np.stack([np.broadcast_to(one, count) for one in beside])
+    return np.asarray(np.argmin(np.where(np.isnan(found), np.inf, found), axis=0))

@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from steadyslip.kernels.runner import STATUSES, TALLY
-from steadyslip.motion.ends import BLOWN_UP, LOST, ending_contact
 from steadyslip.motion.jobs import automatic_method
+from steadyslip.motion.status import BLOWN_UP, LOST, ending_contact
 from steadyslip.nonlinear.kicks.closed_orbits import attracted, on_long_cycle
 from steadyslip.nonlinear.kicks.field import normal_stresses, slip_rates_at
 from steadyslip.nonlinear.kicks.fold import at_fold

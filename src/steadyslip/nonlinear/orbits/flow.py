@@ -26,12 +26,11 @@ from steadyslip.model.scales import natural_scales, shortest_time
 from steadyslip.model.sliding import explain_absence
 from steadyslip.model.start import initial_values, restored_of
 from steadyslip.model.variational import with_sensitivities
-from steadyslip.motion.ends import BLOWN_UP, LOST, ending_contact
 from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.motion.observe import observe
 from steadyslip.motion.single import areas as areas_of
-from steadyslip.motion.status import WORDS, remedy
+from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact, remedy
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.protocol import Segments
 

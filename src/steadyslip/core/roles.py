@@ -81,6 +81,7 @@ PARAMETER_KINDS = {
     "slip distance": "slip over which a memory fades",
     "reference rate": "velocity at which other parameters hold",
     "stress share": "share of the response to normal stress that is not immediate",
+    "drainage": "rate at which pore pressure evens out",
     "immediate share": "share of the response to normal stress that is immediate",
     "normal stress": "of the contact, in steady sliding or without coupling to the motion",
     "stiffness": "of the spring, or of what acts as one",

@@ -32,6 +32,7 @@ from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
 from steadyslip.machine.slider import Slider
+from steadyslip.model.sliding import steady_state
 from steadyslip.protocol import Protocol
 
 TABLES = (
@@ -91,17 +92,26 @@ class Spec(Displayed):
     def fit(self, records: Sequence[Record], **changes: Any) -> Fit:
         """Fit the records as the file says."""
         rig, parts = self._for(records)
-        return fit(rig, parts, **self.options, protocol=self.protocol, **changes)
+        return fit(rig, parts, **self._options(rig), protocol=self.protocol, **changes)
 
     def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
         """The laws that the file lists; if none, those among which changes of the normal stress decide."""
-        decides = self.rig.contact.is_imposed() and any(record.stress_changes for record in records)
+        imposed = self.rig.contact.is_imposed() or self.rig.contact.has_pores()
+        decides = imposed and any(record.stress_changes for record in records)
         return self.laws or (self.undecided if decides else ())
 
     def compare(self, records: Sequence[Record], **changes: Any) -> LawComparison:
         """Fit all laws of `compared`."""
         rig, parts = self._for(records)
-        return compare_laws(rig, parts, self.compared(records), **self.options, protocol=self.protocol, **changes)
+        options = self._options(rig)
+        return compare_laws(rig, parts, self.compared(records), **options, protocol=self.protocol, **changes)
+
+    def _options(self, rig: Slider) -> dict[str, Any]:
+        """Arguments of `fit`; of a contact that was given pores as the records have some, the drainage is free too."""
+        further = [name for name in rig.of_kind("drainage") if name not in self.rig.parameters()]
+        if "free" not in self.options or not further:
+            return self.options
+        return self.options | {"free": [*self.options["free"], *further]}
 
     def _for(self, records: Sequence[Record]) -> tuple[Slider, tuple[Record, ...]]:
         parts = tuple(w for r in records for w in (r.windows() if self.windows else (r,)))
@@ -114,6 +124,8 @@ class Spec(Displayed):
             raise ParameterError([Problem("normal", message)])
         rate = parts[0].initial_rate
         rig = self.referred_to(parts[0]).rig
+        if any(record.pressure_changes for record in parts) and not self.contact_given:
+            rig = with_pores(rig)
         if self.protocol is not None and not self.drive_given:
             if rate is None or not rate > 0:
                 message = (
@@ -194,6 +206,7 @@ def lab_rig(
     *,
     states: int = 1,
     normal_memory: str = "none",
+    pores: bool = False,
     stiffness: Any = None,
     v_ref: Any = "1 um/s",
 ) -> Slider:
@@ -206,6 +219,9 @@ def lab_rig(
     states : int
     normal_memory : str
         ``none``, ``linker-dieterich`` or ``prakash-clifton``.
+    pores : bool
+        Whether the contact has pores into which a changed pore pressure drains, at a rate that is fitted; if not, it
+        acts at once.
     stiffness : float or str, optional
         Of the machine, Pa/m, where it is known; name it in ``fixed`` of `fit`.
     v_ref : float or str
@@ -217,7 +233,13 @@ def lab_rig(
     count = int(states) if isinstance(states, np.integer) else states
     tables = {"friction": friction, "fit": {"states": count}}
     rig = _spec(read_tables(tables, {}, "lab_rig", further=TABLES, complete=filled.complete), filled).rig
+    rig = with_pores(rig) if pores else rig
     return rig if stiffness is None else replace(rig, stiffness=_checked("stiffness", "Pa/m", stiffness))
+
+
+def with_pores(rig: Slider) -> Slider:
+    """The rig with a contact whose pores drain, without dilatancy, at a rate that stands for what is fitted."""
+    return replace(rig, contact=contact_laws.porous(steady_state(rig).normal_stress))
 
 
 def _checked(name: str, unit: str, value: Any) -> float:

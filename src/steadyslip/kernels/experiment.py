@@ -17,7 +17,7 @@ from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
 from steadyslip.model import Model, OperatingPoint
-from steadyslip.model.reducing import reduce_model
+from steadyslip.model.reducing import PORES, reduce_model
 from steadyslip.model.reduction import Reduction, W
 from steadyslip.model.variational import with_directions
 
@@ -46,10 +46,18 @@ class ExperimentProgram:
 
     @cached_property
     def kernel(self) -> LockstepKernel:
-        friction = self.reduction.outputs["tau"] / self.reduction.outputs["sigma"]
+        friction = self.reduction.outputs["tau"] / self._measured_stress
         extended = with_directions(self.reduction, self.directions)
         choice = Choice(self.method, level="linear", lanes=1 if self.plain else LANES, dense=False)
         return LockstepKernel(extended, choice, friction)
+
+    @property
+    def _measured_stress(self) -> sp.Expr:
+        """Normal stress (Pa) by which records divide; with pores the pressure around, not yet drained, is measured."""
+        contact, channels = self.reduction.model.contact, self.reduction.channels
+        if contact.outside is None:
+            return self.reduction.outputs["sigma"]
+        return contact.sigma_ss + (channels[2] - channels[3]) / contact.area
 
     @cached_property
     def code(self) -> Code:
@@ -131,4 +139,8 @@ class ExperimentProgram:
 @question
 def experiment_program(model: Model, directions: int, method: str, settled: bool = True) -> ExperimentProgram:
     """Kernel for a model (cached)."""
-    return ExperimentProgram(reduce_model(model, None), directions, method, settled, plain=interpreting())
+    own = model.contact.name
+    presses = () if model.contact.outside is None else (own, own + PORES)
+    return ExperimentProgram(
+        reduce_model(model, None, presses=presses), directions, method, settled, plain=interpreting()
+    )

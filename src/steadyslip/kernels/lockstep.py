@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
 from steadyslip.kernels.record import Evaluator, Values
 from steadyslip.kernels.step import Step
-from steadyslip.model.reduction import V_LP, P, Q, Reduction
+from steadyslip.model.reduction import Reduction
 
 
 class LockstepKernel(Formulation):
@@ -33,10 +33,9 @@ class LockstepKernel(Formulation):
         Observable in terms of state, unknowns and inputs.
     """
 
-    varied_inputs = (V_LP, Q, P)
-
     def __init__(self, reduction: Reduction, choice: Choice, observed: sp.Expr) -> None:
         self.observed = observed
+        self.varied_inputs = reduction.channels
         self.own = len(reduction.state) // (1 + len(reduction.directions))
         super().__init__(reduction, choice)
 

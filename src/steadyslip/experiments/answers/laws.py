@@ -216,7 +216,8 @@ def _near(fits: Mapping[str, Fit]) -> list[str]:
 def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
     """The labels compared by default: with all that changes of the normal stress can decide, where there are any."""
     law = rig.friction
-    if not (rig.contact.is_imposed() and any(record.stress_changes for record in records)):
+    imposed = rig.contact.is_imposed() or rig.contact.has_pores()
+    if not (imposed and any(record.stress_changes for record in records)):
         return law.compared
     return tuple(map(", ".join, product(law.compared, *law.decided_by_stress.values())))
 

@@ -43,6 +43,9 @@ def check_records(plan: Plan) -> None:
         if plan.lag and (plan.protocol is not None or plan.drive != "commanded" or _curved(record.loading)):
             problems.append(Problem("lag", f"{record.source} is not driven by steps and ramps found in it; allowed: "
                                     "false, or drive = 'commanded' and a record of steps and ramps"))  # fmt: skip
+        if record.pressure_changes and plan.pressed and not plan.follows:
+            problems.append(Problem("drive", f"{record.source} changes the pore pressure; allowed: 'commanded' or "
+                                    "'smoothed', without a protocol"))  # fmt: skip
         rate = record.initial_rate or 0.0
         if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
             message = (
@@ -71,7 +74,7 @@ def check_changes(plan: Plan) -> None:
         return
     problems = []
     for i, (record, loading) in enumerate(zip(plan.records, plan.loading, strict=True)):
-        courses = [loading.load, *([loading.stress] if plan.pressed else [])]
+        courses = [loading.load, *([loading.stress, loading.pore] if plan.pressed else [])]
         if plan.rests(i) or any(c is not None and (c.changes or c.curve is not None) for c in courses):
             return
         problems.append(
@@ -88,4 +91,6 @@ def _begins_at_rest(plan: Plan, record: Record) -> bool:
 
 
 def _curved(loading: Loading) -> bool:
-    return any(course is not None and course.curve is not None for course in (loading.load, loading.stress))
+    return any(
+        course is not None and course.curve is not None for course in (loading.load, loading.stress, loading.pore)
+    )

@@ -14,7 +14,7 @@ from steadyslip.experiments.loading.loading import Change, Course, Loading, rest
 STRAIGHT = 5e-4  # of the range of a curve: what straight lines may miss of it
 MOST_CUTS = 30  # of one interval between samples
 BRIEFEST = 1e-9  # of the record: a ramp shorter than that is a step
-_COLUMN = {"load": 0, "stress": 2}
+NORMAL, PORES = 2, 3  # columns of the inputs
 SLID = 1e-3  # of the record: how long the steady sliding before a first rest is run through; any time would do
 
 
@@ -28,21 +28,25 @@ class CommandedInputs:
         Of the samples, s.
     pressed : bool
         Whether its normal stress drives the model.
+    pores : bool
+        Whether the contact has pores into which the pressure around drains; if not, it acts at once.
     lag : bool
         Whether all changes may come later (or earlier) than the columns have them, by one free time.
     """
 
-    def __init__(self, loading: Loading, time: Array, pressed: bool, lag: bool = False) -> None:
+    def __init__(self, loading: Loading, time: Array, pressed: bool, pores: bool = False, lag: bool = False) -> None:
         self.loading, self.time, self.lag, self.resting = loading, time, lag, resting_rate(loading)
         self.courses: dict[str, Course] = {}
         if loading.load is not None:
             self.courses["load"] = loading.load
         if pressed and loading.stress is not None:
             self.courses["stress"] = loading.stress
+            if loading.pore is not None:
+                self.courses["pore"] = loading.pore
+        self.inputs = 4 if pores else 3
+        self.acts = {"load": (0, 1.0), "stress": (NORMAL, 1.0), "pore": (PORES, 1.0) if pores else (NORMAL, -1.0)}
         self.changes = [one for one in loading.changes if one[0] in self.courses]
-        self.base = {"load": 0.0, "stress": 0.0}
-        if "stress" in self.courses:
-            self.base["stress"] = float(self.courses["stress"].at(time[:1])[0])
+        self.base = {name: float(course.at(time[:1])[0]) for name, course in self.courses.items()} | {"load": 0.0}
         self.times = time - time[0]
         self.nodes = self._nodes()
 
@@ -117,7 +121,7 @@ class CommandedInputs:
         curves = {channel: self._along(channel, moving, order) for channel in self._curves}
         nodes = np.take_along_axis(nodes, order, axis=1)
         count = events.shape[1] + before.shape[1]
-        rows = np.zeros((jobs, nodes.shape[1] - 1, 9))
+        rows = np.zeros((jobs, nodes.shape[1] - 1, 3 + 2 * self.inputs))
         rows[:, :, 0], rows[:, :, 1] = nodes[:, :-1] - low, nodes[:, 1:] - low
         self._fill(rows, nodes, begins, lengths, curves)
         if not directions or not self.free:
@@ -178,16 +182,17 @@ class CommandedInputs:
             if channel in curves:
                 before, after = before + curves[channel][:, :-1], after + curves[channel][:, 1:]
             spacing = nodes[:, 1:] - nodes[:, :-1]
-            column = _COLUMN[channel]
-            rows[:, :, 3 + column] = before
-            rows[:, :, 6 + column] = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
+            column, sign = self.acts[channel]
+            slope = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
+            rows[:, :, 3 + column] += sign * before
+            rows[:, :, 3 + self.inputs + column] += sign * slope
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
         """How inputs at given times change with the times of a ramp."""
         if not any(change.duration > 0 for _, _, change in self.changes):
-            return np.zeros((1, 0, 0, 3))
+            return np.zeros((1, 0, 0, self.inputs))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
-        rates = np.zeros((len(nodes), directions, middle.shape[1], 3))
+        rates = np.zeros((len(nodes), directions, middle.shape[1], self.inputs))
         for k, (place, what) in enumerate(self.free):
             for i in range(len(self.changes)) if what == "lag" else [place] if place >= 0 else []:
                 channel, _, change = self.changes[i]
@@ -196,7 +201,8 @@ class CommandedInputs:
                 begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], BRIEFEST * np.ptp(self.time))
                 share = (middle - begin) / length
                 slope = -(change.after - change.before) / length * (share if what == "duration" else 1.0)
-                rates[:, first + k, :, _COLUMN[channel]] += np.where((share > 0) & (share < 1), slope, 0.0)
+                column, sign = self.acts[channel]
+                rates[:, first + k, :, column] += np.where((share > 0) & (share < 1), sign * slope, 0.0)
         return rates
 
 

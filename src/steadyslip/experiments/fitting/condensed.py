@@ -99,7 +99,7 @@ def _possible(plan: Plan) -> bool:
 def _held(time: Array, loading: Loading, pressed: bool) -> Iterator[tuple[int, int]]:
     """Ranges of samples within which the model may have a kink, first and last of each."""
     for channel, _, change in loading.changes:
-        if channel == "stress" and not pressed:
+        if channel != "load" and not pressed:
             continue
         taken = max(change.longest, change.duration) if change.stretches else change.duration
         first, last = np.searchsorted(time, [change.earliest, change.latest + taken])

@@ -33,7 +33,7 @@ class InputTable:
 
     Attributes
     ----------
-    segments : ndarray (jobs or 1, k, 9)
+    segments : ndarray (jobs or 1, k, 9 or more)
         Start, end, jump of the load point, values and slopes of load-point velocity, disturbance and added normal
         stress.
     times : ndarray (samples,)
@@ -56,6 +56,18 @@ class InputTable:
             return array if len(array) == 1 else np.ascontiguousarray(array[rows])
 
         return InputTable(own(self.segments), self.times, own(self.node_rates), own(self.input_rates))
+
+    def with_inputs(self, count: int) -> InputTable:
+        """Table for a kernel with so many inputs; those that it does not have are zero."""
+        known = (self.segments.shape[2] - 3) // 2
+        if known == count:
+            return self
+        head, values, slopes = np.split(self.segments, [3, 3 + known], axis=2)
+        values, slopes, rates = (
+            np.concatenate([one, np.zeros((*one.shape[:-1], count - known))], axis=-1)
+            for one in (values, slopes, self.input_rates)
+        )
+        return InputTable(np.concatenate([head, values, slopes], axis=2), self.times, self.node_rates, rates)
 
     def along(self, part: slice, size: int) -> InputTable:
         """That of some directions, filled up to as many as a kernel has."""
@@ -178,6 +190,7 @@ class Forward:
             Friction, then its derivatives; NaN from where a motion cannot be continued, or where there is no
             steady sliding to start from.
         """
+        table = table.with_inputs(len(self.program.reduction.channels))
         values = self.values(parameters)
         chain = self._chain(parameters, units)
         away = np.zeros((len(parameters), len(self.program.unsettled)))

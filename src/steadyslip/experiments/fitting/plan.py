@@ -106,7 +106,7 @@ class Plan:
     @property
     def pressed(self) -> bool:
         """Whether the normal stress is imposed, so that the record's own drives the model."""
-        return self.rig.contact.is_imposed()
+        return self.rig.contact.is_imposed() or self.rig.contact.has_pores()
 
     def space(self) -> Space:
         """The unknowns: shared ones, separate ones record by record, trends."""
@@ -168,7 +168,9 @@ class Plan:
         inputs: Any
         moved: Array | None = None
         if self.follows:
-            inputs = CommandedInputs(self.loading[i], record.time, self.pressed and record.normal is not None, self.lag)
+            pressing = self.pressed and record.normal is not None
+            pores = rig.contact.has_pores() and self.loading[i].pore is not None
+            inputs = CommandedInputs(self.loading[i], record.time, pressing, pores, self.lag)
             load = self.loading[i].load
             moved = load.integral(record.time) if load is not None and self.trend else None
         elif self.protocol is None:
@@ -203,7 +205,9 @@ class Plan:
             rig = _pressed_with(rig, float(pressed[0]))
             return rig, (record.normal if stress.changes else pressed) - pressed[0]
         if stress is not None:
-            return _pressed_with(rig, float(stress.at(record.time[:1])[0])), None
+            pore = self.loading[i].pore
+            level = stress.at(record.time[:1]) - (0.0 if pore is None else pore.at(record.time[:1]))
+            return _pressed_with(rig, float(level[0])), None
         rig = _pressed_with(rig, float(record.normal[0]))
         return rig, record.normal - record.normal[0]
 
@@ -215,7 +219,7 @@ def _driven_at(rig: Slider, rate: float) -> Slider:
 
 @lru_cache(maxsize=64)
 def _pressed_with(rig: Slider, stress: float) -> Slider:
-    return replace(rig, contact=pressed_at(stress))
+    return replace(rig, contact=pressed_at(stress, rig.contact))
 
 
 def with_loading(plan: Plan) -> Plan:

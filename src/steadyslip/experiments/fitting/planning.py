@@ -93,7 +93,8 @@ def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Addr
 
 def _default_free(rig: Slider) -> list[str]:
     """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
-    found = [name for name in can_be_free(rig) if name.startswith("friction.")]
+    drains = rig.of_kind("drainage")
+    found = [name for name in can_be_free(rig) if name.startswith("friction.") or name in drains]
     return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
 
 

@@ -92,7 +92,7 @@ def _without_spikes(friction: Array) -> Array:
 def _moved(record: Record, rate: float) -> Array:
     """How far the load point has moved, as its steps say: without the noise of a measured displacement."""
     time = record.time
-    changes = [(s.time, s.duration, s.after) for s in record.steps if not s.kind.startswith("normal")]
+    changes = [(s.time, s.duration, s.after) for s in record.steps if s.unit != "Pa"]
     knots, rates = [float(time[0])], [rate]
     for moment, duration, after in changes:
         knots += [moment, moment + max(duration, 1e-9 * (time[-1] - time[0]))]
@@ -204,6 +204,9 @@ def search_bounds(parts: Sequence[RecordPart], told: Sequence[Features], space: 
         own = told if unknown.record is None else [told[unknown.record]]
         if unknown.kind == "slip distance":
             ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
+        elif unknown.kind == "drainage":  # slower than the record, or faster than its samples: nothing to see
+            times = [parts[k].record.time for k in range(len(parts)) if unknown.record in (None, k)]
+            ends = 0.03 / max(map(np.ptp, times)), 10.0 / min(float(np.min(np.diff(time))) for time in times)
         elif unknown.kind == "direct effect":
             ends = 1e-5, 1.0
         elif unknown.kind == "stiffness":
@@ -236,6 +239,9 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         return d_c * (3.0 + 30.0 * spare) ** max(member - 1, 0)
     if unknown.kind == "stress share":
         return alpha
+    if unknown.kind == "drainage":  # between a few samples and the record
+        span, spacing = float(np.ptp(part.record.time)), float(np.median(np.diff(part.record.time)))
+        return (0.3 / spacing) * (10 * spacing / span) ** spare
     if unknown.kind == "immediate share":
         return 1.0 - alpha
     if unknown.kind == "stiffness":

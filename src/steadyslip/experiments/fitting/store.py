@@ -197,7 +197,11 @@ def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
 
 def _written(loading: Loading | None) -> Any:
     """A loading as plain data, a list for each channel; empty where it is found again in the columns."""
-    return [] if loading is None else [[] if c is None else [_course(c)] for c in (loading.load, loading.stress)]
+    return (
+        []
+        if loading is None
+        else [[] if c is None else [_course(c)] for c in (loading.load, loading.stress, loading.pore)]
+    )
 
 
 def _course(course: Course) -> list[Any]:
@@ -214,13 +218,13 @@ def _curves(curve: Any) -> list[Any]:
 
 def _read(table: ExpectedTable, written: list[Any]) -> Loading | None:
     """The loading in such data."""
-    if len(written) != 2:
+    if len(written) != 3:
         return None
     try:
-        load, stress = (_channel(one[0]) if one else None for one in written)
+        load, stress, pore = (_channel(one[0]) if one else None for one in written)
     except ValueError as error:
         raise table.fault(f"a curve of its loading {error}") from error
-    return Loading(load, stress)
+    return Loading(load, stress, pore)
 
 
 def _channel(one: list[Any]) -> Course:

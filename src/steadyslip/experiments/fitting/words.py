@@ -103,7 +103,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
     found += list(fit.at_bounds) + _outliers(fit) + _unsettled(fit) + _off_the_loading(fit) + _vague_jumps(fit)
-    found += _untold_ramps(fit) + _forgotten_stress(fit)
+    found += _untold_ramps(fit) + _forgotten_stress(fit) + _drained_at_once(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     if other := of_another(fit.version):
@@ -164,7 +164,11 @@ def _off_the_loading(fit: FitNumbers) -> list[str]:
     """Records that begin or end with samples off their loading, too few to tell why."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
-        courses = {"load point": loading.load, "normal stress": loading.stress if fit.plan.pressed else None}
+        courses = {
+            "load point": loading.load,
+            "normal stress": loading.stress if fit.plan.pressed else None,
+            "pore pressure": loading.pore if fit.plan.pressed else None,
+        }
         for channel, course in courses.items():
             if course is None:
                 continue
@@ -201,7 +205,7 @@ def _between_samples(fit: FitNumbers, one: Any) -> bool:
         return False
     changes = [c for c in fit.plan.loading[one.record or 0].changes if fit.plan.pressed or c[0] == "load"]
     channel, _, change = changes[int(one.parameter.split(".")[1]) - 1]
-    return channel == "stress" and change.duration == 0
+    return channel != "load" and change.duration == 0
 
 
 def _untold_ramps(fit: FitNumbers) -> list[str]:
@@ -262,6 +266,17 @@ def _forgotten_stress(fit: FitNumbers) -> list[str]:
     ]
 
 
+def _drained_at_once(fit: FitNumbers) -> list[str]:
+    """That a changed pore pressure acts at once, because the contact has no pores to drain."""
+    changing = [record.source for record in fit.plan.records if record.pressure_changes]
+    if not changing or fit.plan.rig.contact.has_pores():
+        return []
+    return [
+        f"the pore pressure changes in {_listed(changing)}, and acts at once in this contact, which has no pores; "
+        "where drainage takes time, fit its rate (lab_rig(pores=True), or no table [contact] in the file)"
+    ]
+
+
 def _lengths(fit: FitNumbers, ramped: Ramped) -> str:
     own = [
         format_quantity(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values
@@ -294,11 +309,16 @@ def drive_line(fit: FitNumbers) -> str:
         return "a smooth curve through the measured displacement"
     count = sum(len(course.changes) for course in loads)
     free = sum(one.parameter.startswith("step.") for one in fit.space.unknowns)
-    presses = [loading.stress for loading in plan.loading if plan.pressed and loading.stress is not None]
-    pressed = sum(len(course.changes) for course in presses)
+    of_each = [[channel for channel, _, _ in loading.changes] for loading in plan.loading if plan.pressed]
+    pressed = {what: sum(own.count(channel) for own in of_each)
+               for channel, what in (("stress", "normal stress"), ("pore", "pore pressure"))}  # fmt: skip
     text = f"commanded loading found in the record, {count} change{'' if count == 1 else 's'} of rate"
-    text += f" and {pressed} of normal stress" if pressed else ""
-    text += f", {free} of {'its' if count + pressed == 1 else 'their'} times and durations fitted" if free else ""
+    text += "".join(f" and {number} of {what}" for what, number in pressed.items() if number)
+    text += (
+        f", {free} of {'its' if count + sum(pressed.values()) == 1 else 'their'} times and durations fitted"
+        if free
+        else ""
+    )
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
         text += "; at rest at first, how long is fitted (start.hold)"
     if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):

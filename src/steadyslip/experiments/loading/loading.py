@@ -108,6 +108,11 @@ class Course(ReadOnly):
         found = np.interp(time, knots, values)
         return np.asarray(found if self.curve is None else found + self.curve(time))
 
+    def lowered(self, by: float) -> Course:
+        """The same course with all levels less `by`."""
+        changes = tuple(replace(one, before=one.before - by, after=one.after - by) for one in self.changes)
+        return replace(self, first=self.first - by, changes=changes)
+
     def integral(self, time: Array) -> Array:
         """Integral from the first of given times."""
         knots = [c.time for c in self.changes] + [c.time + c.duration for c in self.changes]
@@ -127,18 +132,21 @@ class Loading:
     load : Course or None
         Course of the load-point rate; None if it was not measured.
     stress : Course or None
-        Course of the normal stress; None if it was not measured.
+        Course of the (total) normal stress; None if it was not measured.
+    pore : Course or None
+        Course of the pore pressure around the contact; None if it was not measured.
     """
 
     load: Course | None
     stress: Course | None
+    pore: Course | None = None
 
     @cached_property
     def changes(self) -> tuple[tuple[str, int, Change], ...]:
-        """(channel, index, change) in order of time; the channel is ``load`` or ``stress``."""
+        """(channel, index, change) in order of time; the channel is ``load``, ``stress`` or ``pore``."""
         found = [
             (channel, i, change)
-            for channel, course in (("load", self.load), ("stress", self.stress))
+            for channel, course in (("load", self.load), ("stress", self.stress), ("pore", self.pore))
             if course is not None
             for i, change in enumerate(course.changes)
         ]
@@ -155,7 +163,7 @@ def resting_rate(loading: Loading) -> float | None:
 
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
     """Loadings with one level each raised by its standard deviation, for levels with an error above rounding."""
-    for channel in ("load", "stress") if pressed else ("load",):
+    for channel in ("load", "stress", "pore") if pressed else ("load",):
         course = getattr(loading, channel)
         if course is None:
             continue

@@ -67,6 +67,7 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
         message = f"{len(lines)} usable rows are left; a record needs {FEWEST_ROWS} or more"
         raise ParameterError([Problem("file", message)], title=source)
     si = _in_compression(si, notes) if any_sign else si
+    si = _effective(si, notes)
     _check_stress(si, source, lines)
     if "friction" not in si:
         si["friction"] = si["shear"] / si["normal"]
@@ -102,7 +103,9 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
         None if name not in si else frozen(si[name]) for name in ("normal", "shear", "displacement", "velocity")
     )
     time, friction = frozen(si["time"]), frozen(si["friction"])
-    return Record(time, friction, normal, shear, displacement, velocity, source, tuple(notes), integrated)
+    pores = None if "pore_pressure" not in si else frozen(si["pore_pressure"])
+    columns = (time, friction, normal, shear, displacement, velocity)
+    return Record(*columns, source, tuple(notes), integrated, pore_pressure=pores)
 
 
 def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
@@ -224,6 +227,17 @@ def _in_compression(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
         return si
     notes.append("normal stress is negative throughout: taken as compression, its sign changed")
     return si | {"normal": -si["normal"]}
+
+
+def _effective(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
+    """Effective normal stress in place of the total one where the pore pressure was measured."""
+    if "pore_pressure" not in si:
+        return si
+    if "normal" not in si:
+        notes.append("pore pressure left out: there is no normal stress to take it from")
+        return {role: values for role, values in si.items() if role != "pore_pressure"}
+    notes.append("normal stress taken as total; the effective one, less the pore pressure, presses")
+    return si | {"normal": si["normal"] - si["pore_pressure"]}
 
 
 def _turned_forwards(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:

@@ -11,7 +11,15 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import Problem, QuantityError, unknown_name
 from steadyslip.core.quantities import described, example
 
-ROLES = {"time": "s", "displacement": "m", "velocity": "m/s", "friction": "1", "shear": "Pa", "normal": "Pa"}
+ROLES = {
+    "time": "s",
+    "displacement": "m",
+    "velocity": "m/s",
+    "friction": "1",
+    "shear": "Pa",
+    "normal": "Pa",
+    "pore_pressure": "Pa",
+}
 """Roles of columns, with SI units; displacement and velocity are those of the load point."""
 
 MOST_LISTED = 40  # names in a message; more would not be read
@@ -35,6 +43,7 @@ _ACROSS = re.compile(r"normalweg|vertikal|normalversch")
 _SHEAR = re.compile(
     r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement|cortante|cizall|tagli|tangenzial"
 )
+_PORES = re.compile(r"pore|pf|pp|fluid|interstiti|poren")
 _BRACKETS = re.compile(r"^(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*$")
 
 
@@ -124,6 +133,8 @@ def guess_role(name: str, has_unit: str | None) -> str | None:
     across = words & {"normal", "vertical", "horizontal normal"} or _ACROSS.search(joined)
     if displaced and not (stress or across):
         return "displacement"
+    if dimension == unit("Pa")[1] and any(_PORES.match(word) for word in words) and "effective" not in words:
+        return "pore_pressure"
     if re.search(r"normal|sigma|σ", joined) or words & {"sn", "fn", "effective", "nor", "norm"}:
         return None if dimension == unit("m")[1] or displaced else "normal"
     if _SHEAR.search(joined) or words & {"ft", "fs", "shr"}:
@@ -280,7 +291,7 @@ def _with_unit(
 
 
 def _usual(role: str) -> str:
-    return {"displacement": "um", "velocity": "um/s", "shear": "MPa", "normal": "MPa"}[role]
+    return {"displacement": "um", "velocity": "um/s", "shear": "MPa", "normal": "MPa", "pore_pressure": "MPa"}[role]
 
 
 def missing_roles(columns: Mapping[str, Column], names: Sequence[str]) -> list[Problem]:

@@ -38,7 +38,8 @@ def read_record(
 
     Columns are found by their names, units are read from them: ``Normal_stress(MPa)``, ``lp_disp_um``, ``time [s]``.
     Otherwise give them: ``time="t"`` (a column), ``shear="MPa"`` (a unit), ``normal=("sn", "MPa")``, or ``friction=3``
-    (the third column). Friction is shear over normal stress unless it has a column of its own.
+    (the third column). Friction is shear over normal stress unless it has a column of its own. Where the pore pressure
+    has a column, the normal stress is the total one, and friction is shear over the effective normal stress.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def _format_unit(column: Column, area: float, assumed: bool) -> str:
 @checked()
 def record_from_arrays(
     time: Any, *, friction: Any = None, shear: Any = None, normal: Any = None, displacement: Any = None,
-    velocity: Any = None, source: str = "arrays",
+    velocity: Any = None, pore_pressure: Any = None, source: str = "arrays",
 ) -> Record:  # fmt: skip
     """Make a record from arrays in SI units, cleaned like one from a file.
 
@@ -179,6 +180,8 @@ def record_from_arrays(
         s.
     friction : array_like, optional
         By default shear over normal stress.
+    pore_pressure : array_like or float, optional
+        Pa; `normal` is then the total normal stress.
     shear, normal : array_like or float, optional
         Pa.
     displacement, velocity : array_like, optional
@@ -191,7 +194,8 @@ def record_from_arrays(
         If columns are missing, or differ in length.
     """
     given: Mapping[str, Any] = {"time": time, "friction": friction, "shear": shear, "normal": normal,
-                                "displacement": displacement, "velocity": velocity}  # fmt: skip
+                                "displacement": displacement, "velocity": velocity,
+                                "pore_pressure": pore_pressure}  # fmt: skip
     si, problems = {}, []
     count = np.size(time)
     for role, values in given.items():
@@ -202,7 +206,7 @@ def record_from_arrays(
         except (TypeError, ValueError):
             problems.append(Problem(role, f"got {values!r}; allowed: numbers in {ROLES[role]}"))
             continue
-        if array.ndim == 0 and role == "normal":
+        if array.ndim == 0 and role in ("normal", "pore_pressure"):
             array = np.full(count, float(array))
         if array.shape != (count,):
             problems.append(Problem(role, f"got an array of shape {array.shape}; allowed: as many as times, {count}"))

@@ -42,7 +42,9 @@ class Record(Displayed, Keeper):
         Rising times, s.
     friction : ndarray (n,)
         Shear stress over normal stress.
-    normal, shear : ndarray (n,) or None
+    normal : ndarray (n,) or None
+        Effective normal stress, Pa: total less `pore_pressure` where that was measured.
+    shear : ndarray (n,) or None
         Pa.
     displacement : ndarray (n,) or None
         Displacement of the load point, m; integrated where only its rate was measured.
@@ -71,6 +73,7 @@ class Record(Displayed, Keeper):
     integrated: bool = False
     worth: Array | None = field(default=None, repr=False)
     commanded: Loading | None = field(default=None, repr=False)
+    pore_pressure: Array | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -78,7 +81,7 @@ class Record(Displayed, Keeper):
     @cached_property
     def steps(self) -> tuple[LoadStep, ...]:
         """Changes made during the experiment, in order of time."""
-        return steps_of(self.loading, None if self.normal is None else oscillation(self.time, self.normal))
+        return steps_of(self.loading, None if (total := self.total_normal) is None else oscillation(self.time, total))
 
     @cached_property
     def loading(self) -> Loading:
@@ -86,7 +89,19 @@ class Record(Displayed, Keeper):
         if self.commanded is not None:
             return self.commanded
         load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
-        return Loading(load, None if self.normal is None else stress_course(self.time, self.normal))
+        total = self.total_normal
+        pore = None
+        if self.pore_pressure is not None and total is not None:  # counted so that no level of it is zero
+            size = float(np.mean(total))
+            pore = stress_course(self.time, self.pore_pressure + size).lowered(size)
+        return Loading(load, None if total is None else stress_course(self.time, total), pore)
+
+    @property
+    def total_normal(self) -> Array | None:
+        """Total normal stress, Pa; None if no normal stress was measured."""
+        if self.normal is None or self.pore_pressure is None:
+            return self.normal
+        return np.asarray(self.normal + self.pore_pressure)
 
     @cached_property
     def stress_changes(self) -> bool:
@@ -94,8 +109,18 @@ class Record(Displayed, Keeper):
         stress = self.loading.stress
         if stress is None:
             return False
-        along = stress.at(self.time)
-        return bool(stress.changes) or float(np.ptp(along)) > DRIFT * float(np.mean(along))
+        pore = self.loading.pore
+        along = stress.at(self.time) - (0.0 if pore is None else pore.at(self.time))
+        changes = bool(stress.changes) or self.pressure_changes
+        return changes or float(np.ptp(along)) > DRIFT * float(np.mean(along))
+
+    @cached_property
+    def pressure_changes(self) -> bool:
+        """Whether the pore pressure was changed: at once, by ramps, or smoothly by more than drifts."""
+        pore = self.loading.pore
+        if pore is None or self.normal is None:
+            return False
+        return bool(pore.changes) or float(np.ptp(pore.at(self.time))) > DRIFT * float(np.mean(self.normal))
 
     @cached_property
     def initial_rate(self) -> float | None:
@@ -221,6 +246,9 @@ class Record(Displayed, Keeper):
                 f"normal stress   {format_quantity(float(stress.min()), 'Pa')} to "
                 f"{format_quantity(float(stress.max()), 'Pa')}"
             )
+        if self.pore_pressure is not None:
+            ends = (format_quantity(float(end(self.pore_pressure)), "Pa") for end in (np.min, np.max))
+            lines.append(f"pore pressure   {' to '.join(ends)}")
         if self.displacement is not None:
             moved = float(self.displacement[-1] - self.displacement[0])
             lines.append(
@@ -252,14 +280,15 @@ class Record(Displayed, Keeper):
             If the file cannot be written.
         """
         names = {"time": "Time (s)", "displacement": "Load displacement (m)", "velocity": "Load velocity (m/s)",
-                 "friction": "Friction", "shear": "Shear stress (Pa)", "normal": "Normal stress (Pa)"}  # fmt: skip
+                 "friction": "Friction", "shear": "Shear stress (Pa)", "total_normal": "Normal stress (Pa)",
+                 "pore_pressure": "Pore pressure (Pa)"}  # fmt: skip
         if self.integrated:
             del names["displacement"]
         present = {title: getattr(self, n) for n, title in names.items() if getattr(self, n) is not None}
         write_columns(path, present, "%.12g")
 
 
-_OPTIONAL = ("normal", "shear", "displacement", "velocity")
+_OPTIONAL = ("normal", "shear", "displacement", "velocity", "pore_pressure")
 
 
 def whole_record(

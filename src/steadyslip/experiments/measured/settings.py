@@ -30,6 +30,9 @@ class RecordSettings(Settings):
     friction: ColumnSettings | None = part(ColumnSettings, "column of the friction coefficient", default=None)
     shear: ColumnSettings | None = part(ColumnSettings, "column of the shear stress or force", default=None)
     normal: ColumnSettings | None = part(ColumnSettings, "column of the normal stress or force", default=None)
+    pore_pressure: ColumnSettings | None = part(
+        ColumnSettings, "column of the pore pressure; the normal stress is then the total one", default=None
+    )
     area: float | None = parameter(
         "m^2", positive, "contact area where shear and normal are forces; 1 m^2 unless given", default=None
     )

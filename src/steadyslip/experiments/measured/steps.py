@@ -33,7 +33,7 @@ class LoadStep:
 
     @property
     def unit(self) -> str:
-        return "Pa" if self.kind.startswith("normal") else "m/s"
+        return "Pa" if self.kind.startswith(("normal", "pore")) else "m/s"
 
     def __str__(self) -> str:
         if self.kind == "normal-stress oscillation":
@@ -56,8 +56,8 @@ def steps_of(loading: Loading, wave: StressWave | None) -> tuple[LoadStep, ...]:
 
 
 def _step(channel: str, change: Change) -> LoadStep:
-    if channel == "stress":
-        kind = "normal-stress step"
+    if channel in ("stress", "pore"):
+        kind = "normal-stress step" if channel == "stress" else "pore-pressure step"
     else:
         kind = "hold" if change.after == 0.0 else "reslide" if change.before == 0.0 else "velocity step"
     return LoadStep(kind, change.time, change.duration, change.before, change.after)

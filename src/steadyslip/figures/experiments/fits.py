@@ -78,8 +78,10 @@ def _is_pressed(data: Record) -> bool:
     course = data.loading.stress
     if course is None:
         return False
-    return bool(course.changes) or (
-        course.curve is not None and float(np.ptp(course.at(data.time))) > MIN_STRESS_CHANGE * course.first
+    return (
+        data.pressure_changes
+        or bool(course.changes)
+        or (course.curve is not None and float(np.ptp(course.at(data.time))) > MIN_STRESS_CHANGE * course.first)
     )
 
 

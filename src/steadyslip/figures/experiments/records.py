@@ -55,14 +55,18 @@ def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
 
 
 def draw_normal_stress(data: Record, ax: Axes, time: np.ndarray) -> None:
-    """Plot the measured normal stress, and the commanded one found from it."""
-    if data.normal is None:
+    """Plot measured normal stress (total) and pore pressure, and the commanded ones found from them."""
+    if data.total_normal is None:
         return
-    size, name = display_unit("Pa", float(np.max(np.abs(data.normal))))
-    ax.plot(time, data.normal / size, color=SKY, linewidth=0.8)
-    if data.loading.stress is not None:
-        along, commanded = commanded_curve(data.loading.stress, data, time)
-        ax.plot(along, commanded / size, color=BLACK, linewidth=1)
+    size, name = display_unit("Pa", float(np.max(np.abs(data.total_normal))))
+    ax.plot(time, data.total_normal / size, color=SKY, linewidth=0.8)
+    if data.pore_pressure is not None:
+        ax.plot(time, data.pore_pressure / size, color=BLUE, linewidth=0.8, label="pore pressure")
+        ax.legend(loc="best", fontsize="x-small")
+    for course in (data.loading.stress, data.loading.pore):
+        if course is not None:
+            along, commanded = commanded_curve(course, data, time)
+            ax.plot(along, commanded / size, color=BLACK, linewidth=1)
     ax.set_ylabel(axis_label("normal\nstress", name))
     ax.ticklabel_format(axis="y", useOffset=False)
 

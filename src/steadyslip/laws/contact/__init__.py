@@ -2,7 +2,7 @@
 
 from steadyslip.laws.contact.basic import Constant, Linear, Prescribed, pressed_at
 from steadyslip.laws.contact.compliant import Compliant
-from steadyslip.laws.contact.fluid import PoreFluid
+from steadyslip.laws.contact.fluid import PoreFluid, porous
 from steadyslip.laws.contact.law import ContactLaw, Motion, PreloadedContact
 from steadyslip.laws.contact.mechanisms import (
     DilatingLayer,
@@ -21,5 +21,5 @@ USUAL = Constant.name
 __all__ = [
     "USUAL", "Compliant", "Constant", "ContactLaw", "DilatingLayer", "InclinedSpring", "LeadScrew", "Lift", "Linear",
     "Motion", "PoreFluid", "PreloadedContact", "Prescribed", "SelfEnergising", "SliderCrank", "SlopedGuide",
-    "Triaxial", "pressed_at",
+    "Triaxial", "porous", "pressed_at",
 ]  # fmt: skip

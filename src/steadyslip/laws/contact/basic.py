@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import sympy as sp
 
 from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.core.records import parameter
-from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
+from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact
 
 
 class Constant(PreloadedContact, name="constant"):
     """A normal stress that never changes (dead weight, servo-controlled press): B0 = ... = B3 = 0."""
 
 
-def pressed_at(stress: float) -> Constant:
-    """Contact with a constant normal stress (Pa)."""
+def pressed_at(stress: float, like: ContactLaw | None = None) -> ContactLaw:
+    """Contact with a constant normal stress (Pa), effective where `like` has pores, which are kept."""
+    if isinstance(like, PreloadedContact) and like.has_pores():
+        return replace(like, preload=None, steady_normal_stress=stress)
     return Constant(steady_normal_stress=stress)
 
 

@@ -19,7 +19,10 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
     """
 
     suction: float = parameter("Pa", real, "fall of pore pressure ε/β per e-fold of velocity, undrained")
-    drainage: float = parameter("1/s", positive, "rate c* at which pore pressure evens out", letter="c_d")
+    drainage: float = parameter(
+        "1/s", positive, "rate c* at which pore pressure evens out", letter="c_d",
+        kind="drainage",
+    )  # fmt: skip
     slip_distance: float = parameter("m", positive, "slip over which porosity follows", letter="d_p")
     v_ref: float = parameter("m/s", positive, "velocity from which porosity counts", gauge=True)
 
@@ -40,3 +43,11 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
 
     def coupling(self, motion: Motion) -> Expression:
         return -motion.memory[1]
+
+
+def porous(stress: float) -> PoreFluid:
+    """Contact with pores at an effective stress (Pa), without dilatancy; its drainage stands for what is not known."""
+    return PoreFluid(
+        steady_normal_stress=stress, suction=0.0, drainage=0.1,
+        slip_distance=1e-5, v_ref=1e-6,
+    )  # fmt: skip

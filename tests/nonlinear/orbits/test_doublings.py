@@ -10,7 +10,7 @@ from dimensionless import two_states
 from doubled_machines import ALONG, closing, drawn, drawn_otherwise, judged, places
 from steadyslip.core.checks import in_words
 from steadyslip.nonlinear.continuation import turned_round
-from steadyslip.nonlinear.orbits import tracer
+from steadyslip.nonlinear.orbits import tracer, values
 from steadyslip.nonlinear.orbits.cycle import End
 from steadyslip.nonlinear.orbits.doublings import doubled_sheets
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
@@ -104,6 +104,19 @@ def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling
     assert below.value < value < above.value == doubling.stable_ranges[0][0]
     assert f"attracts between {below.words('Pa/m', None)} and the period doubling at" in str(found)
     assert not doubling.at(0.9 * doubling.onset.value).simulated
+
+
+def test_a_cycle_that_cannot_be_computed_is_said(doubling, monkeypatch):
+    """On the branch and on its doublings, between which neighbours; a simulation finds the one that attracts."""
+    monkeypatch.setattr(values, "_at_value", lambda *_: None)
+    value = 0.862 * doubling.onset.value
+    found = doubling.at(value)
+    assert (len(found.missed), found.multiples) == (2, (0,))
+    assert found.missed[0].startswith("a cycle between ")
+    assert all(line in str(found).splitlines() for line in found.missed)
+    monkeypatch.undo()
+    assert found[0].period == pytest.approx(doubling.at(value)[1].period, rel=1e-8)
+    assert not doubling.at(value).missed
 
 
 def test_cycles_carry_how_well_they_close_and_multipliers_their_error(doubling):

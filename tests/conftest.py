@@ -62,7 +62,7 @@ def pytest_sessionfinish():
 
 @pytest.fixture(autouse=True)
 def _closed_figures():
-    """What a test leaves open in pyplot does not become a warning in another."""
+    """Close all pyplot figures after a test, so that they cause no warning in another one."""
     yield
     if (pyplot := sys.modules.get("matplotlib.pyplot")) is not None:
         pyplot.close("all")

@@ -1,4 +1,4 @@
-"""What every stage answers about a rig with laws under given names, by what is asked."""
+"""Answers of every stage on a rig whose laws have given names, by question."""
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def moved(own, mass):
 
 
 def of_machine(own, mass):
-    """The same of a machine, with its eigenvalues."""
+    """Answers on a machine, with its eigenvalues."""
     found = machine(own, mass)
     push = [ss.VelocityStep(at=1.0, to=2e-6), ss.DisturbanceStep(at=3.0, by=1e5, on="two")]
     run = ss.simulate(found, push, until=8.0, times=TIMES[:9])
@@ -80,7 +80,7 @@ ASKED = {one.__name__: one for one in (moved, of_machine, judged, printed, fitte
 
 
 def differing(what, own, mass):
-    """How many of the answers under other names are other answers, bit for bit."""
+    """Number of answers that change in any bit under other names."""
     one, two = ASKED[what]((), mass), ASKED[what](own, mass)
     same = [
         a == b if isinstance(a, str) else np.array_equal(a, b, equal_nan=True) for a, b in zip(one, two, strict=True)

@@ -67,7 +67,7 @@ class ByHand:
     # Small perturbations, with a' = a v_a/(v_a + v) and b' alike.
 
     def eigenvalues(self):
-        """Of x, v (with mass) and Ψ_i = b_i Θ_i + α_i ln σ + c_N τ/σ, friction at v + σ as unknowns in between."""
+        """Eigenvalues in the variables x, v (with mass) and Ψ_i = b_i Θ_i + α_i ln σ + c_N τ/σ."""
         v, n, sigma, mu = self.v0, len(self.b), self.sigma, self._steady()
         a1 = self.a if np.isinf(self.v_a) else self.a * self.v_a / (self.v_a + v)
         b1 = np.array([b if np.isinf(own) else b * own / (own + v) for b, own in zip(self.b, self.v_b, strict=True)])

@@ -156,7 +156,7 @@ def places(branch, many):
 
 
 def judged(branch, value):
-    """What `at` says at a value; its stable cycles, and whether one of them all is of twice the period."""
+    """Result of `at` at a value, its stable cycles, and True if one cycle has twice the period."""
     found = branch.at(value)
     return found, [cycle for cycle in found if cycle.stable], 2 in found.multiples
 

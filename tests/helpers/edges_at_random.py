@@ -67,13 +67,13 @@ def range_around(rig, name, edges, chance):
 
 
 def reordered(rig):
-    """The same machine, its members named the other way round."""
+    """Machine with its bodies, links and contacts listed in reverse order."""
     parts = ("bodies", "links", "contacts")
     return replace(rig, **{part: dict(list(getattr(rig, part).items())[::-1]) for part in parts})
 
 
 def in_other_unit(rig):
-    """The same rig with stress, or force, in a smaller unit; and by how much each parameter's number is larger."""
+    """Rig with stress, or force, in a smaller unit, and the factor on the number of each parameter."""
     factors = {}
     for name, one in rig.parameters().items():
         if one.value is not None:
@@ -98,7 +98,7 @@ def unlike(found, wanted, factor=1.0):
 
 
 def differences(seed):
-    """What differs for one random rig and two of its parameters, and how much was compared."""
+    """Differences for one random rig and two of its parameters, and number of comparisons."""
     chance = np.random.default_rng(seed)
     compared, found = 0, []
     try:

@@ -45,14 +45,14 @@ class Explored:
 
 
 class ExploredMachine(Explored):
-    """The same of a machine, with the stable values of one of its parameters and its mode in words."""
+    """Answers of JavaScript on a machine, with the stable values of one parameter and its mode in words."""
 
     def __init__(self, machine):
         super().__init__(machine)
         self.names = list(operating_point(machine).model.parameters)
 
     def __call__(self, machine, name=None):
-        """What JavaScript says; `name` is the parameter of the bar."""
+        """Answers of JavaScript; `name` is the parameter of the bar."""
         point = operating_point(machine)
         bar = self.names.index(machine.resolve(name)) if name else -1
         ask = """(() => {
@@ -64,7 +64,7 @@ class ExploredMachine(Explored):
 
 
 def differences(explored, machine, names=()):
-    """How far JavaScript is from Python on a machine: what is not the same, in words; nothing where all is."""
+    """Differences of JavaScript from Python on a machine, in words; empty if there are none."""
     point, found = operating_point(machine), explored(machine)
     expected = int(status(point))
     if expected != found["status"]:
@@ -148,7 +148,7 @@ def same_motion(found, runs, until):
 
 @dataclass
 class Difference:
-    """How far the two are apart: verdicts in a word each, the rest relative."""
+    """Differences of JavaScript and Python: verdicts as words, numbers as relative differences."""
 
     verdicts: tuple
     critical: float

@@ -28,7 +28,7 @@ function edgesAt(values, coarse) {
 
 
 class Edges:
-    """What the page of a rig finds at any values: edges of all parameters, and the list of the nearest."""
+    """Results of the page of a rig at given values: edges of all parameters, and the list of nearest edges."""
 
     def __init__(self, rig):
         self.rig = rig
@@ -70,7 +70,7 @@ def judged(rig):
 
 
 def other_edges(page, values):
-    """What the page finds otherwise than Python at some values, in words; and what it lists."""
+    """Differences of the page from Python at some values, in words, and its list of nearest edges."""
     own, told, wrong = page.own(values), page(values), []
     now, rounding = judged(own)
     for name, value, found in zip(page.names, values, told["found"], strict=True):

@@ -171,7 +171,7 @@ def points(rng):
 
 
 def wrong(seed, count=20, depth=3, refused=0.02):
-    """What differs among some expressions, how many numbers were compared, how many expressions were refused."""
+    """Differences among random expressions, number of values compared, and number of expressions refused."""
     drawn, found, refusals = Random(seed, refused), [], 0
     while len(found) < count:
         try:

@@ -60,7 +60,7 @@ class Firefox:
         return answer
 
     def run(self, script, *arguments):
-        """What a script returns, or what the promise that it returns comes to."""
+        """Return value of a script; that of its promise if it returns one."""
         return self.ask("WebDriver:ExecuteScript", script=script, args=arguments)["value"]
 
     def close(self):

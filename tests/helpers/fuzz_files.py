@@ -46,7 +46,7 @@ LARGE = (0, 1, -1, 2**31 - 1, -(2**31), 2**30, 255, 10**9)
 
 
 class Wrong(Exception):
-    """What came back is not what it should be."""
+    """Error: a file was not read or refused as it should be."""
 
 
 # -- sound files
@@ -404,7 +404,7 @@ def contents(folder):
 
 
 def trial(number, seed, sound, folder):
-    """What became of it: kind, what was done, and a word (opened, message) or what is wrong."""
+    """Outcome of a damaged file: its kind, the damage, and "opened", "message" or the fault."""
     chance = random.Random(f"{seed} {number}")
     name = chance.choice(sorted(BY_KIND))
     change = chance.choice(BY_KIND[name])

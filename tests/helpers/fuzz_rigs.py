@@ -47,7 +47,7 @@ def _alarm(*_: object) -> None:
 
 
 def judged(question: Callable[[], object], seconds: float = SECONDS) -> str:
-    """What is wrong with asking a question, empty if it has an answer or one message within so much processor time."""
+    """Fault of a call; empty if it returns, or raises one message, within the given processor time."""
     signal.signal(signal.SIGPROF, _alarm)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:

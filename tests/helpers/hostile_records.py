@@ -527,7 +527,7 @@ def _(path):
 
 
 def outcome(path, table=None):
-    """What became of a file: ``read`` or a sentence."""
+    """Outcome of reading a file: "read, ... rows" or the error message."""
     import steadyslip as ss
 
     try:

@@ -112,7 +112,7 @@ def pressed(random: np.random.Generator, contact: str) -> object:
 
 
 def by_preload(rig: ss.Slider) -> ss.Slider:
-    """The same rig, its contact described by what presses it, which no change of velocity moves."""
+    """Rig with its contact given by a preload, which does not change with the drive velocity, in place of σss."""
     contact = rig.contact
     if getattr(contact, "steady_normal_stress", None) is None:
         return rig

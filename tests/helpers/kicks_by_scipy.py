@@ -1,4 +1,4 @@
-"""What comes of random kicks by SciPy and equations typed by hand, and by long simulation.
+"""Outcomes of random kicks by SciPy with equations typed by hand, and by long simulation.
 
 The reference integrates x, ln v and ln θ (LuGre: x, v and z) by DOP853, or Radau where it is stiff, and looks at the
 last half of the motion; it shares no equation with the package. `simulated` looks at a long run of the package so.
@@ -157,7 +157,7 @@ def bristle_speed(spring, sigma, z, p):
 
 @njit(cache=False)
 def jumps(start, end, rate_start, rate_end, span, p):
-    """Whether v changes at once between two states, followed by halves: a velocity that balances forces is lost."""
+    """True if v jumps between two states, found by bisection: a velocity that balances forces is lost."""
     p = p.copy()
     low, high, slow = 0.0, 1.0, p[16]
     fast = bristle_speed(*stresses(end[0], p), end[-1], p)
@@ -255,7 +255,7 @@ class Reference:
         return y[1] if p[1] else massless_w(y[0], y[1:], p)
 
     def outcome(self, turns: float = 150.0, limit: float = 8.0) -> str:
-        """What comes of the kick, in the words of `OUTCOMES`; ? where it cannot be told within `limit` seconds."""
+        """Outcome of a kick, one of `OUTCOMES`; "?" if it is open within `limit` seconds of computation."""
         p, y = self.p, self.y
         if stresses(y[0], p)[1] <= 0:
             return "contact lost"
@@ -292,7 +292,7 @@ class Reference:
         return judged(self.away(np.array(speeds))[int(len(times) * self.reload / times[-1]) :])
 
     def lost(self, before: np.ndarray, solver: Radau) -> bool:
-        """Whether the velocity of a block of bristles without mass ceases to balance forces in the last step."""
+        """True if the velocity of a massless block of bristles ceased to balance forces in the last step."""
         p = self.p
         if p[0] != LUGRE or p[1]:
             return False
@@ -320,7 +320,7 @@ class Reference:
         return judged(self.away(speeds)[int(len(times) * self.reload / times[-1]) :])
 
     def rested(self, speeds: list[float], times: np.ndarray) -> bool:
-        """Whether nothing has happened for two periods, after the spring has been taken up again."""
+        """True if nothing has happened for two periods after the spring was loaded again."""
         some = int(2 * self.period / times[1]) + 1
         if len(speeds) * times[1] < self.reload + 4 * self.period or len(speeds) % 20:
             return False
@@ -347,7 +347,7 @@ SEEN_TO_DIE_OUT = 3.0  # decay times that a run must last to tell an oscillation
 
 
 def judged(away: np.ndarray) -> str:
-    """What distances from steady sliding, evenly spread in time, say of the end."""
+    """Outcome from distances from steady sliding at equal time steps."""
     away = np.where(np.isfinite(away), away, 700.0)
     quarters = [np.sqrt(np.mean(part**2)) for part in np.array_split(away, 8)[-4:]]
     before, late = max(quarters[:2]), max(quarters[2:])

@@ -25,7 +25,7 @@ def rig(evolution: ss.Evolution | None = None, alpha: float | None = None, **cha
 
 
 def two_states() -> ss.Slider:
-    """The same with two states."""
+    """Rig whose friction has two states."""
     states = (ss.State(b=0.008, d_c=6e-6), ss.State(b=0.006, d_c=120e-6))
     friction = ss.RateState(a=0.011, states=states, mu_ref=0.62, v_ref=SLOW)
     contact = ss.Constant(steady_normal_stress=STRESS)

@@ -28,7 +28,7 @@ def of_one_body(block, points=POINTS):
 
 
 def apart(own, other):
-    """How far two branches are from each other: relative difference of onset, and of periods at equal values."""
+    """Relative differences of two branches: onset, and periods at equal values."""
     if isinstance(own, str) or isinstance(other, str):
         return 0.0 if isinstance(own, str) == isinstance(other, str) else np.inf
     onset = abs(own.onset.value / other.onset.value - 1)

@@ -219,7 +219,7 @@ def _value(value: Any) -> str:
 
 
 def damaged_text(text: str, chance: random.Random) -> tuple[str, str]:
-    """What no table shows: the same table twice, lines cut off, brackets, marks of order."""
+    """Text of a file with random damage (repeated or cut lines, brackets, byte-order marks), and its name."""
     lines = text.splitlines()
     place = chance.randrange(len(lines))
     what = chance.randrange(8)
@@ -246,11 +246,11 @@ def damaged_text(text: str, chance: random.Random) -> tuple[str, str]:
 
 
 class Wrong(Exception):
-    """What came back is not what it should be."""
+    """Error: a file was not read or refused as it should be."""
 
 
 def trial(number: int, seed: int = 0) -> tuple[str, str]:
-    """What was done to the file, and the verdict or message that came."""
+    """Damage done to a file, and the verdict or message that followed."""
     chance = random.Random(f"{seed} {number}")
     path = chance.choice(EXAMPLES)
     document = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -39,7 +39,7 @@ def outcome(kicked, size):
 
 
 def of_one_body(case):
-    """What comes of a random kick (`kicks_at_random`) of a slider, and of the machine that it is."""
+    """Outcomes of a random kick (`kicks_at_random`) of a slider and of the equivalent machine."""
     kick, at = OF_MACHINE[case.kick]
     machine = Kicked(as_machine(case.rig), kick, case.direction, case.reference, {}, 0, None, at)
     return outcome(case.kicked(), case.size), outcome(machine, case.size)
@@ -90,7 +90,7 @@ def chained(seed):
 
 
 def by_radau(case):
-    """What comes of a kick: 'returns', 'oscillation', or '?' where the motion does not tell."""
+    """Outcome of a kick: 'returns', 'oscillation', or '?' if the motion is not conclusive."""
     machine, kicked = case.machine, case.kicked()
     amount, names = float(kicked.amount(case.size)[0]), list(machine.bodies)
     n = len(names)
@@ -149,7 +149,7 @@ def by_radau(case):
 
 
 def compared(seed):
-    """Of a chain: what the package says, and SciPy."""
+    """Outcomes of a kick of a chain by the package and by SciPy."""
     case = chained(seed)
     kicked = case.kicked()
     if not kicked.exists[0]:

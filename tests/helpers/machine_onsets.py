@@ -74,7 +74,7 @@ def _by_differences(machine, onset):
 
 
 def compared(seed):
-    """How far both coefficients of a random machine are apart beyond what is sure, as a share of the terms they are
+    """Difference of both coefficients of a random machine beyond their error, as a share of the terms they are
     sums of; None where there is nothing to compare.
     """
     machine, _ = at_random(seed)

@@ -215,7 +215,7 @@ def same_block(seed):
 
 
 def renamed(machine):
-    """The same machine, its bodies, links and contacts the other way round and called something else."""
+    """Machine with renamed bodies, links and contacts, in another order."""
     other = {"motor": "zeta", "table": "alpha"}
     ends = lambda link: tuple(other.get(end, end) for end in link.between)  # noqa: E731
     links = {f"l{name}": replace(one, between=ends(one)) for name, one in list(machine.links.items())[::-1]}

@@ -174,7 +174,7 @@ class _Drawn:
                                             mu=level, at_once=level - alpha))  # fmt: skip
 
     def normal_forces(self):
-        """Of every contact in steady sliding: what a controller holds is where it is asked to be."""
+        """Normal forces (N) of all contacts in steady sliding, with a controlled coordinate held at its target."""
         n = self.n
         whole, right = np.eye(n + 1), np.zeros(n + 1)
         whole[:n, :n], right[:n] = self.stiff, np.array(self.force) - self.held_back
@@ -210,13 +210,13 @@ def in_the_plane(seed):
 
 
 def is_root(matrix, s):
-    """Whether a matrix is singular at s, or far nearer to it than next to s."""
+    """True if a matrix is singular at s, or far closer to singular there than beside s."""
     values, near = (np.linalg.svd(matrix(at), compute_uv=False) for at in (s, s * (1 + 1e-5)))
     return bool(values[-1] < 1e-8 * values[0] or values[-1] < 1e-3 * near[-1])
 
 
 def compare(seed):
-    """What comes of a machine: whether it slides, as it must, and whether every eigenvalue is a root; in words."""
+    """Word on the random machine of a seed: "agrees", "no steady sliding", or "WRONG: ..." with the fault."""
     one = in_the_plane(seed)
     found = ss.eigenvalues(one.machine)
     found = found[np.isfinite(found)]

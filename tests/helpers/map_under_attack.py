@@ -61,7 +61,7 @@ def plan(log, pause=0.01):
 
 
 def computed(log):
-    """How often each point was computed."""
+    """Number of times that each point was computed."""
     counts = {}
     for line in Path(log).read_text().splitlines():
         point = tuple(line.split()[:2])

@@ -120,7 +120,7 @@ class Typed:
 
 
 def by_radau(case):
-    """What comes of a kick: 'returns', 'oscillation', or '?' where the motion does not tell."""
+    """Outcome of a kick: 'returns', 'oscillation', or '?' if the motion is not conclusive."""
     typed, kicked = Typed(case.machine), case.kicked()
     amount, n = float(kicked.amount(case.size)[0]), typed.n
     count = int(typed.heavy.sum())
@@ -152,7 +152,7 @@ def by_radau(case):
 
 
 def compared(seed):
-    """Of a chain: what the package says, and SciPy."""
+    """Outcomes of a kick of a chain by the package and by SciPy."""
     case = tied(seed)
     kicked = case.kicked()
     assert len(kicked.rest.reduction.unknowns) >= 2

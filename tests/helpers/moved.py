@@ -48,13 +48,13 @@ def driver():
 
 
 def compiled_run(moving, protocol, until, rtol=1e-7, most_steps=10_000_000):
-    """What compiled kernels make of a rig."""
+    """Results of compiled kernels for a rig."""
     jobs = prepare(moving, protocol, until, {}, {}, Options(rtol=rtol, most_steps=most_steps), 0)
     return run_single(jobs, jobs.runner(lanes=1, dense=True), np.linspace(0, until, 41), watch=True, record=False)
 
 
 def moved(moving, protocol, until, most_steps=10_000_000):
-    """The same tables through compiled kernels, with a finer tolerance too, and through JavaScript."""
+    """Results of given tables by compiled kernels, also with a finer tolerance, and by JavaScript."""
     times = np.linspace(0, until, 41)
     outcomes = []
     for rtol in (1e-7, 1e-9):

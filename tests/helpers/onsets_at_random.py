@@ -16,7 +16,7 @@ from steadyslip.core.dimensions import unit
 
 
 def in_units(rig, length, force, time):
-    """The same rig in units so many metres, newtons and seconds large; radians stay."""
+    """Rig with all numbers in other units of length (m), force (N) and time (s); radians stay."""
     mass = force * time**2 / length
 
     def factor(role):
@@ -100,7 +100,7 @@ def compared(seed):
 
 
 def alike(kinds):
-    """Whether kinds are the same wherever they are decided."""
+    """True if all kinds of onset that are decided agree."""
     return len({*kinds} - {"not decided"}) <= 1
 
 

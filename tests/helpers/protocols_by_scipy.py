@@ -22,7 +22,7 @@ SHAPES = {
     "injection": ("Injection", 0.08, ("Step", "Pulse", "Ramp", "Table")),
     "creep": ("Creep", 0.1, ("Step", "Ramp", "Table")),
 }
-"""Of every channel beside the drive: what its pieces are called, how large they are, and their shapes."""
+"""Names, sizes and shapes of the pieces of every channel other than the drive."""
 
 
 class RandomProtocol:
@@ -78,7 +78,7 @@ class RandomProtocol:
         return law(at=self._when(), by=by, **length)
 
     def _motion(self):
-        """What sets the velocity, in the order of time; waves and jumps of the load point."""
+        """Pieces that set the velocity, in order of time; waves and jumps of the load point."""
         now, found = 0.0, []
         for kind in self.random.choice(["step", "ramp", "hold"], self.random.integers(0, 3)):
             at, length = now + float(self.random.integers(0, 6)) / 4, float(self.random.integers(1, 6)) / 4
@@ -116,7 +116,7 @@ def edges(pieces):
 
 
 def value(piece, t, inside):
-    """What a piece that adds up gives at t, on the side of its edges on which `inside` is."""
+    """Value at time t of an additive piece; at its edges that of the side of `inside`."""
     name = type(piece).__name__
     if name.endswith("Harmonic"):
         on = piece.at <= inside < (piece.until or np.inf)
@@ -189,7 +189,7 @@ def solved(case, pieces, times=TIMES):
 
 
 def louder(pieces, factor):
-    """The same with every amplitude and change multiplied."""
+    """Protocol with every amplitude and change multiplied by a factor."""
     names = ("amplitude", "by")
     return [
         replace(one, **{name: factor * getattr(one, name) for name in names if hasattr(one, name)}) for one in pieces

@@ -30,5 +30,5 @@ class Balanced(HTMLParser):
 
 
 def words(text):
-    """What a reader sees, elements checked on the way."""
+    """Visible text of a page, with its elements checked."""
     return re.sub(r"\s+", " ", " ".join(Balanced(text.replace("<wbr>", "")).words))

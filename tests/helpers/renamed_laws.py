@@ -23,7 +23,7 @@ WORDS = """
     event event_time velocity stiffness mass damping a1 σ_ß R row parameter_000 at_000_memory_000
 """
 NAMES = WORDS.split()
-"""What the equations, the printers, SymPy, LLVM, JavaScript, TOML, NumPy and xarray have meanings for."""
+"""Names with a meaning in equations, printers, SymPy, LLVM, JavaScript, TOML, NumPy or xarray."""
 
 
 @cache
@@ -86,7 +86,7 @@ def renamed(own=(), contact=None, **slider):
 
 
 def machine(own=(), mass=1e3):
-    """The same laws in a machine of two bodies."""
+    """Machine of two bodies with the given laws."""
     rig = renamed(own)
     surface = {"friction": rig.friction, "contact": rig.contact}
     return ss.Machine(

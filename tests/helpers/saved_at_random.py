@@ -38,7 +38,7 @@ EXTREMES = (5e-324, 2.2250738585072014e-308, 1e-300, 1e300, 1.7976931348623157e3
 
 
 def differs(own, other, at=""):
-    """Where two things differ, in type, in keys or in one bit of a number; empty if nowhere."""
+    """Path of the first difference of two objects, in type, keys or one bit of a number; empty if there is none."""
     if type(own) is not type(other):
         return f"{at}: {type(own).__name__} and {type(other).__name__}"
     if isinstance(own, float):
@@ -63,7 +63,7 @@ def differs(own, other, at=""):
 
 
 def plain(data):
-    """What is wrong with plain data as JSON: nothing but null for what is no number, and it reads back the same."""
+    """Fault of plain data as JSON (NaN must be null, and data must read back unchanged); empty if there is none."""
     try:
         text = json.dumps(data, allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -72,7 +72,7 @@ def plain(data):
 
 
 def listed(data):
-    """The same with lists for tuples."""
+    """Data with tuples replaced by lists."""
     if isinstance(data, dict):
         return {name: listed(one) for name, one in data.items()}
     return [listed(one) for one in data] if isinstance(data, (list, tuple)) else data
@@ -319,7 +319,7 @@ def populations(random, folder):
 
 
 def saved_twice(one, load, path):
-    """What is not the same in what is read back; fits by their files, which are written once more."""
+    """Differences of a result after writing and reading; fits are compared by files written again."""
     one.save(path)
     content, again = path.read_bytes(), load(path)
     again.save(path)
@@ -338,7 +338,7 @@ CAMPAIGNS = {
 
 
 def found(what, count, seed):
-    """What differs, case by case."""
+    """Differences of each case."""
     with tempfile.TemporaryDirectory() as folder:
         for i in range(count):
             random = np.random.default_rng([seed, i, sorted(CAMPAIGNS).index(what)])

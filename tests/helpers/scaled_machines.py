@@ -82,7 +82,7 @@ def apart(own, other):
 
 
 def same(random):
-    """How far a random machine's answers are from those in other units and another order."""
+    """Numbers of a random machine, its units, and largest change of its answers in other units and order."""
     numbers = drawn(random)
     length, force, time = 10.0 ** random.uniform(-6, 4, 3)
     own = answers(numbers)

@@ -76,7 +76,7 @@ def _protocol(rng: np.random.Generator, rig: ss.Slider) -> ss.Protocol:
 
 
 def _noise(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Of friction: 1e-4 to 4e-4, in every other record correlated from sample to sample."""
+    """Noise of friction with standard deviation 1e-4 to 4e-4, correlated in every other record."""
     size, memory = 10 ** rng.uniform(-4, -3.4), rng.choice([0.0, 0.5])
     fresh = rng.standard_normal(count)
     found = fresh.copy()

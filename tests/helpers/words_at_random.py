@@ -74,7 +74,7 @@ def some_rig(rng):
 
 
 def eigenvalues_of(rig):
-    """Of the Jacobian of the equations of motion; None without steady sliding or where they are ill-posed."""
+    """Eigenvalues of the Jacobian of the equations of motion; None without steady sliding or if ill-posed."""
     try:
         return np.linalg.eigvals(jacobian(rig))
     except NoSteadySliding:
@@ -82,7 +82,7 @@ def eigenvalues_of(rig):
 
 
 def fate(rig):
-    """What becomes of small disturbances: stable, oscillation, growth, absent or ill-posed."""
+    """Fate of small disturbances as a word: stable, oscillation, growth, absent or ill-posed."""
     try:
         rates = ss.eigenvalues(rig)
         if np.isinf(ss.growth_rate(rig)):
@@ -153,7 +153,7 @@ def _same_side(rig, verdict):
 
 
 def _stiffness(rig, verdict, text):
-    """What is said of all stiffnesses, at many of them."""
+    """Faults of a sentence on all stiffnesses, found at many of them."""
     edges = [end for pair in verdict.stable_stiffness for end in pair if 0 < end < math.inf]
     size = rig.stiffness
     tried = np.unique(
@@ -197,7 +197,7 @@ def _edges(rig, verdict, text):
 
 
 def _beside(rig, margin, own, words, share):
-    """What is wrong with an edge at two places this share of its value away."""
+    """Faults of an edge, from the verdicts at two values this share of the edge away from it."""
     step = min(share * abs(margin.edge.value or margin.value), 0.5 * abs(margin.absolute))
     step = math.copysign(step, margin.absolute)
     before, beyond = (changed(rig, margin.parameter, margin.edge.value + s) for s in (-step, step))

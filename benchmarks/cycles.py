@@ -44,7 +44,7 @@ def random_rig(index: int, seed: int) -> tuple[str, ss.Slider]:
 def lugre(rng: np.random.Generator, law: str, inertia: str, contact: str) -> ss.Slider:
     """Bristles of every damping, at speeds around that of Stribeck."""
     sigma, static, v_stribeck = 10 ** rng.uniform(6, 7.5), rng.uniform(0.15, 0.5), 10 ** rng.uniform(-3.5, -2.5)
-    friction = ss.LuGre(
+    friction = ss.laws.LuGre(
         mu_coulomb=static * rng.uniform(0.5, 0.9), mu_static=static, v_stribeck=v_stribeck,
         bristle_stiffness=10 ** rng.uniform(4, 5.5), bristle_damping=10 ** rng.uniform(0.5, 2),
         viscous=10 ** rng.uniform(-1, 1),
@@ -54,15 +54,19 @@ def lugre(rng: np.random.Generator, law: str, inertia: str, contact: str) -> ss.
     if inertia == "damping":
         still = {"radiation_damping": 10 ** rng.uniform(-6, -3) * sigma / v0}
     return ss.Slider(
-        friction=friction, contact=pressed(rng, sigma, contact), stiffness=1e10, drive=ss.Steady(v0), **still
+        friction=friction,
+        contact=pressed(rng, sigma, contact),
+        stiffness=1e10,
+        drive=ss.machine.SteadyDrive(v0),
+        **still,
     )
 
 
 def pressed(rng: np.random.Generator, sigma: float, contact: str) -> object:
     """A contact of either kind."""
     if contact == "inclined":
-        return ss.InclinedSpring(preload=sigma, angle=rng.uniform(-0.6, 0.6))
-    return ss.Constant(preload=sigma)
+        return ss.laws.InclinedSpring(preload=sigma, angle=rng.uniform(-0.6, 0.6))
+    return ss.laws.ConstantNormalStress(preload=sigma)
 
 
 def rate_state(rng: np.random.Generator, law: str, inertia: str, contact: str) -> ss.Slider:
@@ -73,12 +77,15 @@ def rate_state(rng: np.random.Generator, law: str, inertia: str, contact: str) -
     more: dict[str, object] = {"b": b, "d_c": d_c}
     if law == "two states":
         share = rng.uniform(0.3, 0.7)
-        states = (ss.State(b=b * share, d_c=d_c), ss.State(b=b * (1 - share), d_c=d_c * 10 ** rng.uniform(0.3, 1.3)))
+        states = (
+            ss.laws.State(b=b * share, d_c=d_c),
+            ss.laws.State(b=b * (1 - share), d_c=d_c * 10 ** rng.uniform(0.3, 1.3)),
+        )
         more = {"states": states}
-    evolution = {"aging": ss.Aging(), "slip": ss.Slip(), "prz": ss.PRZ(), "two states": ss.Slip(),
-                 "nagata": ss.Nagata(c_nagata=rng.uniform(0.1, 1.0))}[law]  # fmt: skip
-    memory = ss.LinkerDieterich(alpha=rng.uniform(0.1, 0.5)) if contact == "inclined" else ss.NoMemory()
-    friction = ss.RateState(a=a, mu_ref=0.6, v_ref=v0, evolution=evolution, normal_memory=memory, **more)
+    evolution = {"aging": ss.laws.Aging(), "slip": ss.laws.Slip(), "prz": ss.laws.PRZ(), "two states": ss.laws.Slip(),
+                 "nagata": ss.laws.Nagata(c_nagata=rng.uniform(0.1, 1.0))}[law]  # fmt: skip
+    memory = ss.laws.LinkerDieterich(alpha=rng.uniform(0.1, 0.5)) if contact == "inclined" else ss.laws.NoMemory()
+    friction = ss.laws.RateState(a=a, mu_ref=0.6, v_ref=v0, evolution=evolution, normal_memory=memory, **more)
     press = pressed(rng, sigma, contact)
     size = 10 ** rng.uniform(-6, -1)
     still = (
@@ -87,23 +94,26 @@ def rate_state(rng: np.random.Generator, law: str, inertia: str, contact: str) -
         else {"mass": size * a * sigma * d_c / v0**2}
     )
     stiffness = 0.8 * b * lam / (1 + lam) * sigma / d_c
-    return ss.Slider(friction=friction, contact=press, stiffness=stiffness, drive=ss.Steady(v0), **still)
+    return ss.Slider(friction=friction, contact=press, stiffness=stiffness, drive=ss.machine.SteadyDrive(v0), **still)
 
 
 def aging_rig(index: int) -> tuple[str, ss.Slider]:
     """λ and H of the aging law at constant normal stress."""
     lam = 0.25 * (1 + index % 8)
     damping = 10.0 ** (-2 * (1 + index // 8))
-    friction = ss.RateState(a=0.01, b=0.01 * (1 + lam), d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.Aging())
-    rig = ss.Slider(friction=friction, contact=ss.Constant(preload=1e7), stiffness=lam * 1e5 / 1e-5 * 0.9,
-                    radiation_damping=damping * 1e5 / 1e-6, drive=ss.Steady(1e-6))  # fmt: skip
+    friction = ss.laws.RateState(
+        a=0.01, b=0.01 * (1 + lam), d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.Aging()
+    )
+    rig = ss.Slider(friction=friction, contact=ss.laws.ConstantNormalStress(preload=1e7),
+        stiffness=lam * 1e5 / 1e-5 * 0.9,
+                    radiation_damping=damping * 1e5 / 1e-6, drive=ss.machine.SteadyDrive(1e-6))  # fmt: skip
     return f"aging, λ = {lam:g}, H = {damping:.0e}", rig
 
 
 def simulated_period(rig: ss.Slider, natural: float) -> float | str:
     """The period after which peaks and the times between them repeat themselves to 1e-7, or what happens instead."""
     until, friction = 300 * natural, rig.friction
-    start = {"x": -2.0 * (friction.d_c or friction.states[0].d_c) if isinstance(friction, ss.RateState) else 1e-6}
+    start = {"x": -2.0 * (friction.d_c or friction.states[0].d_c) if isinstance(friction, ss.laws.RateState) else 1e-6}
     begun = time.process_time()
     while time.process_time() - begun < 3.0:
         run = ss.simulate(rig, until=until, initial=start, rtol=1e-9)
@@ -131,7 +141,7 @@ def times_round(gaps: np.ndarray) -> int:
     return 1
 
 
-def judged(branch: ss.CycleBranch | None, value: float, truth: float | str) -> tuple[str, float]:
+def judged(branch: ss.nonlinear.CycleBranch | None, value: float, truth: float | str) -> tuple[str, float]:
     """What a branch says at a value, against the truth; and the relative error of the period."""
     if not isinstance(truth, float):
         return "undecided", np.nan

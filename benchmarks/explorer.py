@@ -57,8 +57,8 @@ CHANGES = ({}, {"stiffness": 0.01}, {"stiffness": 100.0}, {"drive.velocity": 30.
 BAR = 1e-12
 
 
-LAWS = [*FRICTION, ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3), users_laws.FRICTION]
-PRESSED = [*CONTACTS, ss.Prescribed(preload=5e6, amplitude=1e5, period=3.0), users_laws.CONTACT]
+LAWS = [*FRICTION, ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3), users_laws.FRICTION]
+PRESSED = [*CONTACTS, ss.laws.Prescribed(preload=5e6, amplitude=1e5, period=3.0), users_laws.CONTACT]
 
 
 def kinds(seed: int = 16) -> Iterator[tuple[str, ss.Slider]]:
@@ -95,7 +95,7 @@ def motion(first: int) -> None:
     count = wrong = chance = late = refused = events = 0
     worst = 0.0
     for words, rig in itertools.islice(kinds(), first):
-        protocol, until = ss.VelocityStep(at=1.0, to=2e-6), 30.0
+        protocol, until = ss.protocol.VelocityStep(at=1.0, to=2e-6), 30.0
         if not np.all(well_posed(operating_point(rig))):
             refused += 1  # as everywhere
             continue
@@ -157,7 +157,7 @@ def machines(first: int) -> None:
         except ss.NotAvailable:
             refused += 1
             continue
-        piece = ss.VelocityStep(at=1.0, to=2.0)
+        piece = ss.protocol.VelocityStep(at=1.0, to=2.0)
         runs = [ss.simulate(machine, piece, until=8.0, rtol=rtol) for rtol in (1e-6, 1e-9)]
         moved_ones += 1
         try:

@@ -30,18 +30,18 @@ STIFFNESS = 2e10
 def rig_of(law: str, states: int = 1, **numbers: float) -> ss.Slider:
     """The rig that makes records."""
     values = TRUTH | numbers
-    evolution = {"slip": ss.Slip, "aging": ss.Aging}[law]()
+    evolution = {"slip": ss.laws.Slip, "aging": ss.laws.Aging}[law]()
     stiffness, stress = values.pop("stiffness", STIFFNESS), values.pop("stress", STRESS)
     alpha = values.pop("alpha", None)
-    memory = ss.NoMemory() if alpha is None else ss.LinkerDieterich(alpha=alpha)
+    memory = ss.laws.NoMemory() if alpha is None else ss.laws.LinkerDieterich(alpha=alpha)
     if states == 2:
         b, d_c = values.pop("b"), values.pop("d_c")
-        pair = (ss.State(b=0.6 * b, d_c=d_c), ss.State(b=0.4 * b, d_c=12 * d_c))
-        friction = ss.RateState(**values, states=pair, v_ref=SLOW, evolution=evolution, normal_memory=memory)
+        pair = (ss.laws.State(b=0.6 * b, d_c=d_c), ss.laws.State(b=0.4 * b, d_c=12 * d_c))
+        friction = ss.laws.RateState(**values, states=pair, v_ref=SLOW, evolution=evolution, normal_memory=memory)
     else:
-        friction = ss.RateState(**values, v_ref=SLOW, evolution=evolution, normal_memory=memory)
-    contact = ss.Constant(steady_normal_stress=stress)
-    return ss.Slider(friction=friction, contact=contact, stiffness=stiffness, drive=ss.Steady(SLOW))
+        friction = ss.laws.RateState(**values, v_ref=SLOW, evolution=evolution, normal_memory=memory)
+    contact = ss.laws.ConstantNormalStress(steady_normal_stress=stress)
+    return ss.Slider(friction=friction, contact=contact, stiffness=stiffness, drive=ss.machine.SteadyDrive(SLOW))
 
 
 def record_of(rig: ss.Slider, protocol: ss.Protocol, rng: np.random.Generator, samples: int = SAMPLES) -> Any:
@@ -70,7 +70,7 @@ def rates(y: np.ndarray, t: float, a: float, b: float, d: float, mu: float, k: f
     return np.array([(stress - b * state) / a, stress])
 
 
-def rival(record: ss.Record, step: float, solver: str) -> tuple[float, Any]:
+def rival(record: ss.experiments.Record, step: float, solver: str) -> tuple[float, Any]:
     """SciPy from ten per cent beside the truth, by either of its two interfaces to LSODA."""
     before = record.time < step
 
@@ -108,7 +108,7 @@ def measured_rates(
     return np.array([k * (load[i] - v), -v / d * (u + y[1])])
 
 
-def measured_rival(record: ss.Record) -> tuple[float, Any]:
+def measured_rival(record: ss.experiments.Record) -> tuple[float, Any]:
     """SciPy on a measured history, which breaks off at every sample; from ten per cent beside our minimum."""
     assert record.displacement is not None
     assert record.normal is not None
@@ -136,7 +136,7 @@ def measured_rival(record: ss.Record) -> tuple[float, Any]:
 def speed() -> None:
     """One velocity step, five parameters."""
     step = 60.13
-    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=step, to=FAST),), until=150.0)
+    protocol = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=step, to=FAST),), until=150.0)
     record = record_of(rig_of("slip"), protocol, np.random.default_rng(2))
     guess = ss.lab_rig()
     fit = ss.fit(guess, record)
@@ -153,7 +153,7 @@ def speed() -> None:
         text = f"ssq {2 * found.cost:.9e}, {theirs / ours:.1f} x ours"
         print(f"    LSODA by {solver:<10}                 {1e3 * theirs:8.1f} ms   {text}")
     count = 4 if QUICK else 1000
-    seconds = _timed(lambda: ss.bootstrap(fit, count))
+    seconds = _timed(lambda: ss.experiments.bootstrap(fit, count))
     print(f"{count} warm refits of it                  {seconds:8.2f} s")
     path = Path(__file__).parents[1] / "examples" / "data" / "basalt_b819_velocity_step.txt"
     few = ss.read_record(path, between=(11674, 11680))
@@ -167,7 +167,7 @@ def speed() -> None:
     print(f"  steadyslip, no guess                  {1e3 * ours:8.1f} ms   ssq {basalt.ssq:.9e}")
     print(f"  SciPy on LSODA, 10 % beside it        {1e3 * theirs:8.1f} ms   ssq {2 * found.cost:.9e}")
     print(f"  ratio                                 {theirs / ours:8.1f}")
-    seconds = _timed(lambda: ss.bootstrap(basalt, count))
+    seconds = _timed(lambda: ss.experiments.bootstrap(basalt, count))
     print(f"{count} block-bootstrap refits of it       {seconds:8.2f} s")
 
 
@@ -189,19 +189,19 @@ def random_case(rng: np.random.Generator, kind: str, law: str) -> tuple[ss.Slide
     rig = rig_of(law, states, stiffness=kappa * a * stress / d_c, **numbers)
     unit, ratio = d_c / SLOW, rng.choice([0.1, 1 / 3, 3.0, 10.0])
     at, later = 10 * unit, unit / ratio
-    pieces: list[Any] = [ss.VelocityStep(at=at, to=ratio * SLOW)]
+    pieces: list[Any] = [ss.protocol.VelocityStep(at=at, to=ratio * SLOW)]
     end = at + (20 if states == 1 else 300) * later
     if kind == "slide-hold-slide":
-        pieces.append(ss.Hold(at=end, duration=30 * later))
+        pieces.append(ss.protocol.Hold(at=end, duration=30 * later))
         end += 55 * later
     elif kind == "normal step":
-        pieces.append(ss.NormalStressStep(at=end, by=0.1 * stress * rng.choice([-1, 1])))
+        pieces.append(ss.protocol.NormalStressStep(at=end, by=0.1 * stress * rng.choice([-1, 1])))
         end += 25 * later
     elif kind == "normal pulse":
-        pieces.append(ss.NormalStressPulse(at=end, by=0.05 * stress, duration=10 * later))
+        pieces.append(ss.protocol.NormalStressPulse(at=end, by=0.05 * stress, duration=10 * later))
         end += 35 * later
     elif kind == "normal harmonic":
-        pieces.append(ss.NormalStressHarmonic(at=end, amplitude=0.02 * stress, period=6 * later))
+        pieces.append(ss.protocol.NormalStressHarmonic(at=end, amplitude=0.02 * stress, period=6 * later))
         end += 40 * later
     return rig, ss.Protocol(pieces=tuple(pieces), until=end)
 
@@ -242,14 +242,14 @@ def robustness(count: int) -> None:
     print(f"the best minimum was found in {best} of {total} fits ({100 * best / total:.2f} %)")
 
 
-def _against_truth(fit: ss.Fit, rig: ss.Slider, protocol: ss.Protocol) -> tuple[np.ndarray, np.ndarray]:
+def _against_truth(fit: ss.experiments.Fit, rig: ss.Slider, protocol: ss.Protocol) -> tuple[np.ndarray, np.ndarray]:
     """Deviations in standard errors of what is determined, and the coordinates of the truth."""
     known = {name: a.value for name, a in rig.parameters().items()}
     times: list[float] = []
     for piece in protocol.pieces:
-        if isinstance(piece, (ss.NormalStressStep, ss.NormalStressPulse)):
+        if isinstance(piece, (ss.protocol.NormalStressStep, ss.protocol.NormalStressPulse)):
             times.append(piece.at)
-        if isinstance(piece, ss.NormalStressPulse):
+        if isinstance(piece, ss.protocol.NormalStressPulse):
             times.append(piece.at + piece.duration)
     z = fit.coordinates.copy()
     for i, one in enumerate(fit.space.unknowns):

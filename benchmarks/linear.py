@@ -49,9 +49,13 @@ def side_by_side(ours: Callable[[], Any], other: Callable[[], Any], runs: int = 
 
 
 def paper_rig(**changes: Any) -> ss.Slider:
-    rock = ss.RateState(a=A, b=B, d_c=D_C, mu_ref=MU, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=ALPHA))
-    spring = ss.InclinedSpring(preload=PRELOAD, angle=0.0)
-    return ss.Slider(**({"friction": rock, "contact": spring, "stiffness": 9e9, "drive": ss.Steady(1e-6)} | changes))
+    rock = ss.laws.RateState(
+        a=A, b=B, d_c=D_C, mu_ref=MU, v_ref=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=ALPHA)
+    )
+    spring = ss.laws.InclinedSpring(preload=PRELOAD, angle=0.0)
+    return ss.Slider(
+        **({"friction": rock, "contact": spring, "stiffness": 9e9, "drive": ss.machine.SteadyDrive(1e-6)} | changes)
+    )
 
 
 def typed(angle: Any, a: Any = A, m_star: Any = None) -> Any:
@@ -88,20 +92,20 @@ def closed_form(count: int) -> None:
 
 
 def three_states() -> dict[str, ss.Slider]:
-    two = ss.RateState(
+    two = ss.laws.RateState(
         a=0.01,
         mu_ref=0.6,
         v_ref=1e-6,
-        states=[ss.State(b=0.008, d_c=1e-6), ss.State(b=0.006, d_c=2e-5)],
-        normal_memory=ss.LinkerDieterich(alpha=0.3),
+        states=[ss.laws.State(b=0.008, d_c=1e-6), ss.laws.State(b=0.006, d_c=2e-5)],
+        normal_memory=ss.laws.LinkerDieterich(alpha=0.3),
     )
-    three = ss.RateState(
+    three = ss.laws.RateState(
         a=0.01,
         mu_ref=0.6,
         v_ref=1e-6,
-        states=[ss.State(b=0.008, d_c=1e-6), ss.State(b=0.006, d_c=2e-5), ss.State(b=0.002, d_c=1e-4)],
-        evolution=ss.Aging(),
-        normal_memory=ss.LinkerDieterich(alpha=0.3),
+        states=[ss.laws.State(b=0.008, d_c=1e-6), ss.laws.State(b=0.006, d_c=2e-5), ss.laws.State(b=0.002, d_c=1e-4)],
+        evolution=ss.laws.Aging(),
+        normal_memory=ss.laws.LinkerDieterich(alpha=0.3),
     )
     return {
         "one state with mass (x, v, Ψ)": paper_rig(mass=1e9),

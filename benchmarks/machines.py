@@ -22,7 +22,7 @@ from machines import at_random, same_block, three_bodies
 from moving_machines import slopes_of_motion
 from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
-from steadyslip.model import operating_point
+from steadyslip.model.point import operating_point
 
 APART = 1e-3  # of the terms that a cubic coefficient is the sum of
 SINGULAR = 1e-8  # smallest over largest singular value of the matrix at an eigenvalue
@@ -76,9 +76,9 @@ def motions(count, first):
     for seed in range(first, first + count):
         block, machine = same_block(seed)
         pieces = [
-            ss.VelocityStep(at=0.5, to=1.3),
-            ss.DisturbanceStep(at=1.0, by=0.02),
-            ss.NormalStressStep(at=2.0, by=0.05),
+            ss.protocol.VelocityStep(at=0.5, to=1.3),
+            ss.protocol.DisturbanceStep(at=1.0, by=0.02),
+            ss.protocol.NormalStressStep(at=2.0, by=0.05),
         ]
         try:
             own = ss.simulate(block, pieces, times=times_of, until=20.0)

@@ -116,24 +116,25 @@ def stability(points: int) -> ss.Map:
     n = round(points**0.5)
     return ss.Map(
         ss.read_rig(RIG),
-        {"angle": ss.Grid("-80 deg", "80 deg", n), "stiffness": ss.Grid("0.1 GPa/m", "100 GPa/m", n, "log")},
+        {"angle": ss.maps.Grid("-80 deg", "80 deg", n), "stiffness": ss.maps.Grid("0.1 GPa/m", "100 GPa/m", n, "log")},
         compute=["status", "critical_stiffness", "growth_rate"],
     )
 
 
 def stick_slip(points: int) -> ss.Map:
     """Radiation-damped stick-slip with aging, lengths in d_c and times in d_c/v0, started by a step of 10 %."""
-    friction = ss.RateState(a=0.01, b=0.015, d_c=1.0, mu_ref=0.6, v_ref=1.0, evolution=ss.Aging())
+    friction = ss.laws.RateState(a=0.01, b=0.015, d_c=1.0, mu_ref=0.6, v_ref=1.0, evolution=ss.laws.Aging())
     rig = ss.Slider(
-        friction=friction, contact=ss.Constant(preload=1.0), stiffness=0.003, drive=ss.Steady(1.0),
+        friction=friction, contact=ss.laws.ConstantNormalStress(preload=1.0), stiffness=0.003,
+        drive=ss.machine.SteadyDrive(1.0),
         radiation_damping=1e-8,
     )  # fmt: skip
     n = round(points**0.5)
     return ss.Map(
         rig,
-        {"stiffness": ss.Grid(0.0025, 0.004, n), "friction.b": ss.Grid(0.0145, 0.0155, n)},
-        compute=[ss.Events(until=800.0)],
-        protocol=ss.VelocityStep(at=0.0, to=1.1),
+        {"stiffness": ss.maps.Grid(0.0025, 0.004, n), "friction.b": ss.maps.Grid(0.0145, 0.0155, n)},
+        compute=[ss.maps.Events(until=800.0)],
+        protocol=ss.protocol.VelocityStep(at=0.0, to=1.1),
     )
 
 

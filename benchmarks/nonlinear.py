@@ -22,13 +22,15 @@ POINTS, TIMES = (1, 1) if QUICK else (100, 3)
 
 def paper_rig(angle: float, damping_share: float = 0.0) -> ss.Slider:
     """The paper's inclined spring; radiation damping in units of aσ0/v0."""
-    rock = ss.RateState(
-        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.Slip(),
-        normal_memory=ss.LinkerDieterich(alpha=0.56),
+    rock = ss.laws.RateState(
+        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.laws.Slip(),
+        normal_memory=ss.laws.LinkerDieterich(alpha=0.56),
     )  # fmt: skip
-    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(angle))
+    contact = ss.laws.InclinedSpring(preload=5e6, angle=np.radians(angle))
     damping = damping_share * 0.0145 * 5e6 / 1e-6
-    return ss.Slider(friction=rock, contact=contact, stiffness=9e9, radiation_damping=damping, drive=ss.Steady(1e-6))
+    return ss.Slider(
+        friction=rock, contact=contact, stiffness=9e9, radiation_damping=damping, drive=ss.machine.SteadyDrive(1e-6)
+    )
 
 
 def timed(work: Callable[[], Any], times: int = TIMES) -> tuple[float, Any]:
@@ -57,7 +59,9 @@ def bisected(rig: ss.Slider, low: float = 1.0, high: float = 6.0) -> float:
     """Threshold of a velocity step by single runs."""
     while high - low > (1e-3 if QUICK else 1e-8) * high:
         middle = 0.5 * (low + high)
-        run = ss.simulate(rig, ss.VelocityStep(at=0.0, to=1e-6 * np.exp(middle)), until=600.0, rtol=1e-10, events=False)
+        run = ss.simulate(
+            rig, ss.protocol.VelocityStep(at=0.0, to=1e-6 * np.exp(middle)), until=600.0, rtol=1e-10, events=False
+        )
         low, high = (low, middle) if run.status == "blow-up" else (middle, high)
     return low
 

@@ -32,14 +32,16 @@ class Problem:
     def rig(self) -> ss.Slider:
         """The first variant, lengths in d_c and times in d_c/v0."""
         kappa, a, b, mu, alpha, slope, extra = self.variants[0]
-        memory = ss.LinkerDieterich(alpha=alpha, sigma_ref=1.0) if alpha else ss.NoMemory()
-        evolution = ss.Slip() if self.law == "slip" else ss.Aging()
-        friction = ss.RateState(a=a, b=b, d_c=1.0, mu_ref=mu, v_ref=1.0, evolution=evolution, normal_memory=memory)
-        contact: Any = ss.Constant(preload=1.0)
+        memory = ss.laws.LinkerDieterich(alpha=alpha, sigma_ref=1.0) if alpha else ss.laws.NoMemory()
+        evolution = ss.laws.Slip() if self.law == "slip" else ss.laws.Aging()
+        friction = ss.laws.RateState(a=a, b=b, d_c=1.0, mu_ref=mu, v_ref=1.0, evolution=evolution, normal_memory=memory)
+        contact: Any = ss.laws.ConstantNormalStress(preload=1.0)
         if slope:
-            contact = ss.InclinedSpring(steady_normal_stress=1.0, angle=float(np.arctan(slope)))
+            contact = ss.laws.InclinedSpring(steady_normal_stress=1.0, angle=float(np.arctan(slope)))
         masses = {"mass": extra} if self.inertial else {"radiation_damping": extra}
-        return ss.Slider(friction=friction, contact=contact, stiffness=kappa, drive=ss.Steady(1.0), **masses)
+        return ss.Slider(
+            friction=friction, contact=contact, stiffness=kappa, drive=ss.machine.SteadyDrive(1.0), **masses
+        )
 
     def vary(self, count: int) -> dict[str, np.ndarray]:
         """Arguments of simulate_many for the first `count` variants."""

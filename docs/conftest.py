@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from steadyslip import ContactLaw, FrictionLaw, NormalMemory
+from steadyslip.laws import ContactLaw, FrictionLaw, NormalMemory
 
 os.environ["MPLBACKEND"] = "Agg"
 

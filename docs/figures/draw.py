@@ -40,14 +40,16 @@ MEASURED = {0.89: 0.080, 0.78: 1.42, 0.75: 2.60}  # κ: mm/s; Leeman et al. 2016
 
 def fault(evolution, mass=500, **cutoffs):
     """The rig of the page on slow slip."""
-    rock = ss.RateState(a=0.006, b=0.010, d_c=8 * um, mu_ref=0.6, v_ref=10 * um / s, evolution=evolution, **cutoffs)
-    face, drive = ss.Constant(preload=10 * MPa), ss.Steady(10 * um / s)
+    rock = ss.laws.RateState(
+        a=0.006, b=0.010, d_c=8 * um, mu_ref=0.6, v_ref=10 * um / s, evolution=evolution, **cutoffs
+    )
+    face, drive = ss.laws.ConstantNormalStress(preload=10 * MPa), ss.machine.SteadyDrive(10 * um / s)
     return ss.Slider(friction=rock, contact=face, stiffness=1 * GPa / m, mass=mass, drive=drive)
 
 
 def peaks(rig):
     """Peak velocities (mm/s) over `KAPPAS`, after the motion has settled."""
-    kick = [ss.VelocityStep(at=0.1, to=10.5 * um / s), ss.VelocityStep(at=0.2, to=10 * um / s)]
+    kick = [ss.protocol.VelocityStep(at=0.1, to=10.5 * um / s), ss.protocol.VelocityStep(at=0.2, to=10 * um / s)]
     found = []
     for kappa in KAPPAS:
         softer = rig.with_values({"stiffness": kappa * ss.critical_stiffness(rig)})
@@ -59,10 +61,10 @@ def peaks(rig):
 def slow_slip():
     (ax,) = panels(62)
     rows = (
-        (fault(ss.Aging()), "a, b constant", "-", "o"),
-        (fault(ss.Aging(), mass=5e6), "the same, $10^4$ times the mass", ":", "^"),
-        (fault(ss.Aging(), b_cutoff_velocity=1000 * um / s), "$v_b$ = 1000 µm/s, aging", "--", "s"),
-        (fault(ss.Slip(), b_cutoff_velocity=300 * um / s), "$v_b$ = 300 µm/s, slip", "-.", "D"),
+        (fault(ss.laws.Aging()), "a, b constant", "-", "o"),
+        (fault(ss.laws.Aging(), mass=5e6), "the same, $10^4$ times the mass", ":", "^"),
+        (fault(ss.laws.Aging(), b_cutoff_velocity=1000 * um / s), "$v_b$ = 1000 µm/s, aging", "--", "s"),
+        (fault(ss.laws.Slip(), b_cutoff_velocity=300 * um / s), "$v_b$ = 300 µm/s, slip", "-.", "D"),
     )
     for rig, label, line, mark in rows:
         ax.plot(KAPPAS, peaks(rig), line, marker=mark, color=BLACK, markerfacecolor="white", label=label)
@@ -77,17 +79,17 @@ def slow_slip():
 
 def bench(memory):
     """A rock between faces that are driven so stiffly that it slides at a given velocity."""
-    rock = ss.RateState(a=0.010, b=0.015, d_c=5 * um, mu_ref=0.6, v_ref=1 * um / s, normal_memory=memory)
-    face, drive = ss.Constant(preload=5 * MPa), ss.Steady(1 * um / s)
+    rock = ss.laws.RateState(a=0.010, b=0.015, d_c=5 * um, mu_ref=0.6, v_ref=1 * um / s, normal_memory=memory)
+    face, drive = ss.laws.ConstantNormalStress(preload=5 * MPa), ss.machine.SteadyDrive(1 * um / s)
     return ss.Slider(friction=rock, contact=face, stiffness=1e6 * GPa / m, drive=drive)
 
 
 STEP = 5.5 * MPa
 MEMORIES = (
-    (ss.NoMemory(), "no memory", "-"),
-    (ss.LinkerDieterich(alpha=0.2), "α = 0.2", "--"),
-    (ss.LinkerDieterich(alpha=0.56), "α = 0.56", "-."),
-    (ss.PrakashClifton(slip_distance=1 * um), "Prakash-Clifton, 1 µm", ":"),
+    (ss.laws.NoMemory(), "no memory", "-"),
+    (ss.laws.LinkerDieterich(alpha=0.2), "α = 0.2", "--"),
+    (ss.laws.LinkerDieterich(alpha=0.56), "α = 0.56", "-."),
+    (ss.laws.PrakashClifton(slip_distance=1 * um), "Prakash-Clifton, 1 µm", ":"),
 )
 
 
@@ -95,15 +97,15 @@ def normal_stress_steps():
     above, below = panels(46, 44)
     times = np.concatenate([[0.0, 0.999], 1 + np.geomspace(1e-5, 25, 60)])
     for (memory, label, line), colour in zip(MEMORIES, (GREY, BLACK, VERMILION, BLUE), strict=True):
-        run = ss.simulate(bench(memory), ss.NormalStressStep(at=1, by=STEP - 5 * MPa), until=27, times=times)
+        run = ss.simulate(bench(memory), ss.protocol.NormalStressStep(at=1, by=STEP - 5 * MPa), until=27, times=times)
         above.plot(run["slip"] / um - 1, run["shear_stress"] / MPa, line, color=colour, label=label)
     above.set(xlabel="slip since the step (µm)", ylabel="shear stress (MPa)", xlim=(-1, 20))
     above.legend(loc="lower right")
     ratios = np.array([0.5, 0.7, 0.9, 1.1, 1.4, 2.0])
     for mark, alpha, colour, line in (("o", 0.2, BLACK, "--"), ("s", 0.56, VERMILION, "-.")):
-        rig, drops = bench(ss.LinkerDieterich(alpha=alpha)), []
+        rig, drops = bench(ss.laws.LinkerDieterich(alpha=alpha)), []
         for ratio in ratios:
-            step = ss.NormalStressStep(at=1, by=(ratio - 1) * 5 * MPa)
+            step = ss.protocol.NormalStressStep(at=1, by=(ratio - 1) * 5 * MPa)
             run = ss.simulate(rig, step, until=1.02, times=[1.01])  # 0.01 µm later, when the drive has taken it up
             drops.append(run["friction"][0] - 0.6)
         below.plot(ratios, -alpha * np.log(ratios), line, color=colour, label=f"$-$α ln(σ$_2$/σ$_1$), α = {alpha}")
@@ -120,16 +122,16 @@ def normal_stress_steps():
 
 def creeping():
     """The velocity-strengthening rig of the page on oscillation."""
-    memory = ss.LinkerDieterich(alpha=0.2)
-    rock = ss.RateState(a=0.010, b=0.008, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s, normal_memory=memory)
-    face, drive = ss.Constant(preload=25 * MPa), ss.Steady(10 * um / s)
+    memory = ss.laws.LinkerDieterich(alpha=0.2)
+    rock = ss.laws.RateState(a=0.010, b=0.008, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s, normal_memory=memory)
+    face, drive = ss.laws.ConstantNormalStress(preload=25 * MPa), ss.machine.SteadyDrive(10 * um / s)
     return ss.Slider(friction=rock, contact=face, stiffness=10 * GPa / m, drive=drive)
 
 
 def near_critical():
     """A weakening rock, 1.3 times as stiff as it has to be."""
-    rock = ss.RateState(a=0.010, b=0.015, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s)
-    face, drive = ss.Constant(preload=25 * MPa), ss.Steady(10 * um / s)
+    rock = ss.laws.RateState(a=0.010, b=0.015, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s)
+    face, drive = ss.laws.ConstantNormalStress(preload=25 * MPa), ss.machine.SteadyDrive(10 * um / s)
     return ss.Slider(friction=rock, contact=face, stiffness=16.25 * GPa / m, drive=drive)
 
 
@@ -169,13 +171,16 @@ def oscillating_normal_stress():
 
 def well():
     """A fault with pore fluid, stable where what presses it together is less than 10 MPa."""
-    rock = ss.RateState(a=0.010, b=0.015, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s)
-    fluid = ss.PoreFluid(preload=9 * MPa, suction=0.0, drainage=1.0, slip_distance=10 * um, v_ref=10 * um / s)
-    drive = ss.Steady(10 * um / s)
+    rock = ss.laws.RateState(a=0.010, b=0.015, d_c=10 * um, mu_ref=0.6, v_ref=10 * um / s)
+    fluid = ss.laws.PoreFluid(preload=9 * MPa, suction=0.0, drainage=1.0, slip_distance=10 * um, v_ref=10 * um / s)
+    drive = ss.machine.SteadyDrive(10 * um / s)
     return ss.Slider(friction=rock, contact=fluid, stiffness=5 * GPa / m, mass=1e4, drive=drive)
 
 
-PUMPED = (ss.InjectionRamp(at=50, by=-6 * MPa, duration=300), ss.InjectionRamp(at=550, by=6 * MPa, duration=300))
+PUMPED = (
+    ss.protocol.InjectionRamp(at=50, by=-6 * MPa, duration=300),
+    ss.protocol.InjectionRamp(at=550, by=6 * MPa, duration=300),
+)
 
 
 def injection():

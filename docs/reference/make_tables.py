@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import importlib
 import inspect
 from dataclasses import MISSING
 from pathlib import Path
@@ -258,7 +257,7 @@ give either. Arrays of the map are per unit area. This page is written by `make_
 the source.
 """
 MAP_TAIL = """An installed package may offer further results, as [laws](../how-to/add-a-friction-law.md): a class
-derived from `steadyslip.Measure`, named in the entry-point group `steadyslip.laws`.
+derived from `steadyslip.maps.Measure`, named in the entry-point group `steadyslip.laws`.
 """
 
 
@@ -294,55 +293,54 @@ def map_page() -> str:
 
 PYTHON_HEAD = """# Python
 
-Everything public is a name in `steadyslip`; nothing needs importing from deeper. Each entry is the first line of the
-docstring; `help(steadyslip.analyze)` shows the rest. Numbers in and out are SI, per unit contact area also where the
-rig has an `area`; constructors, `with_values` and `between=` read text such as `"9 GPa/m"` too. Laws are frozen; their
-arguments are the keys of a [rig file](rig-file.md), by keyword (a drive's velocity also by position). "Theory 3" is
-section 3 of [Equations and where they live](equations.md). This page is written by `make_tables.py`.
+What one calls is a name in `steadyslip`. What rigs, protocols, fits and maps are made of is in the modules `laws`,
+`machine`, `protocol`, `experiments` and `maps`, and each type of result in the module that makes it, all of which are
+attributes of `steadyslip`: `import steadyslip as ss`, then `ss.analyze`, `ss.laws.RateState`. Nothing needs importing
+from deeper. Each entry is the first line of the docstring; `help(steadyslip.analyze)` shows the rest. Numbers in and
+out are SI, per unit contact area also where the rig has an `area`; constructors, `with_values` and `between=` read text
+such as `"9 GPa/m"` too. Laws are frozen; their arguments are the keys of a [rig file](rig-file.md), by keyword (a
+drive's velocity also by position). "Theory 3" is section 3 of [Equations and where they live](equations.md).
+
+Names that left the top with 0.3 are found by their short form until 1.0, with a warning that says where they are, and
+so are those that changed:
+
+| until 0.2 | now |
+|---|---|
+| `steadyslip.laws.ConstantNormalStress`, the contact law | `steadyslip.laws.ConstantNormalStress` |
+| `steadyslip.laws.LinearNormalStress` | `steadyslip.laws.LinearNormalStress` |
+| `steadyslip.laws.ContactInputs`, and of it `slip` | `steadyslip.laws.ContactInputs`, and of it `lead` |
+| `steadyslip.machine.SteadyDrive`, the drive | `steadyslip.machine.SteadyDrive` |
+
+This page is written by `make_tables.py`.
 """
 GROUPS = {
-    "": "Modules",
-    "verdict": "The verdict",
-    "explorer": "The explorer",
-    "reports": "Reports",
-    "files.specifications": "Rig files",
-    "schemas": "Schema of files",
-    "laws.contact": "Contact laws",
-    "machine.drive": "Drives",
+    "machine.slider": "The rig",
     "machine.machine": "Machines",
-    "machine.bodies": "Bodies of machines",
-    "machine.links": "Links of machines",
-    "machine.joining": "Rigid links of machines",
-    "machine.surfaces": "Contacts of machines",
-    "machine.servo": "Drives of machines",
-    "core.errors": "Exceptions",
-    "laws.friction": "Friction laws",
-    "experiments": "Records and fits",
+    "files.specifications": "Files of rigs and protocols",
+    "protocol": "Protocols of experiments",
+    "verdict": "The verdict",
+    "model.sliding": "Steady sliding",
     "linear": "Linear stability",
     "model": "The Model",
     "motion": "Motion",
     "nonlinear": "Beyond the edge",
-    "protocol": "Protocols of experiments",
-    "core.records": "To declare a law of your own",
-    "machine.slider": "The rig",
-    "model.sliding": "Steady sliding",
+    "experiments": "Records and fits",
     "maps": "Maps",
+    "explorer": "The explorer",
+    "reports": "Reports",
+    "schemas": "Schema of files",
+    "core.errors": "Exceptions",
 }
-ORDER = (
-    *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
-    "schemas",
-    *("machine.machine", "machine.bodies", "machine.links", "machine.joining", "machine.surfaces", "machine.servo"),
-    *("verdict", "model.sliding", "linear", "model", "core.records"),
-    *("core.errors", "experiments", "motion", "nonlinear", "maps"),
-)
 MODULES = {
     "figures": tuple(name for name in figures.__all__ if name.islower()),
-    "testing": ("check_friction_law", "check_contact_law"),
+    "testing": ("check_friction_law", "check_contact_law", "Conditions", "Surroundings", "ContractViolation"),
+    "units": (),
 }
+"""Names of modules that the page lists, where they are not all that have a docstring."""
 
 
-def public_names() -> dict[str, list[str]]:
-    """Names of ``__init__.pyi`` by the module they come from."""
+def top_names() -> dict[str, list[str]]:
+    """Names of ``__init__.pyi`` by the module they come from, modules themselves under ""."""
     tree = ast.parse((Path(steadyslip.__file__).with_suffix(".pyi")).read_text(encoding="utf-8"))
     return {node.module or "": [a.name for a in node.names] for node in tree.body if isinstance(node, ast.ImportFrom)}
 
@@ -351,24 +349,35 @@ def entry(name: str, thing) -> str:
     called = name
     if inspect.isfunction(thing):
         called += "(" + ", ".join(inspect.signature(thing).parameters) + ")"
-    elif getattr(thing, "name", ""):
+    elif isinstance(getattr(thing, "name", ""), str) and getattr(thing, "name", ""):
         called += f'` `"{thing.name}"'
     return f"| `{called}` | {summary(thing)} |"
 
 
+def listed(title: str, names: dict[str, object]) -> list[str]:
+    return [title, "", "| name | what it is |", "|---|---|", *(entry(*one) for one in names.items()), ""]
+
+
 def python_page() -> str:
-    names = public_names()
+    names = top_names()
     lines = [PYTHON_HEAD]
-    for module in (*(name for name in ORDER if name in names), *sorted(set(names) - set(ORDER) - {""}), ""):
-        lines += [f"## {GROUPS[module]}", "", "| name | what it is |", "|---|---|"]
-        lines += [entry(name, getattr(steadyslip, name)) for name in names[module]]
-        lines.append("")
-    for module, functions in MODULES.items():
-        lines += [f"### `steadyslip.{module}`", "", "| name | what it is |", "|---|---|"]
-        found = importlib.import_module(f"steadyslip.{module}")
-        lines += [entry(name, getattr(found, name)) for name in functions]
-        lines.append("")
+    for module, title in GROUPS.items():
+        lines += listed(f"## {title}", {name: getattr(steadyslip, name) for name in names[module]})
+    lines += listed("## Modules", {name: getattr(steadyslip, name) for name in names[""]})
+    top = {name for found in names.values() for name in found}
+    for part in names[""]:
+        module = getattr(steadyslip, part)
+        named = MODULES[part] if part in MODULES else module_names(module)
+        own = [name for name in named if name not in top]
+        if own:
+            lines += listed(f"### `steadyslip.{part}`", {f"{part}.{name}": getattr(module, name) for name in own})
     return "\n".join(lines).rstrip() + "\n"
+
+
+def module_names(module) -> list[str]:
+    """Classes and functions of a module's ``__all__``; values such as `laws.positive` are left out."""
+    kinds = inspect.isclass, inspect.isfunction
+    return [name for name in module.__all__ if any(is_kind(getattr(module, name)) for is_kind in kinds)]
 
 
 PAGES = {"rig-file.md": rig_page, "fit-file.md": fit_page, "map-file.md": map_page, "python.md": python_page}

@@ -167,7 +167,7 @@ def test_simulate_takes_pieces_and_changes():
     assert data["status"] == "done"
     assert data["end"] == 20.0
     rig = ss.read_rig(EXAMPLE, ["stiffness=32 GPa/m"])
-    same = ss.simulate(rig, ss.VelocityStep(at=10, to=2e-6), until=20, initial={"v": 1.1e-6})
+    same = ss.simulate(rig, ss.protocol.VelocityStep(at=10, to=2e-6), until=20, initial={"v": 1.1e-6})
     assert data["final"]["v"] == pytest.approx(same["v"][-1], rel=1e-9)
     assert data["units"]["v"] == "m/s"
 

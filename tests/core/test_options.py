@@ -9,6 +9,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from fuzz_rigs import judged
+from public_names import public
 from rigs_of_theory import rig
 from steadyslip.core.options import NUMBERS, checked, role_of
 
@@ -20,10 +21,14 @@ VALUES = {
 }  # fmt: skip
 RIG = rig(mass=0.0)
 STIFF = RIG.with_values({"stiffness": 1.5 * float(ss.critical_stiffness(RIG))})
-STEP = ss.VelocityStep(at=0.1, to=2e-6)
-STRESSED = ss.Protocol(pieces=(ss.NormalStressStep(at=30.0, by=5e5), ss.VelocityStep(at=60.0, to=3e-6)), until=90.0)
+STEP = ss.protocol.VelocityStep(at=0.1, to=2e-6)
+STRESSED = ss.Protocol(
+    pieces=(ss.protocol.NormalStressStep(at=30.0, by=5e5), ss.protocol.VelocityStep(at=60.0, to=3e-6)), until=90.0
+)
 PLAN = ss.Map(
-    RIG, {"friction.a": ss.Grid(0.012, 0.015, 3), "stiffness": ss.Grid(1e9, 1e10, 3)}, ["status", "critical_stiffness"]
+    RIG,
+    {"friction.a": ss.maps.Grid(0.012, 0.015, 3), "stiffness": ss.maps.Grid(1e9, 1e10, 3)},
+    ["status", "critical_stiffness"],
 )
 QUICK = {"until": 0.2, "most_steps": 50}
 
@@ -60,7 +65,9 @@ def _calls(fitted, grid, fresh):
         )
 
     def chosen(**o):
-        return ss.best_protocol(lab.rig(alpha=0.3), **({"candidates": {"one": STRESSED}, "samples": 100} | o))
+        return ss.experiments.best_protocol(
+            lab.rig(alpha=0.3), **({"candidates": {"one": STRESSED}, "samples": 100} | o)
+        )
 
     def mapped(**o):
         return ss.run_map(PLAN, **({"path": next(fresh), "workers": 1, "progress": False} | o))
@@ -84,18 +91,18 @@ def _calls(fitted, grid, fresh):
         basin: ("x", "v", "rtol", "threads", "branch"),
         cycles: ("amplitude", "most_points", "doublings", "rtol", "between", "branch"),
         sensitivity: ("points", "seed"),
-        lambda n: ss.Grid(1e9, 2e9, n): ("n",),
-        lambda low: ss.Grid(low, 2e9, 3): ("low",),
+        lambda n: ss.maps.Grid(1e9, 2e9, n): ("n",),
+        lambda low: ss.maps.Grid(low, 2e9, 3): ("low",),
         lambda chunk: ss.Map(RIG, {"stiffness": [1e9, 2e9]}, ["status"], chunk=chunk): ("chunk",),
-        lambda **o: ss.VelocityStep(**({"at": 1.0, "to": 1e-6} | o)): ("at", "to"),
-        lambda **o: ss.bootstrap(fitted, **({"count": 2, "progress": False} | o)): (
+        lambda **o: ss.protocol.VelocityStep(**({"at": 1.0, "to": 1e-6} | o)): ("at", "to"),
+        lambda **o: ss.experiments.bootstrap(fitted, **({"count": 2, "progress": False} | o)): (
             "count", "block", "seed", "threads"),
-        lambda **o: ss.profile(fitted, "friction.a", **({"count": 3} | o)): ("reach", "count", "threads"),
+        lambda **o: ss.experiments.profile(fitted, "friction.a", **({"count": 3} | o)): ("reach", "count", "threads"),
         lambda level: fitted.interval("friction.a", level): ("level",),
         lambda **o: ss.predict(RIG, fitted, **o): ("record", "kick"),
         lambda **o: ss.fit(ss.lab_rig(), fitted.plan.records, ["friction.a"], **({"starts": 1} | o)): (
             "starts", "trend", "width", "threads"),
-        lambda **o: ss.precision(lab.rig(), lab.STEP, **({"until": 80.0, "samples": 100} | o)): (
+        lambda **o: ss.experiments.precision(lab.rig(), lab.STEP, **({"until": 80.0, "samples": 100} | o)): (
             "noise", "until", "samples"),
     }  # fmt: skip
     return [(call, name) for call, names in calls.items() for name in names]
@@ -147,7 +154,9 @@ LEFT = {  # parameters that their functions check themselves, with words of thei
     "precision", "rtol", "amplitude", "amplitudes", "periods", "doublings", "most_points", "method", "points", "result",
 }  # fmt: skip
 PUBLIC = {
-    name: getattr(ss, name) for name in dir(ss) if inspect.isfunction(getattr(ss, name)) and name not in DECLARE
+    name: thing for name, thing in public().items()
+    if inspect.isfunction(thing) and name.rpartition(".")[2] not in DECLARE
+    and name.partition(".")[0] not in ("testing", "figures")
 }  # fmt: skip
 
 
@@ -190,7 +199,7 @@ def test_a_tolerance_has_one_range_wherever_it_is_given(value):
         lambda: ss.threshold_map(RIG, {}, rtol=value),
         lambda: ss.basin(RIG, rtol=value),
         lambda: Options(rtol=value),
-        lambda: ss.Events(until=1.0, rtol=value),
+        lambda: ss.maps.Events(until=1.0, rtol=value),
     )
     for ask in asked:
         with pytest.raises(ss.ParameterError, match="rtol") as caught:

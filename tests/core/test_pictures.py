@@ -2,14 +2,13 @@
 
 import pytest
 
-import steadyslip
+from public_names import public
 from steadyslip import figures, pictures
 from steadyslip.core.errors import NotAvailable
 
 
 def results_with_a_picture():
-    for name in steadyslip.__all__:
-        found = getattr(steadyslip, name)
+    for found in public().values():
         if isinstance(found, type) and hasattr(found, "plot"):
             yield found
 

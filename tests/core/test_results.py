@@ -53,7 +53,7 @@ def _fit():
 
 
 def _map(folder):
-    over = {"slider.stiffness": [1e9, 5e9, 1e10], "friction.a": ss.Grid(0.01, 0.012, 2)}
+    over = {"slider.stiffness": [1e9, 5e9, 1e10], "friction.a": ss.maps.Grid(0.01, 0.012, 2)}
     return ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), folder / "map.zarr", progress=False)
 
 
@@ -74,17 +74,18 @@ def results(tmp_path_factory):
     fit, branch = _fit(), _branch()
     over = {"friction.a": (0.010, 0.014), "friction.b": (0.015, 0.02)}
     found = [
-        near, near.friction, near.contact, near.drive, ss.Protocol(pieces=(ss.VelocityStep(at=1.0, to=2e-6),)),
+        near, near.friction, near.contact, near.drive, ss.Protocol(pieces=(ss.protocol.VelocityStep(at=1.0, to=2e-6),)),
         ss.analyze(near, kick="displacement"), *ss.boundary(near, "stiffness"), *ss.margins(near)[:1],
         ss.steady_state(near), ss.small_signal(near), ss.hopf(near), ss.hopf_curve(near, "stiffness", "friction.a"),
-        ss.simulate(near, ss.VelocityStep(at=0.1, to=2e-6), until=1.0),
+        ss.simulate(near, ss.protocol.VelocityStep(at=0.1, to=2e-6), until=1.0),
         ss.simulate_many(near, {"stiffness": np.array([8e9, 9e9])}, until=1.0, progress=False),
         branch, *branch.cycles[:1], *branch.special[:1],
         ss.threshold(near, "displacement", precision=1e-2),
-        ss.margin_to_kick(near, ss.DisplacementStep(at=0.0, by=1e-7), precision=1e-2),
+        ss.margin_to_kick(near, ss.protocol.DisplacementStep(at=0.0, by=1e-7), precision=1e-2),
         ss.basin(near, [-1e-6, 1e-6], [1e-7, 1e-6], progress=False),
-        fit.plan.records[0], fit, fit["friction.a"], ss.bootstrap(fit, 16, progress=False),
-        ss.profile(fit, "friction.a", count=5), ss.predict(near, fit), ss.precision(lab.rig(), lab.STEP, until=80.0),
+        fit.plan.records[0], fit, fit["friction.a"], ss.experiments.bootstrap(fit, 16, progress=False),
+        ss.experiments.profile(fit, "friction.a", count=5), ss.predict(near, fit),
+        ss.experiments.precision(lab.rig(), lab.STEP, until=80.0),
         ss.compare({"one": fit, "two": fit}), ss.sensitivity(near, over, points=64, progress=False),
         _map(folder), ss.Map(near, {"stiffness": [1e9, 2e9]}), ss.build_model(near),
     ]  # fmt: skip
@@ -116,7 +117,9 @@ def test_copies_of_results_still_answer(results):
     assert by_type["MapResult"].complete
     assert by_type["Model"] == ss.build_model(rig()) or str(by_type["Model"]) == str(ss.build_model(rig()))
     assert (
-        by_type["History"].to_xarray().equals(next(one for one in results if isinstance(one, ss.History)).to_xarray())
+        by_type["History"]
+        .to_xarray()
+        .equals(next(one for one in results if isinstance(one, ss.motion.History)).to_xarray())
     )
 
 
@@ -136,9 +139,9 @@ def _held(one, seen):
         names = [item.name for item in fields(one)]
         names += [n for n, v in vars(type(one)).items() if isinstance(v, (property, cached_property)) and n[0] != "_"]
         pairs = [(name, getattr(one, name)) for name in names]
-        if isinstance(one, ss.History):
+        if isinstance(one, ss.motion.History):
             pairs += list(one.items())
-        if isinstance(one, ss.Ensemble):
+        if isinstance(one, ss.motion.Ensemble):
             pairs += [(name, one[name]) for name in one.names] if hasattr(one, "names") else []
     else:
         return

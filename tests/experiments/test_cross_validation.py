@@ -20,7 +20,7 @@ def fit(record):
 
 
 def test_a_fold_is_predicted_by_a_fit_that_gives_it_no_weight(record, fit):
-    found = ss.cross_validate(fit, 4, block=20)
+    found = ss.experiments.cross_validate(fit, 4, block=20)
     for fold in (0, 3):
         out = found.fold == fold
         other = ss.fit(ss.lab_rig(), record, weights=np.where(out, 0.0, 1.0))
@@ -28,7 +28,7 @@ def test_a_fold_is_predicted_by_a_fit_that_gives_it_no_weight(record, fit):
 
 
 def test_every_sample_is_predicted_once_a_little_worse_than_seen(fit):
-    found = ss.cross_validate(fit)
+    found = ss.experiments.cross_validate(fit)
     counts = np.bincount(found.fold)
     assert counts.sum() == fit.samples
     assert counts.min() > 0
@@ -49,4 +49,4 @@ def test_the_law_that_made_the_record_predicts_it_better():
 @pytest.mark.parametrize("folds", [1, 0, None, 2.5, True, 10**9])
 def test_other_folds_are_refused(fit, folds):
     with pytest.raises(ss.ParameterError, match="folds: got"):
-        ss.cross_validate(fit, folds)
+        ss.experiments.cross_validate(fit, folds)

@@ -101,11 +101,11 @@ def test_an_autoregression_is_recovered():
 
 def test_bootstrap_profile_and_covariance_agree_where_noise_is_white():
     fit = lab.stepped()
-    draws = ss.bootstrap(fit, 200)
+    draws = ss.experiments.bootstrap(fit, 200)
     assert draws.details["converged"] == 1
     for name in fit.names:
         assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.2)
-    outline = ss.profile(fit, "d_c")
+    outline = ss.experiments.profile(fit, "d_c")
     assert outline.gaussian
     low, high = outline.interval(0.95)
     assert (low, high) == pytest.approx(fit.interval("d_c"), rel=0.01)
@@ -117,7 +117,7 @@ def test_bootstrap_profile_and_covariance_agree_where_noise_is_white():
 @pytest.mark.campaign
 def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian():
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300))
-    draws = ss.posterior(fit, 500, walkers=24)
+    draws = ss.experiments.posterior(fit, 500, walkers=24)
     assert 0.2 < draws.details["acceptance"] < 0.8
     for name in fit.names:
         assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.3)
@@ -130,15 +130,15 @@ def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian()
     best = draws.log_probability.argmax()
     assert abs(draws["friction.d_c"][best] / fit.values["friction.d_c"] - 1) < 3 * fit.errors["friction.d_c"] / 1e-5
     assert handed["sample_stats"]["lp"].values.max() == draws.log_probability[best]
-    assert ss.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
+    assert ss.experiments.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
 
 
 @pytest.mark.campaign
 def test_blocks_keep_correlation():
     fit = lab.basalt()
     assert fit.correlated
-    blocks = ss.bootstrap(fit, 40)
-    single = ss.bootstrap(fit, 40, kind="residual")
+    blocks = ss.experiments.bootstrap(fit, 40)
+    single = ss.experiments.bootstrap(fit, 40, kind="residual")
     assert blocks.details["block"] == pytest.approx(19, abs=3)
     for name in ("friction.a", "friction.d_c", "slider.stiffness"):
         assert blocks.error(name) > 1.7 * single.error(name)
@@ -149,12 +149,16 @@ def test_a_jump_at_an_unknown_time_makes_errors_that_are_not_gaussian():
     """After a small step the first response is lost between samples; the fit says so, and the profile knows it."""
     rig = lab.rig(alpha=0.45)
     protocol = ss.Protocol(
-        pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressStep(at=140.37, by=-0.02 * lab.STRESS)), until=260.0
+        pieces=(
+            ss.protocol.VelocityStep(at=60.13, to=3e-6),
+            ss.protocol.NormalStressStep(at=140.37, by=-0.02 * lab.STRESS),
+        ),
+        until=260.0,
     )
     fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(rig, protocol, 3, count=800))
     assert "errors of what the jump tells" in " ".join(str(fit).split())
     assert "the load point is measured" not in str(fit)
-    outline = ss.profile(fit, "alpha", reach=8, count=65)
+    outline = ss.experiments.profile(fit, "alpha", reach=8, count=65)
     low, high = outline.interval(0.999)
     assert low < 0.45 < high
     assert not outline.gaussian
@@ -177,27 +181,29 @@ def test_alpha_is_not_given_an_absurd_error_from_a_velocity_step():
 def test_a_normal_stress_history_leaves_one_direction_open():
     """At constant load-point velocity (a, b, d_c, alpha) have one direction without effect, to first order."""
     protocol = ss.Protocol(
-        pieces=(ss.NormalStressHarmonic(amplitude=1e-4 * lab.STRESS, period=15.0, at=20.0),), until=200.0
+        pieces=(ss.protocol.NormalStressHarmonic(amplitude=1e-4 * lab.STRESS, period=15.0, at=20.0),), until=200.0
     )
-    small = ss.precision(lab.rig(alpha=0.4), protocol, fixed=["slider.stiffness"], noise=2e-6)
+    small = ss.experiments.precision(lab.rig(alpha=0.4), protocol, fixed=["slider.stiffness"], noise=2e-6)
     (open_one,) = small.unidentified
     names = {"friction.a", "friction.b", "friction.d_c", "friction.normal_memory.alpha"}
     assert set(open_one.weights) <= names
     assert len(open_one.weights) >= 3
     for name in names:
         assert not np.isfinite(small.errors[name])
-    large = replace(protocol, pieces=(ss.NormalStressHarmonic(amplitude=0.05 * lab.STRESS, period=15.0, at=20.0),))
-    assert not ss.precision(lab.rig(alpha=0.4), large, fixed=["slider.stiffness"], noise=1e-4).unidentified
-    both = protocol + ss.VelocityStep(at=100.0, to=3e-6)
-    assert not ss.precision(lab.rig(alpha=0.4), both, fixed=["slider.stiffness"], noise=2e-7).unidentified
+    large = replace(
+        protocol, pieces=(ss.protocol.NormalStressHarmonic(amplitude=0.05 * lab.STRESS, period=15.0, at=20.0),)
+    )
+    assert not ss.experiments.precision(lab.rig(alpha=0.4), large, fixed=["slider.stiffness"], noise=1e-4).unidentified
+    both = protocol + ss.protocol.VelocityStep(at=100.0, to=3e-6)
+    assert not ss.experiments.precision(lab.rig(alpha=0.4), both, fixed=["slider.stiffness"], noise=2e-7).unidentified
 
 
 @pytest.mark.campaign
 def test_stiffness_and_slip_distance_of_a_short_record():
     """Before the state has evolved, only slopes are seen."""
-    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=30.13, to=1.2e-6),), until=33.0)
+    protocol = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=30.13, to=1.2e-6),), until=33.0)
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol, count=300), starts=8)
     lost_names = {name for one in fit.unidentified for name in one.weights}
     assert "friction.d_c" in lost_names
     with pytest.raises(ss.NotAvailable, match="does not determine"):
-        ss.normal_draws(fit)
+        ss.experiments.normal_draws(fit)

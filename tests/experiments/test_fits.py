@@ -22,11 +22,11 @@ from steadyslip.experiments.numerics.noise import lag_one
     ("rig", "protocol", "guess", "jumps"),
     [
         (lab.rig(), lab.STEP, ss.lab_rig(), ()),
-        (lab.rig(ss.Aging()), lab.STEP, ss.lab_rig("aging"), ()),
+        (lab.rig(ss.laws.Aging()), lab.STEP, ss.lab_rig("aging"), ()),
         (lab.rig(b=0.006), lab.STEP, ss.lab_rig(), ()),
         (lab.rig(b=-0.004), lab.STEP, ss.lab_rig(), ()),
         (lab.rig(), lab.HOLD, ss.lab_rig(), ()),
-        (lab.rig(ss.Aging()), lab.HOLD, ss.lab_rig("aging"), ()),
+        (lab.rig(ss.laws.Aging()), lab.HOLD, ss.lab_rig("aging"), ()),
         (lab.rig(alpha=0.35), lab.PRESSED, ss.lab_rig(normal_memory="linker-dieterich"), (140.41,)),
         (lab.rig(alpha=0.2), lab.PULSED, ss.lab_rig(normal_memory="linker-dieterich"), (120.2, 160.5)),
         (lab.rig(alpha=0.5), lab.SHAKEN, ss.lab_rig(normal_memory="linker-dieterich"), ()),
@@ -58,7 +58,7 @@ def test_random_truths_come_back(seed):
     )
     ratio = rng.choice([0.1, 0.3, 3.0, 10.0])
     end = 12 * unit + 30 * unit / min(ratio, 1)
-    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=12 * unit, to=ratio * lab.SLOW),), until=end)
+    protocol = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=12 * unit, to=ratio * lab.SLOW),), until=end)
     record = lab.record(rig, protocol, seed=seed)
     fit = ss.fit(ss.lab_rig(), record)
     truth = fit.space.coordinates(np.array([rig.value(u.parameter) for u in fit.space.unknowns]))
@@ -188,7 +188,7 @@ def test_a_commanded_step_whose_time_is_not_known():
     blind = ss.record_from_arrays(record.time, friction=record.friction, normal=record.normal)
     guess = ss.lab_rig().with_values({"drive.velocity": lab.SLOW, "friction.d_c": lab.TRUTH["d_c"]})
     fit = ss.fit(
-        guess, blind, protocol=ss.VelocityStep(at=58.0, to=5e-6),
+        guess, blind, protocol=ss.protocol.VelocityStep(at=58.0, to=5e-6),
         free=["a", "b", "stiffness", "protocol.pieces.1.at"],
     )  # fmt: skip
     at = fit["protocol.pieces.1.at"]
@@ -277,7 +277,7 @@ def test_sepiolite_strengthens():
 
 @pytest.mark.slow
 def test_criteria_prefer_the_law_that_made_the_record():
-    record = lab.record(lab.rig(ss.Aging()), lab.HOLD)
+    record = lab.record(lab.rig(ss.laws.Aging()), lab.HOLD)
     found = ss.compare_laws(ss.lab_rig(), record, ("slip", "aging"))
     assert found.best == "aging"
     assert found.weights["aging"] > 0.999
@@ -321,7 +321,7 @@ def test_a_fit_saved_is_the_same_fit(tmp_path):
         ({"weights": [1.0, 2.0]}, "finite numbers >= 0"),
         ({"width": -1.0}, "allowed: a finite number above 0"),
         ({"fixed": ["a", "b", "d_c", "mu_ref", "stiffness"]}, "nothing is free"),
-        ({"protocol": ss.NormalStressStep(at=1, by=1e5)}, "does not move the load point"),
+        ({"protocol": ss.protocol.NormalStressStep(at=1, by=1e5)}, "does not move the load point"),
     ],
 )
 def test_bad_options_are_named(options, message):

@@ -18,7 +18,7 @@ from steadyslip.kernels.runner import Runner
 from steadyslip.model.reducing import reduce_model
 from steadyslip.motion.jobs import Jobs
 
-CONSTANT = ss.Constant(steady_normal_stress=lab.STRESS)
+CONSTANT = ss.laws.ConstantNormalStress(steady_normal_stress=lab.STRESS)
 
 
 def plan_of(rig, made_by, count=1200, uniform=True, **options):
@@ -128,19 +128,19 @@ def test_free_times_of_a_protocol_have_sensitivities():
 
 RIGS = {
     "slip": lab.rig(),
-    "prz": lab.rig(ss.PRZ()),
-    "nagata": lab.rig(ss.Nagata(c_nagata=0.01)),
-    "linker-dieterich": lab.rig(ss.Aging(), alpha=0.3),
+    "prz": lab.rig(ss.laws.PRZ()),
+    "nagata": lab.rig(ss.laws.Nagata(c_nagata=0.01)),
+    "linker-dieterich": lab.rig(ss.laws.Aging(), alpha=0.3),
     "prakash-clifton": replace(
-        lab.rig(), friction=replace(lab.rig().friction, normal_memory=ss.PrakashClifton(direct_share=0.6))
+        lab.rig(), friction=replace(lab.rig().friction, normal_memory=ss.laws.PrakashClifton(direct_share=0.6))
     ),
     "regularised": replace(lab.rig(), friction=replace(lab.rig().friction, regularised=True)),
     "two states": lab.two_states(),
     "radiation damping": replace(lab.rig(), radiation_damping=1e10),
-    "inclined": replace(lab.rig(), contact=ss.InclinedSpring(preload=8e6, angle=0.3)),
+    "inclined": replace(lab.rig(), contact=ss.laws.InclinedSpring(preload=8e6, angle=0.3)),
     "triaxial": ss.Slider(
-        friction=lab.rig().friction, contact=ss.Triaxial(confining_pressure=5e6, angle=0.5), axial_stiffness=4e10,
-        drive=ss.Steady(lab.SLOW),
+        friction=lab.rig().friction, contact=ss.laws.Triaxial(confining_pressure=5e6, angle=0.5), axial_stiffness=4e10,
+        drive=ss.machine.SteadyDrive(lab.SLOW),
     ),
     "with mass": replace(lab.rig(), mass=1e3),
 }  # fmt: skip
@@ -154,7 +154,7 @@ def test_every_law_contact_and_regime(name, monkeypatch):
     )
     rig = RIGS[name]
     times = np.linspace(0.0, 14.0, 20)
-    pieces = [ss.VelocityStep(at=4.0, to=2e-6)]
+    pieces = [ss.protocol.VelocityStep(at=4.0, to=2e-6)]
     run = ss.simulate(rig, pieces, until=14.0, times=times, rtol=1e-10, events=False)
     free = [n for n in make_plan(rig, _bare(run), protocol=pieces).free if n in rig.parameters()]
     if name in ("inclined", "triaxial"):
@@ -212,7 +212,7 @@ def space_index(space, name):
 
 
 def test_no_steady_sliding_to_start_from_is_no_crash():
-    rig = replace(lab.rig(), contact=ss.InclinedSpring(preload=8e6, angle=0.3))
+    rig = replace(lab.rig(), contact=ss.laws.InclinedSpring(preload=8e6, angle=0.3))
     record = ss.record_from_arrays(
         np.linspace(0, 10, 50),
         friction=np.full(50, 0.6),
@@ -253,7 +253,7 @@ def test_tables_pass_through_every_sample():
 def test_a_sample_at_a_step_shows_what_comes_after_it():
     rig = lab.rig(alpha=0.4)
     steps = ss.Protocol(
-        pieces=(ss.VelocityStep(at=20.0, to=3e-6), ss.NormalStressStep(at=50.0, by=5e5)), until=80.0
+        pieces=(ss.protocol.VelocityStep(at=20.0, to=3e-6), ss.protocol.NormalStressStep(at=50.0, by=5e5)), until=80.0
     )  # fmt: skip
     plan, columns = plan_of(rig, steps, count=81, protocol=steps)
     assert {20.0, 50.0} <= set(columns["time"])

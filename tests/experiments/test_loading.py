@@ -317,7 +317,11 @@ def test_a_glitch_at_a_step_does_not_hide_its_time(seed, height, later, width):
 )  # fmt: skip
 def test_friction_is_asked_whether_a_step_is_a_ramp(ramp, noise, words):
     """Where the displacement does not tell, friction may; a fit says which, and what ramps make of its parameters."""
-    change = ss.VelocityRamp(at=60.0, to=5e-6, duration=ramp) if ramp else ss.VelocityStep(at=60.0, to=5e-6)
+    change = (
+        ss.protocol.VelocityRamp(at=60.0, to=5e-6, duration=ramp)
+        if ramp
+        else ss.protocol.VelocityStep(at=60.0, to=5e-6)
+    )
     found = lab.columns(lab.rig(), ss.Protocol(pieces=(change,), until=150.0), count=2000)
     rng = np.random.default_rng(4)
     found["friction"] = found["friction"] + 1e-5 * rng.standard_normal(len(found["time"]))

@@ -26,8 +26,8 @@ def made(protocol, seed=0, rig=None):
 
 def two():
     rig = ss.lab_rig()
-    states = tuple(ss.State(b=b, d_c=d) for b, d in ((0.006, 1e-5), (0.004, 1e-4)))
-    law = ss.RateState(a=0.01, states=states, mu_ref=0.6, v_ref=1e-6, evolution=ss.Slip())
+    states = tuple(ss.laws.State(b=b, d_c=d) for b, d in ((0.006, 1e-5), (0.004, 1e-4)))
+    law = ss.laws.RateState(a=0.01, states=states, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.Slip())
     return ss.Slider(friction=law, contact=rig.contact, stiffness=1e10, drive=rig.drive)
 
 

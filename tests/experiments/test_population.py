@@ -169,7 +169,7 @@ def test_a_population_for_arviz(fits):
 def test_a_population_read_back_says_the_same(fits, tmp_path):
     rock = ss.population(fits, ["a", "mu_ref"], conditions="normal stress", count=400)
     rock.save(tmp_path / "rock.nc")
-    again = ss.load_population(tmp_path / "rock.nc")
+    again = ss.experiments.load_population(tmp_path / "rock.nc")
     assert str(again) == str(rock)
     assert again.to_dict() == rock.to_dict()
     assert again.another("a", seed=3) == rock.another("a", seed=3)
@@ -197,7 +197,7 @@ def files(tmp_path_factory):
     """Three files of records that begin at different rates."""
     folder = tmp_path_factory.mktemp("rock")
     for j, (a, rate) in enumerate([(0.010, 1e-6), (0.011, 2e-6), (0.012, 1e-6)]):
-        step = ss.VelocityStep(at=60.13, to=5e-6)
+        step = ss.protocol.VelocityStep(at=60.13, to=5e-6)
         rig = lab.rig(a=a).with_values({"drive.velocity": rate})
         found = lab.columns(rig, ss.Protocol(pieces=(step,), until=150.0), count=300)
         friction = found["friction"] + 1e-4 * np.random.default_rng(j).standard_normal(300)
@@ -224,7 +224,7 @@ def test_a_population_from_files(files):
     assert [levels[f"p{j}"]["value"] for j in (1, 2, 3)] == pytest.approx([0.62] * 3, abs=2e-4)
     assert "Population of 3 experiments" in (files / "rock.html").read_text(encoding="utf-8")
     assert (files / "rock.png").stat().st_size > 5000
-    again = ss.load_population(files / "rock.nc")
+    again = ss.experiments.load_population(files / "rock.nc")
     assert {
         label: one["value"] for label, one in again.to_dict()["parameters"]["friction.mu_ref"]["experiments"].items()
     } == {label: one["value"] for label, one in found["parameters"]["friction.mu_ref"]["experiments"].items()}

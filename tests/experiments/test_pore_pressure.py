@@ -21,15 +21,15 @@ FREE = ("friction.a", "friction.b", "friction.d_c", "friction.normal_memory.alph
 
 def rig(**changes):
     own = {"suction": 0.0, "drainage": DRAINAGE, "slip_distance": 1e-5, "v_ref": lab.SLOW} | changes
-    return replace(lab.rig(alpha=ALPHA), contact=ss.PoreFluid(steady_normal_stress=lab.STRESS, **own))
+    return replace(lab.rig(alpha=ALPHA), contact=ss.laws.PoreFluid(steady_normal_stress=lab.STRESS, **own))
 
 
 @cache
 def columns(count=500):
     """What an experiment with drainage shows: the total normal stress, and the pressure of the pump."""
     inject, press, draw = MOMENTS
-    pieces = (ss.VelocityStep(at=30.13, to=3e-6), ss.InjectionStep(at=inject, by=BY),
-              ss.NormalStressStep(at=press, by=BY), ss.InjectionStep(at=draw, by=-BY))  # fmt: skip
+    pieces = (ss.protocol.VelocityStep(at=30.13, to=3e-6), ss.protocol.InjectionStep(at=inject, by=BY),
+              ss.protocol.NormalStressStep(at=press, by=BY), ss.protocol.InjectionStep(at=draw, by=-BY))  # fmt: skip
     time = np.linspace(0.0, 180.0, count)
     run = ss.simulate(rig(), ss.Protocol(pieces=pieces, until=180.0), times=time, rtol=1e-10, events=False)
     pore = PORE + BY * ((time > inject) & (time <= draw))
@@ -83,7 +83,7 @@ def test_derivatives_are_derivatives():
 
 
 def test_a_pressure_that_acts_at_once_is_the_limit_of_fast_drainage():
-    dry = replace(rig(), contact=ss.Constant(steady_normal_stress=lab.STRESS))
+    dry = replace(rig(), contact=ss.laws.ConstantNormalStress(steady_normal_stress=lab.STRESS))
     at_once = make_plan(dry, record(0.0), FREE[:4])
     errors = []
     for drainage in (10.0, 40.0):

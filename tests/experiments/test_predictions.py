@@ -38,7 +38,7 @@ def test_predictions_carry_the_uncertainty():
 @pytest.mark.slow
 def test_kick_thresholds_are_predicted():
     fit = lab.stepped()
-    found = ss.predict(lab.rig(), ss.bootstrap(fit, 8), kick="velocity")
+    found = ss.predict(lab.rig(), ss.experiments.bootstrap(fit, 8), kick="velocity")
     single = ss.threshold(found.rig, "velocity").size
     _, _, middle, _, _ = np.quantile(found.thresholds["velocity"], [0.025, 0.16, 0.5, 0.84, 0.975])
     assert middle == pytest.approx(single, rel=0.1)
@@ -46,7 +46,7 @@ def test_kick_thresholds_are_predicted():
 
 def test_a_prediction_keeps_the_memory_of_normal_stress_that_the_fit_has_not():
     rig = lab.rig(alpha=0.4)
-    found = ss.predict(replace(rig, contact=ss.InclinedSpring(preload=8e6, angle=0.2)), lab.stepped())
+    found = ss.predict(replace(rig, contact=ss.laws.InclinedSpring(preload=8e6, angle=0.2)), lab.stepped())
     assert found.rig.value("friction.normal_memory.alpha") == 0.4
     moved = ss.predict(rig, lab.stepped(), transfer=["slider.stiffness"])
     assert moved.rig.stiffness == lab.stepped().values["slider.stiffness"]
@@ -59,13 +59,13 @@ def test_a_prediction_keeps_the_memory_of_normal_stress_that_the_fit_has_not():
 
 def test_promised_precision_is_what_a_fit_has():
     rig = lab.rig()
-    promise = ss.precision(rig, lab.STEP, noise=lab.NOISE, samples=1000)
+    promise = ss.experiments.precision(rig, lab.STEP, noise=lab.NOISE, samples=1000)
     for name, error in promise.errors.items():
         assert error == pytest.approx(lab.stepped().errors[name], rel=0.1)
 
 
 def test_the_best_experiment_comes_first():
-    found = ss.best_protocol(lab.rig(alpha=0.4), fixed=["slider.stiffness"], samples=1500)
+    found = ss.experiments.best_protocol(lab.rig(alpha=0.4), fixed=["slider.stiffness"], samples=1500)
     errors = [one.errors[found.parameter] for one in found.found.values()]
     assert errors == sorted(errors)
     assert found.best != "step"
@@ -78,4 +78,4 @@ def test_which_parameter_an_experiment_is_for():
     """That which friction's law calls its share of a change of stress; where there is none, it has to be said."""
     rig = lab.rig()
     with pytest.raises(ss.ParameterError, match=r"parameter: missing; allowed: .*friction\.a.*\(free parameters\)"):
-        ss.best_protocol(rig, {"one": lab.STEP}, until=80.0, samples=100)
+        ss.experiments.best_protocol(rig, {"one": lab.STEP}, until=80.0, samples=100)

@@ -10,7 +10,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting.planning import make_plan
 
 RELOADS = ss.Protocol(
-    pieces=(ss.Hold(at=40.0, duration=60.0), ss.VelocityStep(at=160.37, to=4e-6)), until=260.0
+    pieces=(ss.protocol.Hold(at=40.0, duration=60.0), ss.protocol.VelocityStep(at=160.37, to=4e-6)), until=260.0
 )  # slides at 1 um/s until 40 s, rests until 100 s, slides again
 REST = 70.0  # where the record is cut: 30 s into the hold
 

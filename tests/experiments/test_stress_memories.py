@@ -18,10 +18,10 @@ from steadyslip.experiments.spec import spec_from_text
 ALPHA = 0.3
 BY = 0.04 * lab.STRESS
 PRESSED = ss.Protocol(
-    pieces=(ss.VelocityStep(at=30.13, to=3e-6), ss.NormalStressStep(at=60.41, by=BY),
-            ss.NormalStressStep(at=100.41, by=-BY)), until=140.0,
+    pieces=(ss.protocol.VelocityStep(at=30.13, to=3e-6), ss.protocol.NormalStressStep(at=60.41, by=BY),
+            ss.protocol.NormalStressStep(at=100.41, by=-BY)), until=140.0,
 )  # fmt: skip
-PRAKASH = ss.PrakashClifton(direct_share=0.4, slip_distance=30e-6)
+PRAKASH = ss.laws.PrakashClifton(direct_share=0.4, slip_distance=30e-6)
 MEMORIES = ("none", "linker-dieterich", "prakash-clifton")
 
 
@@ -33,7 +33,7 @@ def pressed():
 def lagging_rig():
     rig = lab.rig()
     return ss.Slider(
-        friction=ss.RateState(**lab.TRUTH, v_ref=lab.SLOW, normal_memory=PRAKASH),
+        friction=ss.laws.RateState(**lab.TRUTH, v_ref=lab.SLOW, normal_memory=PRAKASH),
         contact=rig.contact, stiffness=rig.stiffness, drive=rig.drive,
     )  # fmt: skip
 
@@ -167,7 +167,9 @@ def test_a_law_without_memory_says_what_one_would_make_of_it():
 
 def test_white_residuals_speak_for_no_memory():
     by = 0.01 * lab.STRESS  # of more the block would be left behind, or run ahead, with no memory at all
-    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=30.13, to=3e-6), ss.NormalStressStep(at=60.41, by=by)), until=120)
+    protocol = ss.Protocol(
+        pieces=(ss.protocol.VelocityStep(at=30.13, to=3e-6), ss.protocol.NormalStressStep(at=60.41, by=by)), until=120
+    )
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol, 1, count=300))
     assert "residuals are white, which speaks for none" in " ".join(str(fit).split())
 

@@ -12,7 +12,11 @@ import steadyslip as ss
 from steadyslip.experiments.fitting.planning import make_plan
 
 STEPS = ss.Protocol(
-    pieces=(ss.VelocityStep(at=20.0, to=3e-6), ss.VelocityStep(at=80.37, to=9e-6), ss.VelocityStep(at=130.21, to=3e-6)),
+    pieces=(
+        ss.protocol.VelocityStep(at=20.0, to=3e-6),
+        ss.protocol.VelocityStep(at=80.37, to=9e-6),
+        ss.protocol.VelocityStep(at=130.21, to=3e-6),
+    ),
     until=200.0,
 )
 CUT = 22.0  # s: 2 s, half a slip distance, after a step, where friction and state are far from steady
@@ -36,7 +40,7 @@ def truth(rig):
     return run["friction"][1] - level, run["Theta"][1] - settled
 
 
-@pytest.mark.parametrize(("evolution", "guess"), [(ss.Slip(), "slip"), (ss.Aging(), "aging")])
+@pytest.mark.parametrize(("evolution", "guess"), [(ss.laws.Slip(), "slip"), (ss.laws.Aging(), "aging")])
 def test_where_a_record_begins_is_found(evolution, guess):
     fit = ss.fit(ss.lab_rig(guess), cut(1, evolution), initial="free")
     friction, state = truth(lab.rig(evolution))
@@ -117,7 +121,7 @@ def test_the_drive_may_be_the_spring():
     """A servo that pushes in proportion to what the load point lacks, behind no spring of its own."""
     base = lab.rig()
     plain = make_plan(base, cut(3), ["friction.a", "slider.stiffness"], initial="free")
-    servo = replace(base, stiffness=0.0, drive=ss.PID(velocity=lab.SLOW, kp=lab.STIFFNESS))
+    servo = replace(base, stiffness=0.0, drive=ss.machine.PID(velocity=lab.SLOW, kp=lab.STIFFNESS))
     other = make_plan(servo, cut(3), ["friction.a", "drive.kp"], initial="free")
     names = [one.name for one in plain.space().unknowns]
     values = [{"friction.a": 0.01, "slider.stiffness": 1e10, "initial.friction": 0.004}.get(n, 0.3) for n in names]
@@ -151,6 +155,6 @@ def test_figures_name_what_is_fitted_of_the_beginning(fit):
 
 @pytest.mark.parametrize("count", [27, 1000])
 def test_histograms_of_few_draws_have_few_bars(count, fit):
-    panels = np.ravel(ss.normal_draws(fit, count).plot())
+    panels = np.ravel(ss.experiments.normal_draws(fit, count).plot())
     bars = len(next(panel for panel in panels if panel is not None).patches)
     assert bars == round(2 * count ** (1 / 3))

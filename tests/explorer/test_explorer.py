@@ -149,7 +149,7 @@ def test_verdicts_on_users_laws_are_those_of_python(who):
 
 
 def test_where_there_is_no_steady_sliding_it_says_so():
-    locked = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0))
+    locked = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-1.0))
     found = Explored(locked)(locked)
     assert found["status"] == 0
     assert found["slope"] > 1
@@ -157,7 +157,7 @@ def test_where_there_is_no_steady_sliding_it_says_so():
 
 
 def test_conditions_between_numbers_are_checked():
-    crank = rig(contact=ss.SliderCrank(preload=SIGMA, crank_angle=1.0, crank_radius=0.1, rod_length=0.3))
+    crank = rig(contact=ss.laws.SliderCrank(preload=SIGMA, crank_angle=1.0, crank_radius=0.1, rod_length=0.3))
     explored = Explored(crank)
     place = json.loads(json.dumps(linear_part(crank)[1]))["parameters"].index("contact.rod_length")
     explored(crank)
@@ -215,7 +215,7 @@ def test_no_two_parameters_of_a_part_are_called_the_same():
 
 # -- links and files
 
-OWN = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
+OWN = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
 TEXT = st.text(max_size=200) | st.lists(
     st.tuples(st.sampled_from(["friction.a", "contact.angle", "slider.stiffness", "__proto__", "constructor", "a=b"]),
               st.text(max_size=20) | st.floats().map(repr)).map("=".join), max_size=5).map("&".join)  # fmt: skip
@@ -331,20 +331,22 @@ def test_a_path_that_goes_round_and_round_is_as_long_as_the_drawing_can_show():
 # -- motion
 
 MOVING = {
-    "massless": rig(stiffness=9e9, friction=rate_state(evolution=ss.Aging())),
-    "stick-slip": rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e4, stiffness=3e9),
+    "massless": rig(stiffness=9e9, friction=rate_state(evolution=ss.laws.Aging())),
+    "stick-slip": rig(friction=rate_state(evolution=ss.laws.Aging()), radiation_damping=1e4, stiffness=3e9),
     "with mass": rig(mass=1e3, stiffness=6e9),
-    "controller": rig(stiffness=None, drive=ss.PID(V0, kp=9e9, ki=1e8), mass=1e3),
-    "regularised": rig(friction=ONE_MEMORY[2], contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=1.2e10),
+    "controller": rig(stiffness=None, drive=ss.machine.PID(V0, kp=9e9, ki=1e8), mass=1e3),
+    "regularised": rig(
+        friction=ONE_MEMORY[2], contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=1.2e10
+    ),
     "solved": rig(friction=ONE_MEMORY[3], stiffness=2e10),
     "users' laws": USERS["both"].with_values({"stiffness": 2e10}),
 }
 DISTURBED = {
-    "velocity": (2.0, ss.VelocityStep(at=1.0, to=2 * V0)),
-    "push": (1e-7, ss.DisplacementStep(at=1.0, by=1e-7)),
-    "normal": (2e5, ss.NormalStressStep(at=1.0, by=2e5)),
-    "pull": (1e5, ss.DisturbanceStep(at=1.0, by=1e5)),
-    "hold": (3.0, ss.Hold(at=1.0, duration=3.0)),
+    "velocity": (2.0, ss.protocol.VelocityStep(at=1.0, to=2 * V0)),
+    "push": (1e-7, ss.protocol.DisplacementStep(at=1.0, by=1e-7)),
+    "normal": (2e5, ss.protocol.NormalStressStep(at=1.0, by=2e5)),
+    "pull": (1e5, ss.protocol.DisturbanceStep(at=1.0, by=1e5)),
+    "hold": (3.0, ss.protocol.Hold(at=1.0, duration=3.0)),
     "blow": (10.0, None),
 }
 

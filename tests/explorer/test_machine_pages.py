@@ -70,10 +70,14 @@ def disturbances(machine, at):
     v0, force = machine.value("drive.velocity"), 0.01 * steady.contacts[contact].normal_force
     blown = {f"{body}.v": 3 * steady.speeds[body]}
     return [
-        ({"disturbance": "velocity", "size": 2.0}, ss.VelocityStep(at=at, to=2 * v0), {}),
-        ({"disturbance": "pull", "on": body, "size": force}, ss.DisturbanceStep(at=at, by=force, on=body), {}),
-        ({"disturbance": "normal", "on": contact, "size": force}, ss.NormalStressStep(at=at, by=force, on=contact), {}),
-        ({"disturbance": "hold", "size": at}, ss.Hold(at=at, duration=at), {}),
+        ({"disturbance": "velocity", "size": 2.0}, ss.protocol.VelocityStep(at=at, to=2 * v0), {}),
+        ({"disturbance": "pull", "on": body, "size": force}, ss.protocol.DisturbanceStep(at=at, by=force, on=body), {}),
+        (
+            {"disturbance": "normal", "on": contact, "size": force},
+            ss.protocol.NormalStressStep(at=at, by=force, on=contact),
+            {},
+        ),
+        ({"disturbance": "hold", "size": at}, ss.protocol.Hold(at=at, duration=at), {}),
         ({"disturbance": "blow", "on": body, "size": 3.0}, (), blown),
     ]
 

@@ -12,31 +12,31 @@ from steadyslip.core.format import typeset
 from steadyslip.verdict.causes import why_all, why_none
 from steadyslip.verdict.words import headline
 
-BRISTLES = ss.LuGre(
+BRISTLES = ss.laws.LuGre(
     mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
 )
 HEAVY = ss.Slider(
     friction=BRISTLES,
-    contact=ss.Linear(steady_normal_stress=1e5, b3=0.0),
+    contact=ss.laws.LinearNormalStress(steady_normal_stress=1e5, b3=0.0),
     stiffness=1e6,
     mass=5e5,
-    drive=ss.Steady(1e-3),
+    drive=ss.machine.SteadyDrive(1e-3),
 )
 RIGS = {
     "plain": rig(),
-    "area": rig(area=0.01, contact=ss.Lift(preload=SIGMA, lift=1e11, v_ref=V0)),
-    "inclined": rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5)),
-    "axial": rig(contact=ss.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
+    "area": rig(area=0.01, contact=ss.laws.Lift(preload=SIGMA, lift=1e11, v_ref=V0)),
+    "inclined": rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5)),
+    "axial": rig(contact=ss.laws.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
     "lifted": rig(
-        friction=rate_state(mu_ref=0.3, normal_memory=ss.LinkerDieterich(alpha=0.9)),
-        contact=ss.InclinedSpring(preload=SIGMA, angle=1.2),
+        friction=rate_state(mu_ref=0.3, normal_memory=ss.laws.LinkerDieterich(alpha=0.9)),
+        contact=ss.laws.InclinedSpring(preload=SIGMA, angle=1.2),
     ),
-    "gain": rig(stiffness=None, drive=ss.PD(V0, kp=4e9)),
-    "integrated": rig(stiffness=None, drive=ss.PID(V0, kp=9e9, ki=1e8), mass=1e3),
-    "together": rig(stiffness=1e9, drive=ss.PD(V0, kp=4e9, kd=1e9)),
+    "gain": rig(stiffness=None, drive=ss.machine.PD(V0, kp=4e9)),
+    "integrated": rig(stiffness=None, drive=ss.machine.PID(V0, kp=9e9, ki=1e8), mass=1e3),
+    "together": rig(stiffness=1e9, drive=ss.machine.PD(V0, kp=4e9, kd=1e9)),
     "two states": rig(friction=LAWS["two states"]),
     "heavy": HEAVY,
-    "undamped": replace(HEAVY, friction=ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1e-3)),
+    "undamped": replace(HEAVY, friction=ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1e-3)),
 }
 NEAR, FAR = 1.0003, 1e3  # times an edge; to three digits the first would be one
 

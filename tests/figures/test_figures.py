@@ -21,8 +21,8 @@ matplotlib.use("Agg")
 PAPER = {"a": 0.0145, "b": 0.0160, "mu_ss": 0.7, "alpha": 0.56}
 ANGLES = np.array([-45, -30, 0, 30, 45]) * deg
 
-STATES = (ss.State(b=0.0145, d_c=1 * um), ss.State(b=0.01218, d_c=20 * um))
-TWO_STATES = ss.RateState(a=0.0145, states=STATES, mu_ref=0.7, v_ref=1 * um / s)
+STATES = (ss.laws.State(b=0.0145, d_c=1 * um), ss.laws.State(b=0.01218, d_c=20 * um))
+TWO_STATES = ss.laws.RateState(a=0.0145, states=STATES, mu_ref=0.7, v_ref=1 * um / s)
 
 
 def rig_with(friction=None, contact=None, **slider):
@@ -31,17 +31,22 @@ def rig_with(friction=None, contact=None, **slider):
 
 
 STRENGTHENING = paper_rig().with_values({"friction.b": 0.01})
-PRAKASH_CLIFTON = replace(paper_rig().friction, normal_memory=ss.PrakashClifton())
+PRAKASH_CLIFTON = replace(paper_rig().friction, normal_memory=ss.laws.PrakashClifton())
 LUGRE = ss.Slider(
-    friction=ss.LuGre(bristle_stiffness=1e5, bristle_damping=10.0, mu_coulomb=0.1, mu_static=0.15, v_stribeck=1e-3),
-    contact=ss.Constant(preload=1 * MPa),
+    friction=ss.laws.LuGre(
+        bristle_stiffness=1e5, bristle_damping=10.0, mu_coulomb=0.1, mu_static=0.15, v_stribeck=1e-3
+    ),
+    contact=ss.laws.ConstantNormalStress(preload=1 * MPa),
     stiffness=1e9,
     mass=100.0,
-    drive=ss.Steady(1e-3),
+    drive=ss.machine.SteadyDrive(1e-3),
 )
-CONTROLLED = replace(paper_rig(0.0), stiffness=None, drive=ss.PID(1 * um / s, kp=20e9, kd=0.0, ki=1e8))
+CONTROLLED = replace(paper_rig(0.0), stiffness=None, drive=ss.machine.PID(1 * um / s, kp=20e9, kd=0.0, ki=1e8))
 PRESS = replace(
-    paper_rig(), contact=ss.Triaxial(angle=30 * deg, confining_pressure=5 * MPa), stiffness=None, axial_stiffness=90e9
+    paper_rig(),
+    contact=ss.laws.Triaxial(angle=30 * deg, confining_pressure=5 * MPa),
+    stiffness=None,
+    axial_stiffness=90e9,
 )
 ODD = {
     "locked-up": paper_rig(-60 * deg),
@@ -114,7 +119,7 @@ def test_only_locked_up_angles_still_draw():
 
 
 def test_the_preload_or_the_steady_stress_give_the_same_curves():
-    given = rig_with(contact=ss.InclinedSpring(steady_normal_stress=7 * MPa, angle=0.0))
+    given = rig_with(contact=ss.laws.InclinedSpring(steady_normal_stress=7 * MPa, angle=0.0))
     m_star = np.geomspace(1e-4, 1e-2, 5)
     curves = [mass.dimensionless_critical_stiffness(rig, -0.5, m_star) for rig in (paper_rig(), given)]
     np.testing.assert_allclose(*curves, rtol=32 * np.finfo(float).eps)
@@ -130,8 +135,8 @@ def test_rigs_with_other_friction_have_the_figure_too():
 
 def test_rigs_without_such_a_figure_are_told_why():
     with pytest.raises(ss.NotAvailable, match="inclined-spring"):
-        figures.critical_stiffness_against_mass(rig_with(contact=ss.Constant(preload=5 * MPa)))
-    no_distance = replace(LUGRE, contact=ss.InclinedSpring(preload=1 * MPa, angle=0.1))
+        figures.critical_stiffness_against_mass(rig_with(contact=ss.laws.ConstantNormalStress(preload=5 * MPa)))
+    no_distance = replace(LUGRE, contact=ss.laws.InclinedSpring(preload=1 * MPa, angle=0.1))
     with pytest.raises(ss.NotAvailable, match="slip distance"):
         figures.critical_stiffness_against_mass(no_distance)
     for bad in ([0.0, 1.0], [1.0], [np.nan, 1.0]):
@@ -211,7 +216,7 @@ def test_a_point_outside_the_chart_is_not_marked():
 
 
 def test_lift_off_is_told_from_lock_up():
-    contact = ss.Lift(preload=1 * MPa, lift=1e11, v_ref=1 * um / s)
+    contact = ss.laws.Lift(preload=1 * MPa, lift=1e11, v_ref=1 * um / s)
     ax = figures.stability_chart(
         rig_with(contact=contact),
         "lift",

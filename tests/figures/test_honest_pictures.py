@@ -39,7 +39,7 @@ def test_samples_without_a_safety_factor_count_as_failures():
 
 def test_a_settled_run_is_drawn_flat_with_ticks_that_differ():
     """Round-off in the velocity is no change."""
-    run = ss.simulate(unit_rig("aging", 0.5, 1.5), ss.VelocityStep(at=5.0, to=1.0), until=60.0)
+    run = ss.simulate(unit_rig("aging", 0.5, 1.5), ss.protocol.VelocityStep(at=5.0, to=1.0), until=60.0)
     figure = Figure()
     panels = run.plot(ax=figure.subplots(3, 1))
     figure.canvas.draw()

@@ -101,7 +101,7 @@ def test_the_ellipses_of_a_fit_hold_68_and_95_percent(fit):
     panels = ss.figures.corner(fit, Figure(figsize=(9, 9)).subplots(count, count))
     assert panels[-1, 0].get_xlabel() == "a (1)"
     assert not panels[0, -1].get_visible()
-    draws = ss.normal_draws(fit, 20_000)
+    draws = ss.experiments.normal_draws(fit, 20_000)
     points = np.column_stack([draws["friction.a"], draws["friction.b"]])
     for line, share in zip(panels[1, 0].lines[:2], (0.68, 0.95), strict=True):
         inside = Path(np.column_stack(line.get_data())).contains_points(points)
@@ -109,7 +109,7 @@ def test_the_ellipses_of_a_fit_hold_68_and_95_percent(fit):
 
 
 def test_the_contours_of_draws_hold_68_and_95_percent(fit):
-    draws = ss.normal_draws(fit, 4000)
+    draws = ss.experiments.normal_draws(fit, 4000)
     count = len(fit.names)
     panels = ss.figures.corner(draws, Figure(figsize=(9, 9)).subplots(count, count))
     (found,) = [item for item in panels[1, 0].collections if isinstance(item, ContourSet)]
@@ -126,7 +126,7 @@ def test_a_region_holds_its_share():
 
 
 def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
-    found = ss.profile(fit, "d_c", count=17)
+    found = ss.experiments.profile(fit, "d_c", count=17)
     ax = found.plot(Figure().subplots())
     ends = sorted(line.get_xdata()[0] for line in ax.lines if len(set(line.get_xdata())) == 1)
     expected = sorted(1e6 * np.array([*found.interval(0.68), *found.interval(0.95)]))
@@ -145,7 +145,7 @@ def test_laws_and_experiments_as_bars():
     assert [label.get_text() for label in ax.get_yticklabels()] == list(found.fits)[::-1]
     assert min(bar.get_width() for bar in ax.patches) == 0.0
     rig = lab.rig(alpha=0.35)
-    ranked = ss.best_protocol(rig, fixed=["slider.stiffness"], samples=200)
+    ranked = ss.experiments.best_protocol(rig, fixed=["slider.stiffness"], samples=200)
     drawn = ranked.plot(Figure().subplots())
     known = [one.errors[ranked.parameter] for one in ranked.found.values()]
     widths = sorted(bar.get_width() for bar in drawn.patches)

@@ -16,7 +16,8 @@ EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.
 MACHINES = {path.stem: ss.read_rig(path) for path in EXAMPLES} | {
     "three bodies": three_bodies(), "two blocks": two_blocks(1.0, -0.1, 0.2),
     "mode coupling": brake(rate_state(1, 0, 1)),
-    "late": replace(two_mass(), drive=ss.Cascade(velocity=1.0, body="motor", measured="table", kv=1.0, kp=1.0, tn=1.0,
+    "late": replace(two_mass(), drive=ss.machine.Cascade(velocity=1.0, body="motor", measured="table", kv=1.0, kp=1.0,
+    tn=1.0,
                                                  delay=0.1)),
     **{f"random {seed}": at_random(seed)[0] for seed in range(12)},
 }  # fmt: skip

@@ -12,17 +12,17 @@ matplotlib.use("Agg")
 
 
 def rig():
-    friction = ss.RateState(
-        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.56)
+    friction = ss.laws.RateState(
+        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=0.56)
     )
-    contact = ss.InclinedSpring(preload=5e6, angle=-np.pi / 4)
-    return ss.Slider(friction=friction, contact=contact, stiffness=9e9, drive=ss.Steady(1e-6))
+    contact = ss.laws.InclinedSpring(preload=5e6, angle=-np.pi / 4)
+    return ss.Slider(friction=friction, contact=contact, stiffness=9e9, drive=ss.machine.SteadyDrive(1e-6))
 
 
 @pytest.fixture(scope="module")
 def maps(tmp_path_factory):
     folder = tmp_path_factory.mktemp("maps")
-    angle, stiffness = ss.Grid("-80 deg", "80 deg", 65), ss.Grid("0.1 GPa/m", "100 GPa/m", 49, "log")
+    angle, stiffness = ss.maps.Grid("-80 deg", "80 deg", 65), ss.maps.Grid("0.1 GPa/m", "100 GPa/m", 49, "log")
 
     def made(name, *arguments, **options):
         return ss.run_map(ss.Map(rig(), *arguments, **options), folder / f"{name}.zarr", workers=1)
@@ -30,10 +30,10 @@ def maps(tmp_path_factory):
     return {
         "chart": made("chart", {"angle": angle, "stiffness": stiffness, "friction.b": [0.016, 0.018, 0.02]},
                       ["status", "safety_factor", "growth_rate", "stable_stiffness", "onset", "critical_stiffness"]),
-        "samples": made("samples", {"angle": ss.Grid("-50 deg", "50 deg", 11), "stiffness": stiffness},
-                        ["status", "critical_stiffness"], samples=ss.Samples({"friction.a": (0.012, 0.0155)}, 64)),
+        "samples": made("samples", {"angle": ss.maps.Grid("-50 deg", "50 deg", 11), "stiffness": stiffness},
+                        ["status", "critical_stiffness"], samples=ss.maps.Samples({"friction.a": (0.012, 0.0155)}, 64)),
         "points": made("points", compute=["status", "safety_factor"],
-                       samples=ss.Samples({"friction.a": (0.01, 0.02), "friction.b": (0.01, 0.02)}, 128)),
+                       samples=ss.maps.Samples({"friction.a": (0.01, 0.02), "friction.b": (0.01, 0.02)}, 128)),
     }  # fmt: skip
 
 
@@ -159,13 +159,14 @@ def test_other_parameters_are_held_where_the_rig_or_the_user_says(maps):
 
 
 def test_large_maps_are_thinned(tmp_path):
-    plan = ss.Map(rig(), {"angle": ss.Grid("-40 deg", "80 deg", 3001)}, ["growth_rate"])
+    plan = ss.Map(rig(), {"angle": ss.maps.Grid("-40 deg", "80 deg", 3001)}, ["growth_rate"])
     ax = ss.run_map(plan, tmp_path / "long.zarr", workers=1).plot()
     assert 250 < len(ax.lines[0].get_xdata()) <= 500
 
 
 def test_refined_points_and_sensitivity_are_drawn(maps, tmp_path):
-    small = ss.Map(rig(), {"angle": ss.Grid("-40 deg", "80 deg", 9), "stiffness": ss.Grid(1e9, 1e11, 9, "log")},
+    small = ss.Map(rig(), {"angle": ss.maps.Grid("-40 deg", "80 deg", 9),
+        "stiffness": ss.maps.Grid(1e9, 1e11, 9, "log")},
                    ["status"])  # fmt: skip
     found = ss.refine(ss.run_map(small, tmp_path / "small.zarr", workers=1), 3)
     ax = found.plot()
@@ -182,21 +183,23 @@ def test_refined_points_and_sensitivity_are_drawn(maps, tmp_path):
 
 def test_white_has_words(tmp_path):
     """Where a picture has no number, the legend says why: asked of the rigs there, and of the store."""
-    over = {"friction.b": ss.Grid(0.010, 0.03, 9), "contact.angle": ss.Grid(-1.4, 1.2, 9)}
+    over = {"friction.b": ss.maps.Grid(0.010, 0.03, 9), "contact.angle": ss.maps.Grid(-1.4, 1.2, 9)}
     found = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "white.zarr", workers=1)
     expected = "no critical stiffness (no steady sliding, stable at every stiffness)"
     assert expected in labels(found.plot())
     line = found.plot(x="friction.b", y="")
     assert "where there is no line: no critical stiffness (stable at every stiffness)" in labels(line)
-    over = {"friction.b": ss.Grid(0.02, 0.03, 4), "contact.angle": ss.Grid(-0.1, 0.1, 4)}
+    over = {"friction.b": ss.maps.Grid(0.02, 0.03, 4), "contact.angle": ss.maps.Grid(-0.1, 0.1, 4)}
     full = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "full.zarr", workers=1)
     assert labels(full.plot()) == []
 
 
 def test_numbers_out_of_range_have_words(tmp_path):
-    screw = ss.LuGre(mu_coulomb=0.12, mu_static=0.18, v_stribeck=1e-3, bristle_stiffness=2e5, bristle_damping=30.0)
-    base = ss.Slider(friction=screw, contact=rig().contact, stiffness=4e10, mass=3e3, drive=ss.Steady(5e-4))
-    over = {"friction.v_stribeck": list(np.geomspace(1e-200, 1e-1, 8)), "stiffness": ss.Grid(1e10, 1e12, 4)}
+    screw = ss.laws.LuGre(mu_coulomb=0.12, mu_static=0.18, v_stribeck=1e-3, bristle_stiffness=2e5, bristle_damping=30.0)
+    base = ss.Slider(
+        friction=screw, contact=rig().contact, stiffness=4e10, mass=3e3, drive=ss.machine.SteadyDrive(5e-4)
+    )
+    over = {"friction.v_stribeck": list(np.geomspace(1e-200, 1e-1, 8)), "stiffness": ss.maps.Grid(1e10, 1e12, 4)}
     plan = ss.Map(base, over, ["status", "critical_stiffness"], chunk=4)
     found = ss.run_map(plan, tmp_path / "screw.zarr", workers=1)
     assert found.statistics()["status"]["out of range"] > 0
@@ -208,7 +211,7 @@ def test_numbers_out_of_range_have_words(tmp_path):
 
 
 def test_the_text_of_a_map_without_status_says_where_to_look(tmp_path):
-    over = {"friction.b": ss.Grid(0.010, 0.03, 9)}
+    over = {"friction.b": ss.maps.Grid(0.010, 0.03, 9)}
     bare = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "bare.zarr", workers=1)
     told = ss.run_map(ss.Map(rig(), over, ["critical_stiffness", "status"]), tmp_path / "told.zarr", workers=1)
     hint = "compute status as well to know of the rest"

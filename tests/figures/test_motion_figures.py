@@ -18,7 +18,7 @@ matplotlib.use("Agg")
 
 @pytest.fixture(scope="module")
 def spiral():
-    return ss.simulate(unit_rig("slip", 0.5, 0.6), ss.VelocityStep(at=5.0, to=1.5), until=60.0)
+    return ss.simulate(unit_rig("slip", 0.5, 0.6), ss.protocol.VelocityStep(at=5.0, to=1.5), until=60.0)
 
 
 def lines(ax):
@@ -39,7 +39,7 @@ def test_history_shows_the_run(spiral):
 
 
 def test_blow_up_is_said_and_clipped():
-    run = ss.simulate(unit_rig("slip", 0.5, 0.3), ss.VelocityStep(at=5.0, to=1.5), until=60.0)
+    run = ss.simulate(unit_rig("slip", 0.5, 0.3), ss.protocol.VelocityStep(at=5.0, to=1.5), until=60.0)
     panels = run.plot()
     assert "blow-up" in panels[0].get_title()
     low, high = panels[0].get_ylim()
@@ -64,7 +64,7 @@ def test_the_dot_is_where_a_stable_run_ends_and_stress_steps_are_named(spiral):
     dot = lines(spiral.plot("phase", ax=Figure().subplots()))["_steady sliding"]
     assert dot.get_xdata()[0] == pytest.approx(np.log(1.5))
     assert dot.get_ydata()[0] == pytest.approx(spiral["spring_stress"][-1], rel=1e-3)
-    pressed = ss.simulate(paper_rig(), ss.NormalStressStep(at=1.0, by=1e4), until=5.0)
+    pressed = ss.simulate(paper_rig(), ss.protocol.NormalStressStep(at=1.0, by=1e4), until=5.0)
     drawn = lines(pressed.plot("phase", ax=Figure().subplots()))
     assert "steady states before the change of normal stress" in drawn
     assert "_steady sliding" not in drawn
@@ -78,7 +78,7 @@ def test_history_needs_three_axes(spiral):
 
 def test_reversing_runs_can_be_drawn():
     rig = unit_rig("slip", 0.5, 3.0, regularised=True)
-    run = ss.simulate(rig, ss.VelocityStep(at=1.0, to=-1.0), until=100.0)
+    run = ss.simulate(rig, ss.protocol.VelocityStep(at=1.0, to=-1.0), until=100.0)
     panels = run.plot(ax=Figure().subplots(3, 1))
     assert panels[0].get_yscale() == "linear"
     run.plot("phase", ax=Figure().subplots())

@@ -119,37 +119,44 @@ def test_everything_that_is_wrong_with_a_file_comes_at_once():
 
 ROCK, BOTH = rate_state(1, 0, 1), ("motor", "table")
 STRUCTURE = {
-    "floats": (two_mass(), {"links": {"screw": ss.Spring(between=("motor", "table"), damping=1.0)}}, "bodies.table"),
-    "float": (two_mass(), {"bodies": {**two_mass().bodies, "stray": ss.SlidingBody()}}, "bodies.stray"),
+    "floats": (two_mass(), {"links": {"screw": ss.machine.Spring(between=("motor", "table"), damping=1.0)}},
+    "bodies.table"),
+    "float": (two_mass(), {"bodies": {**two_mass().bodies, "stray": ss.machine.SlidingBody()}}, "bodies.stray"),
     "unknown body": (two_mass(), {"contacts": {"guide": surface("shelf", rate_state(1, 0, 1))}}, "contacts.guide.body"),
     "cannot slide on itself": (
         two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="table")}}, "contacts.g.against"),
     "do not slide": (
         two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="motor")}}, "contacts.g"),
     "write 'rotary-pd'": (
-        two_mass(), {"bodies": {"motor": ss.RotatingBody(), "table": ss.SlidingBody()}}, "drive.control"),
+        two_mass(), {"bodies": {"motor": ss.machine.RotatingBody(), "table": ss.machine.SlidingBody()}},
+        "drive.control"),
     "does not; see the kinds of link": (
-        two_mass(), {"links": {"screw": ss.Screw(between=BOTH, lead=1.0, stiffness=1.0)}}, "links.screw.between"),
+        two_mass(), {"links": {"screw": ss.machine.Screw(between=BOTH, lead=1.0, stiffness=1.0)}},
+        "links.screw.between"),
     "does not move away from the surface": (
-        two_mass(), {"links": {"screw": ss.Spring(between=BOTH, stiffness=1.0, angle=0.1)}}, "links.screw"),
+        two_mass(), {"links": {"screw": ss.machine.Spring(between=BOTH, stiffness=1.0, angle=0.1)}}, "links.screw"),
     "unknown link 'belt'": (
         two_mass(), {"contacts": {"g": surface("table", ROCK, loaded_by="belt")}}, "contacts.g.loaded_by"),
     "needs a body that moves away": (
-        two_mass(), {"contacts": {"g": ss.Surface(body="table", friction=rate_state(1, 0, 1),
-                                                  contact=ss.Compliant(normal_stiffness=1.0))}}, "contacts.g.contact"),
+        two_mass(), {"contacts": {"g": ss.machine.Surface(body="table", friction=rate_state(1, 0, 1),
+                                                  contact=ss.laws.Compliant(normal_stiffness=1.0))}},
+                                                  "contacts.g.contact"),
     "nothing carries it": (
         brake(ROCK), {"contacts": {"disc": surface("pad", ROCK)},
-                      "links": {"arm": ss.Spring(between=("drive", "pad"), stiffness=1.0)}}, "bodies.pad"),
+                      "links": {"arm": ss.machine.Spring(between=("drive", "pad"), stiffness=1.0)}}, "bodies.pad"),
     "slip is a radius": (
         three_bodies(), {"contacts": {"g": surface("motor", rate_state(1, 0, 1))}}, "contacts.g.radius"),
     "there are none": (two_mass(), {"contacts": {}}, "contacts"),
     "stands still": (
-        two_mass(), {"bodies": {**two_mass().bodies, "post": ss.SlidingBody()},
-                     "links": {**two_mass().links, "bolt": ss.Spring(between=("ground", "post"), stiffness=1.0)},
-                     "drive": ss.PositionPD(velocity=1.0, body="motor", measured="post", kp=1.0)}, "drive.measured"),
+        two_mass(), {"bodies": {**two_mass().bodies, "post": ss.machine.SlidingBody()},
+                     "links": {**two_mass().links, "bolt": ss.machine.Spring(between=("ground", "post"),
+                     stiffness=1.0)},
+                     "drive": ss.machine.PositionPD(velocity=1.0, body="motor", measured="post", kp=1.0)},
+                     "drive.measured"),
     "contradict each other": (
         three_bodies(), {"links": {**three_bodies().links,
-                                   "second": ss.Screw(between=("motor", "head"), lead=0.4, stiffness=1.0)}}, "links"),
+                                   "second": ss.machine.Screw(between=("motor", "head"), lead=0.4, stiffness=1.0)}},
+                                   "links"),
 }  # fmt: skip
 
 
@@ -165,18 +172,18 @@ def test_a_machine_that_does_not_hang_together_says_where(words):
 def test_names_must_fit_into_dotted_names():
     for name in ("a.b", "1st", "", "x" * 50):
         with pytest.raises(ss.ParameterError, match="is no name"):
-            ss.Machine(bodies={name: ss.SlidingBody()}, contacts={}, drive=ss.Pull(velocity=1.0))
+            ss.Machine(bodies={name: ss.machine.SlidingBody()}, contacts={}, drive=ss.machine.Pull(velocity=1.0))
     with pytest.raises(ss.ParameterError, match=r"bodies\.ground"):
-        ss.Machine(bodies={"ground": ss.SlidingBody()}, contacts={}, drive=ss.Pull(velocity=1.0))
+        ss.Machine(bodies={"ground": ss.machine.SlidingBody()}, contacts={}, drive=ss.machine.Pull(velocity=1.0))
 
 
 def test_a_sliders_contact_cannot_be_compliant():
     with pytest.raises(ss.ParameterError, match="describe it as a machine"):
         ss.Slider(
             friction=rate_state(1, 0, 1),
-            contact=ss.Compliant(normal_stiffness=1.0),
+            contact=ss.laws.Compliant(normal_stiffness=1.0),
             stiffness=1.0,
-            drive=ss.Steady(1.0),
+            drive=ss.machine.SteadyDrive(1.0),
         )
 
 
@@ -184,7 +191,7 @@ def test_loops_that_contradict_each_other_are_refused_for_arrays_too():
     machine = three_bodies()
     closed = ss.Machine(
         bodies=machine.bodies, contacts=machine.contacts, drive=machine.drive,
-        links={**machine.links, "second": ss.Screw(between=("motor", "head"), lead=0.5, stiffness=1.0)},
+        links={**machine.links, "second": ss.machine.Screw(between=("motor", "head"), lead=0.5, stiffness=1.0)},
     )  # fmt: skip
     with pytest.raises(ss.ParameterError, match="contradict each other"):
         ss.eigenvalues(closed, {"links.second.lead": [0.5, 0.6]})

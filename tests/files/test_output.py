@@ -13,12 +13,12 @@ from steadyslip.files.output import whole_file, write_by_ending, write_text
 
 @pytest.fixture(scope="module")
 def history():
-    return ss.simulate(rig(stiffness=9e9), ss.VelocityStep(at=1.0, to=2e-6), until=2.0, times=[0.0, 2.0])
+    return ss.simulate(rig(stiffness=9e9), ss.protocol.VelocityStep(at=1.0, to=2e-6), until=2.0, times=[0.0, 2.0])
 
 
 @pytest.fixture(scope="module")
 def writers(history, tmp_path_factory):
-    plan = ss.Map(rig(), {"stiffness": ss.Grid(1e9, 3e9, 3)}, ["status"])
+    plan = ss.Map(rig(), {"stiffness": ss.maps.Grid(1e9, 3e9, 3)}, ["status"])
     found = ss.run_map(plan, tmp_path_factory.mktemp("map") / "map.zarr", workers=1, progress=False)
     return {
         "to_csv": history.to_csv,

@@ -35,18 +35,18 @@ def problems(text: str, *changes: str) -> dict[str, tuple[int | None, str]]:
 def test_example_is_the_paper_rig():
     rig = ss.read_rig(EXAMPLE)
     assert rig == ss.Slider(
-        friction=ss.RateState(
+        friction=ss.laws.RateState(
             a=0.0145,
             b=0.016,
             d_c=1e-6,
             mu_ref=0.7,
             v_ref=1e-6,
-            evolution=ss.Slip(),
-            normal_memory=ss.LinkerDieterich(alpha=0.56),
+            evolution=ss.laws.Slip(),
+            normal_memory=ss.laws.LinkerDieterich(alpha=0.56),
         ),
-        contact=ss.InclinedSpring(preload=5e6, angle=-math.pi / 4),
+        contact=ss.laws.InclinedSpring(preload=5e6, angle=-math.pi / 4),
         stiffness=9e9,
-        drive=ss.Steady(1e-6),
+        drive=ss.machine.SteadyDrive(1e-6),
     )
 
 
@@ -215,13 +215,13 @@ def test_a_byte_order_mark_is_no_obstacle(tmp_path):
 def test_changes_override_and_complete_the_file():
     rig = ss.rig_from_text(TEXT, changes=["contact.angle=10 deg", "stiffness='2 GPa/m'", "mass=3", "evolution=aging"])
     assert rig.contact.angle == pytest.approx(math.radians(10), rel=1e-15)
-    assert (rig.stiffness, rig.mass, type(rig.friction.evolution)) == (2e9, 3.0, ss.Aging)
+    assert (rig.stiffness, rig.mass, type(rig.friction.evolution)) == (2e9, 3.0, ss.laws.Aging)
     rig = ss.rig_from_text(
         TEXT.replace("a = 0.0145", ""), changes=["friction.a=0.01", "friction.normal_memory.alpha=.1"]
     )
     assert (rig.friction.a, rig.friction.normal_memory.alpha) == (0.01, 0.1)
     rig = ss.rig_from_text(TEXT, changes=["friction.evolution=nagata", "friction.c_nagata=0.02"])
-    assert rig.friction.evolution == ss.Nagata(c_nagata=0.02)
+    assert rig.friction.evolution == ss.laws.Nagata(c_nagata=0.02)
 
 
 @pytest.mark.parametrize(
@@ -265,10 +265,15 @@ def test_with_an_area_the_file_is_in_newtons():
 
 
 def test_a_law_without_name_cannot_be_written():
-    class Nameless(ss.FrictionLaw):
+    class Nameless(ss.laws.FrictionLaw):
         pass
 
-    rig = ss.Slider(friction=Nameless(), contact=ss.Constant(preload=1e6), stiffness=1e9, drive=ss.Steady(1e-6))
+    rig = ss.Slider(
+        friction=Nameless(),
+        contact=ss.laws.ConstantNormalStress(preload=1e6),
+        stiffness=1e9,
+        drive=ss.machine.SteadyDrive(1e-6),
+    )
     with pytest.raises(ss.ParameterError, match="has no name"):
         ss.rig_to_text(rig)
 
@@ -297,7 +302,7 @@ def test_every_parameter_has_unit_and_meaning():
 def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
     """In a process of its own, with a package that exists on its path only."""
     (tmp_path / "my_laws.py").write_text(
-        "import steadyslip as ss\nclass Mine(ss.RateState, name='my-law'):\n    'A law from elsewhere.'\n"
+        "import steadyslip as ss\nclass Mine(ss.laws.RateState, name='my-law'):\n    'A law from elsewhere.'\n"
     )
     info = tmp_path / "my_laws-1.0.dist-info"
     info.mkdir()
@@ -328,13 +333,16 @@ def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
 def test_rigs_with_an_area_come_back_to_the_last_bit(area, numbers, change):
     """Totals are written; where a total would not divide to the same number, the number per unit area is."""
     preload, stiffness, mass, damping = numbers
-    friction = ss.RateState(a=0.01, b=0.02, d_c=1e-6, mu_ref=0.6, v_ref=1e-6)
+    friction = ss.laws.RateState(a=0.01, b=0.02, d_c=1e-6, mu_ref=0.6, v_ref=1e-6)
     rig = ss.Slider(
-        friction=friction, contact=ss.Constant(preload=preload), stiffness=stiffness, mass=mass,
-        radiation_damping=damping, area=area, drive=ss.Steady(1e-6),
+        friction=friction, contact=ss.laws.ConstantNormalStress(preload=preload), stiffness=stiffness, mass=mass,
+        radiation_damping=damping, area=area, drive=ss.machine.SteadyDrive(1e-6),
     )  # fmt: skip
     protocol = ss.Protocol(
-        pieces=(ss.NormalStressStep(at=1.0, by=change[0]), ss.NormalStressTable(time=(0.0, 1.0), change=tuple(change))),
+        pieces=(
+            ss.protocol.NormalStressStep(at=1.0, by=change[0]),
+            ss.protocol.NormalStressTable(time=(0.0, 1.0), change=tuple(change)),
+        ),
         until=2.0,
     )
     text = ss.rig_to_text(rig, protocol)

@@ -9,7 +9,7 @@ from steadyslip.explorer.motion import motion_part
 from steadyslip.model.names import EVENTS, RESERVED_NAMES
 
 TIMES = np.linspace(0.0, 20.0, 21)
-PUSH = [ss.VelocityStep(at=1.0, to=2e-6), ss.NormalStressHarmonic(amplitude=1e5, period=3.0)]
+PUSH = [ss.protocol.VelocityStep(at=1.0, to=2e-6), ss.protocol.NormalStressHarmonic(amplitude=1e5, period=3.0)]
 PARAMETERS, REMEMBERED = ("a", "film", "share"), ("age", "gap")
 
 
@@ -37,7 +37,7 @@ def moved(own, mass):
 def of_machine(own, mass):
     """Answers on a machine, with its eigenvalues."""
     found = machine(own, mass)
-    push = [ss.VelocityStep(at=1.0, to=2e-6), ss.DisturbanceStep(at=3.0, by=1e5, on="two")]
+    push = [ss.protocol.VelocityStep(at=1.0, to=2e-6), ss.protocol.DisturbanceStep(at=3.0, by=1e5, on="two")]
     run = ss.simulate(found, push, until=8.0, times=TIMES[:9])
     seen = [run[name] for name in ("one.v", "two.x", "first.friction_force", "second.normal_force")]
     return [np.array(ss.eigenvalues(found)), *seen]
@@ -52,18 +52,24 @@ def judged(own, mass):
 
 def beyond(own, mass):
     """Kind of the onset, cycles, and the kick that is too large."""
-    rig = renamed(own, contact=ss.Constant(preload=5e6), mass=mass, radiation_damping=1e4, stiffness=7e9)
+    rig = renamed(
+        own, contact=ss.laws.ConstantNormalStress(preload=5e6), mass=mass, radiation_damping=1e4, stiffness=7e9
+    )
     onset = ss.hopf(rig)
     cycle = ss.cycles(rig, "slider.stiffness", between=(7.3e9, 7.5e9), doublings=0)
-    kick = ss.threshold(renamed(own, contact=ss.Constant(preload=5e6), mass=mass, stiffness=7.8e9), kick="velocity")
+    kick = ss.threshold(
+        renamed(own, contact=ss.laws.ConstantNormalStress(preload=5e6), mass=mass, stiffness=7.8e9), kick="velocity"
+    )
     periods = [np.array([one.period, one.peak_velocity]) for one in cycle.cycles]
     return [np.array([onset.coefficient, onset.value]), *periods, np.array([kick.size])]
 
 
 def fitted(own, mass):
     """A fit to a record that the rig itself made."""
-    rig, names = renamed(own, contact=ss.Constant(preload=5e6), mass=mass, stiffness=2e10), dict(own)
-    run = ss.simulate(rig, ss.VelocityStep(at=5.0, to=3e-6), until=30.0, times=np.linspace(0, 30, 301), events=False)
+    rig, names = renamed(own, contact=ss.laws.ConstantNormalStress(preload=5e6), mass=mass, stiffness=2e10), dict(own)
+    run = ss.simulate(
+        rig, ss.protocol.VelocityStep(at=5.0, to=3e-6), until=30.0, times=np.linspace(0, 30, 301), events=False
+    )
     rest = {"friction": run["friction"], "normal": run["normal_stress"], "displacement": run["load_displacement"]}
     record = ss.record_from_arrays(time=run["t"], **rest, source="synthetic")
     fit = ss.fit(rig, record, free=[f"friction.{names.get(one, one)}" for one in ("a", "b", "d_c")])

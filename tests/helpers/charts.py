@@ -4,17 +4,17 @@ import numpy as np
 
 import steadyslip as ss
 
-ANGLES = ss.Grid("-80 deg", "80 deg", 41)
-STIFFNESSES = ss.Grid("0.1 GPa/m", "100 GPa/m", 30, "log")
+ANGLES = ss.maps.Grid("-80 deg", "80 deg", 41)
+STIFFNESSES = ss.maps.Grid("0.1 GPa/m", "100 GPa/m", 30, "log")
 LINEAR = ("status", "critical_stiffness", "safety_factor", "margin", "growth_rate", "stable_stiffness")
 
 
 def rig(**changes):
-    friction = ss.RateState(
-        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.56)
+    friction = ss.laws.RateState(
+        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=0.56)
     )
-    contact = ss.InclinedSpring(preload=5e6, angle=-np.pi / 4)
-    parts = {"friction": friction, "contact": contact, "stiffness": 9e9, "drive": ss.Steady(1e-6)}
+    contact = ss.laws.InclinedSpring(preload=5e6, angle=-np.pi / 4)
+    parts = {"friction": friction, "contact": contact, "stiffness": 9e9, "drive": ss.machine.SteadyDrive(1e-6)}
     return ss.Slider(**(parts | changes))
 
 
@@ -32,7 +32,7 @@ RANGES = {"friction.a": (0.01, 0.02), "friction.d_c": ("1 um", "100 um", "log")}
 
 
 def sampling(points, **options):
-    plan = ss.Map(rig(), samples=ss.Samples(RANGES, points, **options), compute=["status"])
+    plan = ss.Map(rig(), samples=ss.maps.Samples(RANGES, points, **options), compute=["status"])
     return plan.sampling
 
 
@@ -44,7 +44,7 @@ def noise_map():
         return np.where(k < 4.5e9, 1.0, np.sin(1e9 * np.sin(k + 1e9 * vary["friction.a"])))
 
     plan = ss.Map(
-        rig(), {"stiffness": ss.Grid(1e9, 8e9, 8), "friction.a": ss.Grid(0.01, 0.02, 4000)},
-        [ss.measure(noise, arrays=True)], chunk=4000,
+        rig(), {"stiffness": ss.maps.Grid(1e9, 8e9, 8), "friction.a": ss.maps.Grid(0.01, 0.02, 4000)},
+        [ss.maps.measure(noise, arrays=True)], chunk=4000,
     )  # fmt: skip
     return plan

@@ -12,7 +12,12 @@ from scipy.optimize import brentq
 import steadyslip as ss
 
 V_REF, MU, PRELOAD = 1e-5, 0.6, 1e7
-EVOLUTIONS = {"slip": ss.Slip(), "aging": ss.Aging(), "prz": ss.PRZ(), "nagata": ss.Nagata(c_nagata=0.4)}
+EVOLUTIONS = {
+    "slip": ss.laws.Slip(),
+    "aging": ss.laws.Aging(),
+    "prz": ss.laws.PRZ(),
+    "nagata": ss.laws.Nagata(c_nagata=0.4),
+}
 
 
 class ByHand:
@@ -53,15 +58,19 @@ class ByHand:
         if len(self.b) == 1:
             own = {"b": self.b[0], "d_c": self.d_c[0], **cutoffs[0]}
         else:
-            own = {"states": [ss.State(b=b, d_c=d, **one) for b, d, one in zip(self.b, self.d_c, cutoffs, strict=True)]}
+            own = {
+                "states": [
+                    ss.laws.State(b=b, d_c=d, **one) for b, d, one in zip(self.b, self.d_c, cutoffs, strict=True)
+                ]
+            }
         if np.isfinite(self.v_a):
             own["a_cutoff_velocity"] = self.v_a
         if self.alpha:
-            own["normal_memory"] = ss.LinkerDieterich(alpha=self.alpha, sigma_ref=1e6)
-        law = ss.RateState(a=self.a, mu_ref=MU, v_ref=V_REF, evolution=EVOLUTIONS[self.evolution], **own)
-        contact = ss.InclinedSpring(preload=PRELOAD, angle=np.arctan(self.tan))
+            own["normal_memory"] = ss.laws.LinkerDieterich(alpha=self.alpha, sigma_ref=1e6)
+        law = ss.laws.RateState(a=self.a, mu_ref=MU, v_ref=V_REF, evolution=EVOLUTIONS[self.evolution], **own)
+        contact = ss.laws.InclinedSpring(preload=PRELOAD, angle=np.arctan(self.tan))
         return ss.Slider(
-            friction=law, contact=contact, stiffness=self.k, mass=self.m, drive=ss.Steady(velocity=self.v0)
+            friction=law, contact=contact, stiffness=self.k, mass=self.m, drive=ss.machine.SteadyDrive(velocity=self.v0)
         )
 
     # Small perturbations, with a' = a v_a/(v_a + v) and b' alike.
@@ -168,7 +177,7 @@ def check_motion(rig, faster=1.02):
     theirs = rig.motion(times, faster)
     if theirs is None or not np.all(np.isfinite(theirs)) or np.max(theirs) > 1e4 * rig.v0:
         return None
-    step = ss.VelocityStep(at=0.0, to=faster * rig.v0)
+    step = ss.protocol.VelocityStep(at=0.0, to=faster * rig.v0)
     run = ss.simulate(rig.slider(), step, until=times[-1], times=times[1:], rtol=1e-9)
     return float(np.max(np.abs(np.log(run["v"][-len(times) + 1 :] / theirs[1:]))))
 

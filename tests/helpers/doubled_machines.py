@@ -41,8 +41,8 @@ def drawn_otherwise(random):
         a, length = random.uniform(0.005, 0.02), 10 ** random.uniform(-6, -5)
         b = a * random.uniform(1.0, 2.0), a * random.uniform(0.3, 1.0)
         d_c = length, length * 10 ** random.uniform(0.5, 2)
-        states = tuple(ss.State(b=one, d_c=d) for one, d in zip(b, d_c, strict=True))
-        first = ss.RateState(a=a, mu_ref=0.6, v_ref=v, evolution=ss.Slip(), states=states)
+        states = tuple(ss.laws.State(b=one, d_c=d) for one, d in zip(b, d_c, strict=True))
+        first = ss.laws.RateState(a=a, mu_ref=0.6, v_ref=v, evolution=ss.laws.Slip(), states=states)
         stiff = (sum(b) - a) * loads[0] / np.sqrt(d_c[0] * d_c[1]) * 10 ** random.uniform(-0.3, 1, size=2)
         second = lugre(random, v) if kind == 1 else one_state(random, v, a, length)
         loads[1] = loads[0] * 10 ** random.uniform(-1, 0.3)
@@ -54,15 +54,15 @@ def drawn_otherwise(random):
 def chain(v, laws, loads, stiff, mass, damping):
     """The machine of two bodies p and q, in this order behind the drive."""
     contacts = {
-        name: ss.Surface(body=body, friction=law, contact=ss.Constant(preload=load))
+        name: ss.machine.Surface(body=body, friction=law, contact=ss.laws.ConstantNormalStress(preload=load))
         for name, body, law, load in zip(("cp", "cq"), "pq", laws, loads, strict=True)
     }
     links = {
-        name: ss.Spring(between=ends, stiffness=k, damping=c)
+        name: ss.machine.Spring(between=ends, stiffness=k, damping=c)
         for name, ends, k, c in zip(("l0", "l1"), (("drive", "p"), ("p", "q")), stiff, damping, strict=True)
     }
-    bodies = {name: ss.SlidingBody(mass=m) for name, m in zip("pq", mass, strict=True)}
-    return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.Pull(velocity=v))
+    bodies = {name: ss.machine.SlidingBody(mass=m) for name, m in zip("pq", mass, strict=True)}
+    return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.machine.Pull(velocity=v))
 
 
 def one_state(random, v, a, d_c):
@@ -73,8 +73,8 @@ def one_state(random, v, a, d_c):
         "d_c": d_c * 10 ** random.uniform(-0.5, 1.5),
     }
     mu_ref = random.uniform(0.4, 0.7)
-    evolution = (ss.Aging(), ss.PRZ())[int(random.integers(2))]
-    return ss.RateState(**own, mu_ref=mu_ref, v_ref=v, evolution=evolution)
+    evolution = (ss.laws.Aging(), ss.laws.PRZ())[int(random.integers(2))]
+    return ss.laws.RateState(**own, mu_ref=mu_ref, v_ref=v, evolution=evolution)
 
 
 def rate_state(random, v):
@@ -84,16 +84,16 @@ def rate_state(random, v):
     more = {"b": b, "d_c": d_c}
     kind = int(random.integers(3))
     if kind == 2:
-        states = ss.State(b=0.6 * b, d_c=d_c), ss.State(b=0.4 * b, d_c=d_c * 10 ** random.uniform(0.3, 1.3))
+        states = ss.laws.State(b=0.6 * b, d_c=d_c), ss.laws.State(b=0.4 * b, d_c=d_c * 10 ** random.uniform(0.3, 1.3))
         more = {"states": states}
-    evolution = (ss.Slip(), ss.PRZ(), ss.Slip())[kind]
-    return ss.RateState(a=a, mu_ref=random.uniform(0.4, 0.7), v_ref=v, evolution=evolution, **more)
+    evolution = (ss.laws.Slip(), ss.laws.PRZ(), ss.laws.Slip())[kind]
+    return ss.laws.RateState(a=a, mu_ref=random.uniform(0.4, 0.7), v_ref=v, evolution=evolution, **more)
 
 
 def lugre(random, v):
     """Bristles at speeds around that of Stribeck."""
     static = random.uniform(0.3, 0.6)
-    return ss.LuGre(
+    return ss.laws.LuGre(
         mu_coulomb=static * random.uniform(0.6, 0.9), mu_static=static, v_stribeck=v * 10 ** random.uniform(-0.1, 0.6),
         bristle_stiffness=10 ** random.uniform(4, 5.5), bristle_damping=10 ** random.uniform(0.3, 1.2),
         viscous=10 ** random.uniform(-3, -2) / v, stribeck_exponent=1.0,
@@ -106,13 +106,13 @@ def right_hand_side(machine):
     own, bristles = first.friction, second.friction
     masses = np.array([machine.bodies[name].mass for name in "pq"])
     pull, bar, v0 = machine.links["l0"], machine.links["l1"], machine.drive.velocity
-    states = own.states or (ss.State(b=own.b, d_c=own.d_c),)
+    states = own.states or (ss.laws.State(b=own.b, d_c=own.d_c),)
     b, d_c = np.array([one.b for one in states]), np.array([one.d_c for one in states])
 
     def frictions(v, theta, bend):
         log_v = np.log(v[0] / own.v_ref)
         change = -v[0] / d_c * (log_v + theta)
-        if isinstance(own.evolution, ss.PRZ):  # dθ/dt = 1 - (vθ/2d_c)², Θ = ln(v* θ/2 d_c)
+        if isinstance(own.evolution, ss.laws.PRZ):  # dθ/dt = 1 - (vθ/2d_c)², Θ = ln(v* θ/2 d_c)
             change = own.v_ref / (2 * d_c) * np.exp(-theta) * (1 - np.exp(2 * (log_v + theta)))
         dry = first.contact.preload * (own.mu_ref + own.a * log_v + b @ theta)
         fall = np.exp(-(abs(v[1] / bristles.v_stribeck) ** bristles.stribeck_exponent))

@@ -15,7 +15,11 @@ from rigs_of_theory import CONTACTS, LAWS
 from steadyslip.core.errors import SteadyslipError
 
 MACHINES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
-DRIVES = (ss.Steady(1e-6), ss.PD(1e-6, kp=4e9, kd=1e9), ss.PID(1e-6, kp=4e9, ki=1e8, kd=1e5))
+DRIVES = (
+    ss.machine.SteadyDrive(1e-6),
+    ss.machine.PD(1e-6, kp=4e9, kd=1e9),
+    ss.machine.PID(1e-6, kp=4e9, ki=1e8, kd=1e5),
+)
 SAME = 1e-6  # share by which edges may differ: rounding of an edge at which damping hardly changes
 UNIT = 1024.0  # of stress or force: powers of two change no digit
 

@@ -6,9 +6,9 @@ import weakref
 import steadyslip as ss
 from rigs_of_theory import SIGMA, rate_state, rig
 
-INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
+INCLINED = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
 
-MOVED = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=3e9)
+MOVED = rig(friction=rate_state(evolution=ss.laws.Aging()), radiation_damping=1e5, stiffness=3e9)
 
 FOLLOW = """link => new Promise((done) => {
   addEventListener("hashchange", () => setTimeout(done), { once: true });

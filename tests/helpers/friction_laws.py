@@ -18,19 +18,21 @@ ONE = {"b": 0.016, "d_c": 1e-6}
 
 FADING = {"a_cutoff_velocity": 2e-5, "b_cutoff_velocity": 5e-6}
 
-TWO = {"states": [ss.State(b=0.0145, d_c=1e-6), ss.State(b=0.004, d_c=2e-5)]}
+TWO = {"states": [ss.laws.State(b=0.0145, d_c=1e-6), ss.laws.State(b=0.004, d_c=2e-5)]}
 
-THREE = {"states": [ss.State(b=0.01, d_c=1e-6), ss.State(b=-0.003, d_c=5e-6), ss.State(b=0.009, d_c=4e-5)]}
+THREE = {
+    "states": [ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=-0.003, d_c=5e-6), ss.laws.State(b=0.009, d_c=4e-5)]
+}
 
-OWN_ALPHA = {"states": [ss.State(b=0.0, d_c=1e-6, alpha=0.2), ss.State(b=0.016, d_c=2e-5, alpha=0.1)]}
+OWN_ALPHA = {"states": [ss.laws.State(b=0.0, d_c=1e-6, alpha=0.2), ss.laws.State(b=0.016, d_c=2e-5, alpha=0.1)]}
 
-EVOLUTIONS = (ss.Slip(), ss.Aging(), ss.PRZ(), ss.Nagata(c_nagata=2.0))
+EVOLUTIONS = (ss.laws.Slip(), ss.laws.Aging(), ss.laws.PRZ(), ss.laws.Nagata(c_nagata=2.0))
 
 MEMORIES = (
-    ss.NoMemory(),
-    ss.LinkerDieterich(alpha=0.3),
-    ss.PrakashClifton(slip_distance=3e-6),
-    ss.PrakashClifton(direct_share=0.4, slip_distance=3e-6),
+    ss.laws.NoMemory(),
+    ss.laws.LinkerDieterich(alpha=0.3),
+    ss.laws.PrakashClifton(slip_distance=3e-6),
+    ss.laws.PrakashClifton(direct_share=0.4, slip_distance=3e-6),
 )
 
 BRISTLE = {"mu_coulomb": 0.3, "mu_static": 0.45, "v_stribeck": 2e-6, "viscous": 0.1}
@@ -49,9 +51,9 @@ def combinations():
         evolution, memory, states = EVOLUTIONS[i], MEMORIES[j], (ONE, TWO, THREE)[k]
         if sum(place) % 2:
             continue
-        if isinstance(evolution, ss.Nagata) and (states is not ONE or isinstance(memory, ss.PrakashClifton)):
+        if isinstance(evolution, ss.laws.Nagata) and (states is not ONE or isinstance(memory, ss.laws.PrakashClifton)):
             continue
-        found[place] = ss.RateState(
+        found[place] = ss.laws.RateState(
             **ROCK, **states, evolution=evolution, normal_memory=memory, regularised=bool(regularised)
         )
     return found
@@ -78,27 +80,35 @@ FURTHER = [law for place, law in COMBINATIONS.items() if place not in set(every_
 
 LAWS = [
     *COMBINATIONS.values(),
-    ss.RateState(**ROCK, **OWN_ALPHA, normal_memory=ss.LinkerDieterich()),
-    ss.RateState(**ROCK, b=0.0, d_c=1e-6),
-    ss.RateState(**ROCK, b=0.0, d_c=1e-6, evolution=ss.Aging()),
-    ss.RateState(**ROCK, b=0.0, d_c=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.3)),
-    ss.RateState(**ROCK, b=-0.003, d_c=1e-6, evolution=ss.PRZ(), normal_memory=ss.LinkerDieterich(alpha=0.3)),
-    ss.RateState(**ROCK, b=-0.003, d_c=1e-6, evolution=ss.Nagata(c_nagata=0.5)),
-    ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton()),
-    ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton(direct_share=1.0)),
-    ss.RateState(**ROCK, **ONE, evolution=ss.Aging(), **FADING, normal_memory=ss.LinkerDieterich(alpha=0.3)),
-    ss.RateState(**ROCK, states=[ss.State(b=0.01, d_c=1e-6), ss.State(b=0.009, d_c=4e-5, b_cutoff_velocity=3e-6)]),
-    ss.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3),
-    ss.LuGre(**BRISTLE, bristle_stiffness=1e5),
-    ss.CoulombStribeck(**BRISTLE),
-    ss.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3, stribeck_exponent=0.7),
-    ss.CoulombStribeck(**BRISTLE, stribeck_exponent=1.3),
+    ss.laws.RateState(**ROCK, **OWN_ALPHA, normal_memory=ss.laws.LinkerDieterich()),
+    ss.laws.RateState(**ROCK, b=0.0, d_c=1e-6),
+    ss.laws.RateState(**ROCK, b=0.0, d_c=1e-6, evolution=ss.laws.Aging()),
+    ss.laws.RateState(**ROCK, b=0.0, d_c=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)),
+    ss.laws.RateState(
+        **ROCK, b=-0.003, d_c=1e-6, evolution=ss.laws.PRZ(), normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
+    ),
+    ss.laws.RateState(**ROCK, b=-0.003, d_c=1e-6, evolution=ss.laws.Nagata(c_nagata=0.5)),
+    ss.laws.RateState(**ROCK, **ONE, normal_memory=ss.laws.PrakashClifton()),
+    ss.laws.RateState(**ROCK, **ONE, normal_memory=ss.laws.PrakashClifton(direct_share=1.0)),
+    ss.laws.RateState(
+        **ROCK, **ONE, evolution=ss.laws.Aging(), **FADING, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
+    ),
+    ss.laws.RateState(
+        **ROCK, states=[ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=0.009, d_c=4e-5, b_cutoff_velocity=3e-6)]
+    ),
+    ss.laws.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3),
+    ss.laws.LuGre(**BRISTLE, bristle_stiffness=1e5),
+    ss.laws.CoulombStribeck(**BRISTLE),
+    ss.laws.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3, stribeck_exponent=0.7),
+    ss.laws.CoulombStribeck(**BRISTLE, stribeck_exponent=1.3),
 ]
 
 
 def rig_with(law, velocity=1e-6, sigma=5e6, contact=None, **slider):
-    contact = contact or ss.Constant(steady_normal_stress=sigma)
-    return ss.Slider(friction=law, contact=contact, drive=ss.Steady(velocity), **({"stiffness": 1e9} | slider))
+    contact = contact or ss.laws.ConstantNormalStress(steady_normal_stress=sigma)
+    return ss.Slider(
+        friction=law, contact=contact, drive=ss.machine.SteadyDrive(velocity), **({"stiffness": 1e9} | slider)
+    )
 
 
 def numbers_of(rig, expressions):

@@ -53,12 +53,17 @@ class Wrong(Exception):
 
 
 def rig(**changes):
-    friction = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6)
-    return ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=9e9, drive=ss.Steady(1e-6))
+    friction = ss.laws.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6)
+    return ss.Slider(
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        stiffness=9e9,
+        drive=ss.machine.SteadyDrive(1e-6),
+    )
 
 
 def plan():
-    over = {"stiffness": ss.Grid(1e9, 3e9, 12), "friction.a": [0.013, 0.0135, 0.014, 0.0145, 0.015]}
+    over = {"stiffness": ss.maps.Grid(1e9, 3e9, 12), "friction.a": [0.013, 0.0135, 0.014, 0.0145, 0.015]}
     return ss.Map(rig(), over, ["status", "critical_stiffness"], chunk=5)
 
 
@@ -90,7 +95,7 @@ def small_population():
 
 def make_sound(folder):
     """One file of each kind."""
-    ss.simulate(rig(), ss.VelocityStep(at=1.0, to=2e-6), until=20.0).save(folder / "run.nc")
+    ss.simulate(rig(), ss.protocol.VelocityStep(at=1.0, to=2e-6), until=20.0).save(folder / "run.nc")
     small_fit().save(folder / "fit.nc")
     small_population().save(folder / "population.nc")
     ss.run_map(plan(), folder / "map.zarr", workers=1, progress=False)
@@ -358,10 +363,10 @@ def open_fit(path, sound, forged):
 
 
 def open_population(path, sound, forged):
-    found = ss.load_population(path)
+    found = ss.experiments.load_population(path)
     said = f"{json.dumps(found.to_dict(), allow_nan=False)} {[one.estimates for one in found.fits.values()]}"
     if not forged:
-        same = ss.load_population(sound)
+        same = ss.experiments.load_population(sound)
         if said != f"{json.dumps(same.to_dict())} {[one.estimates for one in same.fits.values()]}":
             raise Wrong("opened with other content")
 

@@ -216,7 +216,9 @@ def seeds() -> list[str]:
     """Every shipped example, and one rig of every law with every contact in turn."""
     texts = [path.read_text(encoding="utf-8") for path in EXAMPLES]
     laws = itertools.cycle(FRICTION)
-    return texts + [rig_to_text(_rig(next(laws), contact, 0.0, ss.Steady(1e-6))) for contact in (*CONTACTS, *CONTACTS)]
+    return texts + [
+        rig_to_text(_rig(next(laws), contact, 0.0, ss.machine.SteadyDrive(1e-6))) for contact in (*CONTACTS, *CONTACTS)
+    ]
 
 
 def files(count: int, seed: object, analyse: int = 20) -> Iterator[tuple[str, str]]:
@@ -236,28 +238,31 @@ def files(count: int, seed: object, analyse: int = 20) -> Iterator[tuple[str, st
 
 FRICTION = (
     rate_state(),
-    rate_state(evolution=ss.Aging(), normal_memory=ss.LinkerDieterich(alpha=0.4)),
-    rate_state(evolution=ss.PRZ(), regularised=True),
-    rate_state(evolution=ss.Nagata(c_nagata=0.7), normal_memory=ss.LinkerDieterich(alpha=0.4)),
-    rate_state(normal_memory=ss.PrakashClifton(direct_share=0.5)),
-    rate_state(b=None, d_c=None, states=(ss.State(b=0.01, d_c=1e-6), ss.State(b=0.008, d_c=2e-5))),
+    rate_state(evolution=ss.laws.Aging(), normal_memory=ss.laws.LinkerDieterich(alpha=0.4)),
+    rate_state(evolution=ss.laws.PRZ(), regularised=True),
+    rate_state(evolution=ss.laws.Nagata(c_nagata=0.7), normal_memory=ss.laws.LinkerDieterich(alpha=0.4)),
+    rate_state(normal_memory=ss.laws.PrakashClifton(direct_share=0.5)),
+    rate_state(b=None, d_c=None, states=(ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=0.008, d_c=2e-5))),
     rate_state(b=-0.003),
-    ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10, viscous=5),
+    ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10, viscous=5),
 )
 DRIVES = (
-    ss.Steady(1e-6),
-    ss.PD(1e-6, kp=2e10, kd=1e9),
-    ss.PID(1e-6, kp=2e10, kd=1e9, ki=1e9),
+    ss.machine.SteadyDrive(1e-6),
+    ss.machine.PD(1e-6, kp=2e10, kd=1e9),
+    ss.machine.PID(1e-6, kp=2e10, kd=1e9, ki=1e9),
 )
 PROTOCOLS = (
     (),
-    (ss.VelocityStep(at=0.3, to=3e-6),),
-    (ss.Hold(at=0.2, duration=0.5),),
-    (ss.DisplacementStep(at=0.3, by=-2e-7),),
-    (ss.NormalStressStep(at=0.3, by=-3e6),),
-    (ss.VelocityHarmonic(amplitude=5e-7, period=0.2), ss.NormalStressRamp(at=0.1, by=1e6, duration=0.3)),
-    (ss.VelocityStep(at=0.3, to=-1e-6),),
-    (ss.VelocityStep(at=0.3, to=1e100),),
+    (ss.protocol.VelocityStep(at=0.3, to=3e-6),),
+    (ss.protocol.Hold(at=0.2, duration=0.5),),
+    (ss.protocol.DisplacementStep(at=0.3, by=-2e-7),),
+    (ss.protocol.NormalStressStep(at=0.3, by=-3e6),),
+    (
+        ss.protocol.VelocityHarmonic(amplitude=5e-7, period=0.2),
+        ss.protocol.NormalStressRamp(at=0.1, by=1e6, duration=0.3),
+    ),
+    (ss.protocol.VelocityStep(at=0.3, to=-1e-6),),
+    (ss.protocol.VelocityStep(at=0.3, to=1e100),),
 )
 QUESTIONS = ("simulate", "analyze", "edges", "sets")
 STEPS = 60

@@ -3,7 +3,7 @@
 import steadyslip as ss
 from machines import rate_state, surface
 
-ALPHA = {"normal_memory": ss.LinkerDieterich(alpha=0.2, sigma_ref=1.0)}
+ALPHA = {"normal_memory": ss.laws.LinkerDieterich(alpha=0.2, sigma_ref=1.0)}
 SMOOTH = [rate_state(0.3, 0.1, 1.0, regularised=True), rate_state(0.2, -0.05, 2.0, regularised=True)]
 WEDGED = [rate_state(0.02, -0.01, 1.0, mu=0.4, **ALPHA), rate_state(0.03, 0.01, 2.0, mu=0.3, **ALPHA)]
 GAINS = (0.3, 0.2)
@@ -11,10 +11,12 @@ GAINS = (0.3, 0.2)
 
 def machine(masses, links, contacts):
     return ss.Machine(
-        bodies={name: ss.SlidingBody(mass=mass) for name, mass in masses.items()},
-        links={f"{a}-{b}": ss.Spring(between=(a, b), stiffness=k, damping=c) for (a, b), (k, c) in links.items()},
+        bodies={name: ss.machine.SlidingBody(mass=mass) for name, mass in masses.items()},
+        links={
+            f"{a}-{b}": ss.machine.Spring(between=(a, b), stiffness=k, damping=c) for (a, b), (k, c) in links.items()
+        },
         contacts=contacts,
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -29,7 +31,7 @@ def wedges(**bodies):
     names = list(bodies)
     links = {("drive", names[-1]): (1.0, 0.1)} | ({(names[1], names[0]): (3.0, 0.1)} if len(names) > 1 else {})
     contacts = {
-        name: ss.Surface(body=body, friction=own, contact=ss.SelfEnergising(preload=1.0, gain=gain))
+        name: ss.machine.Surface(body=body, friction=own, contact=ss.laws.SelfEnergising(preload=1.0, gain=gain))
         for name, body, own, gain in zip(("left", "right"), (names[0], names[-1]), WEDGED, GAINS, strict=True)
     }
     return machine(bodies, links, contacts)
@@ -39,7 +41,7 @@ def heavy_footed():
     """Two blocks whose normal stress feels their acceleration, with memory of it: no acceleration has a closed form."""
     links = {("drive", "one"): (0.5, 0.1), ("one", "two"): (0.3, 0.2)}
     contacts = {
-        name: ss.Surface(body=body, friction=own, contact=ss.Linear(preload=1.0, b0=b0))
+        name: ss.machine.Surface(body=body, friction=own, contact=ss.laws.LinearNormalStress(preload=1.0, b0=b0))
         for name, body, own, b0 in (("first", "one", WEDGED[0], 0.1), ("second", "two", WEDGED[1], -0.05))
     }
     return machine({"one": 1.0, "two": 2.0}, links, contacts)

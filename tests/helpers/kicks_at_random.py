@@ -66,26 +66,26 @@ def rate_state(random: np.random.Generator, law: str, inertia: str, contact: str
     more = {"b": b, "d_c": D_C}
     if name != law:
         share = random.uniform(0.3, 0.7)
-        more = {"states": (ss.State(b=b * share, d_c=D_C),
-                           ss.State(b=b * (1 - share), d_c=D_C * 10 ** random.uniform(0.3, 1.3)))}  # fmt: skip
+        more = {"states": (ss.laws.State(b=b * share, d_c=D_C),
+                           ss.laws.State(b=b * (1 - share), d_c=D_C * 10 ** random.uniform(0.3, 1.3)))}  # fmt: skip
     elif contact == "tilted":
-        more["normal_memory"] = ss.LinkerDieterich(alpha=random.uniform(0.1, 0.56))
-    evolution = {"slip": ss.Slip(), "aging": ss.Aging(), "prz": ss.PRZ()}.get(name)
-    evolution = evolution or ss.Nagata(c_nagata=random.uniform(0.2, 1.5))
-    friction = ss.RateState(a=a, mu_ref=MU, v_ref=V_REF, evolution=evolution, **more)
+        more["normal_memory"] = ss.laws.LinkerDieterich(alpha=random.uniform(0.1, 0.56))
+    evolution = {"slip": ss.laws.Slip(), "aging": ss.laws.Aging(), "prz": ss.laws.PRZ()}.get(name)
+    evolution = evolution or ss.laws.Nagata(c_nagata=random.uniform(0.2, 1.5))
+    friction = ss.laws.RateState(a=a, mu_ref=MU, v_ref=V_REF, evolution=evolution, **more)
     still = {}
     if inertia == "mass":  # m v0²/(a σ d_c)
         still["mass"] = 10 ** random.uniform(-6, 0) * a * SIGMA * D_C / V_REF**2
     if inertia == "damped":
         still["radiation_damping"] = 10 ** random.uniform(-6, -2) * a * SIGMA / V_REF
     return ss.Slider(
-        friction=friction, contact=pressed(random, contact), stiffness=5e9, drive=ss.Steady(V_REF), **still
+        friction=friction, contact=pressed(random, contact), stiffness=5e9, drive=ss.machine.SteadyDrive(V_REF), **still
     )
 
 
 def lugre(random: np.random.Generator, inertia: str, contact: str) -> ss.Slider:
     static, v_stribeck = random.uniform(0.15, 0.5), 10 ** random.uniform(-3.5, -2.5)
-    friction = ss.LuGre(
+    friction = ss.laws.LuGre(
         mu_coulomb=static * random.uniform(0.5, 0.9), mu_static=static, v_stribeck=v_stribeck,
         bristle_stiffness=10 ** random.uniform(4, 5.5), bristle_damping=10 ** random.uniform(0.5, 2),
         viscous=10 ** random.uniform(-1, 1),
@@ -96,7 +96,9 @@ def lugre(random: np.random.Generator, inertia: str, contact: str) -> ss.Slider:
         still["mass"] = 10 ** random.uniform(2, 4)
     if inertia == "damped":
         still["radiation_damping"] = 10 ** random.uniform(-6, -3) * SIGMA / v0
-    base = ss.Slider(friction=friction, contact=pressed(random, contact), stiffness=1e10, drive=ss.Steady(v0), **still)
+    base = ss.Slider(
+        friction=friction, contact=pressed(random, contact), stiffness=1e10, drive=ss.machine.SteadyDrive(v0), **still
+    )
     try:
         edge = ss.hopf(base).value
     except ss.SteadyslipError:
@@ -106,9 +108,9 @@ def lugre(random: np.random.Generator, inertia: str, contact: str) -> ss.Slider:
 
 def pressed(random: np.random.Generator, contact: str) -> object:
     if contact == "level":
-        return ss.Constant(preload=SIGMA)
+        return ss.laws.ConstantNormalStress(preload=SIGMA)
     given = str(random.choice(["preload", "steady_normal_stress"]))
-    return ss.InclinedSpring(angle=random.uniform(-0.6, 0.6), **{given: SIGMA})
+    return ss.laws.InclinedSpring(angle=random.uniform(-0.6, 0.6), **{given: SIGMA})
 
 
 def by_preload(rig: ss.Slider) -> ss.Slider:
@@ -118,7 +120,7 @@ def by_preload(rig: ss.Slider) -> ss.Slider:
         return rig
     at_rest = ss.steady_state(rig)
     preload = at_rest.normal_stress + at_rest.spring_stress * np.tan(contact.angle)
-    return replace(rig, contact=ss.InclinedSpring(preload=float(preload), angle=contact.angle))
+    return replace(rig, contact=ss.laws.InclinedSpring(preload=float(preload), angle=contact.angle))
 
 
 def outcome_of(case: Drawn, size: float | None = None) -> str:

@@ -185,7 +185,7 @@ class Reference:
         kicked, rig = case.kicked(), by_preload(case.rig)
         self.length = float(kicked.rest.natural_slip[0])
         friction, contact = rig.friction, rig.contact
-        bristles = isinstance(friction, ss.LuGre)
+        bristles = isinstance(friction, ss.laws.LuGre)
         length, speed = (1.0, 1.0) if bristles else (D_C, V_REF)
         drive = rig.drive.velocity / speed
         self.p = p = np.zeros(17)
@@ -231,7 +231,7 @@ class Reference:
         thrown = abs(v - p[7]) * np.sqrt(p[1] / p[3])  # as far as the spring alone lets a block go
         self.reload = 3 * (abs(x) + thrown) / p[7]
 
-    def _rate_state(self, friction: ss.RateState) -> None:
+    def _rate_state(self, friction: ss.laws.RateState) -> None:
         p, states = self.p, friction.states or (friction,)
         p[0] = {"slip": SLIP, "aging": AGING, "prz": PRZ, "nagata": NAGATA}[friction.evolution.name]
         p[9:13] = len(states), MU, friction.a, states[0].b
@@ -364,13 +364,13 @@ def simulated(case: Drawn, size: float | None = None, turns: float = 150.0) -> s
     amount, drive = float(kicked.amount(case.size)[0]), rig.drive.velocity
     load, piece, initial = drive, None, {}
     if case.kick == "velocity" and case.reference == "before":
-        load, piece = amount, ss.VelocityStep(at=0.0, to=amount)
+        load, piece = amount, ss.protocol.VelocityStep(at=0.0, to=amount)
     elif case.kick == "velocity":
-        rig, piece = rig.with_values({"drive.velocity": amount}), ss.VelocityStep(at=0.0, to=drive)
+        rig, piece = rig.with_values({"drive.velocity": amount}), ss.protocol.VelocityStep(at=0.0, to=drive)
     elif case.kick == "displacement":
-        piece = ss.DisplacementStep(at=0.0, by=amount)
+        piece = ss.protocol.DisplacementStep(at=0.0, by=amount)
     elif case.kick == "normal-stress":
-        piece = ss.NormalStressStep(at=0.0, by=amount)
+        piece = ss.protocol.NormalStressStep(at=0.0, by=amount)
     else:
         initial = {"v": drive + amount / rig.mass}
     unit = 1.0 if reference.p[0] == LUGRE else D_C / V_REF

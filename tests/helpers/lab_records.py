@@ -15,36 +15,42 @@ STRESS = 10e6
 SLOW = 1e-6
 
 
-def rig(evolution: ss.Evolution | None = None, alpha: float | None = None, **changes: float) -> ss.Slider:
+def rig(evolution: ss.laws.Evolution | None = None, alpha: float | None = None, **changes: float) -> ss.Slider:
     """A rig with the truth in it."""
-    memory = ss.NoMemory() if alpha is None else ss.LinkerDieterich(alpha=alpha)
+    memory = ss.laws.NoMemory() if alpha is None else ss.laws.LinkerDieterich(alpha=alpha)
     values = TRUTH | changes
-    friction = ss.RateState(**values, v_ref=SLOW, evolution=evolution or ss.Slip(), normal_memory=memory)
-    contact = ss.Constant(steady_normal_stress=STRESS)
-    return ss.Slider(friction=friction, contact=contact, stiffness=STIFFNESS, drive=ss.Steady(SLOW))
+    friction = ss.laws.RateState(**values, v_ref=SLOW, evolution=evolution or ss.laws.Slip(), normal_memory=memory)
+    contact = ss.laws.ConstantNormalStress(steady_normal_stress=STRESS)
+    return ss.Slider(friction=friction, contact=contact, stiffness=STIFFNESS, drive=ss.machine.SteadyDrive(SLOW))
 
 
 def two_states() -> ss.Slider:
     """Rig whose friction has two states."""
-    states = (ss.State(b=0.008, d_c=6e-6), ss.State(b=0.006, d_c=120e-6))
-    friction = ss.RateState(a=0.011, states=states, mu_ref=0.62, v_ref=SLOW)
-    contact = ss.Constant(steady_normal_stress=STRESS)
-    return ss.Slider(friction=friction, contact=contact, stiffness=STIFFNESS, drive=ss.Steady(SLOW))
+    states = (ss.laws.State(b=0.008, d_c=6e-6), ss.laws.State(b=0.006, d_c=120e-6))
+    friction = ss.laws.RateState(a=0.011, states=states, mu_ref=0.62, v_ref=SLOW)
+    contact = ss.laws.ConstantNormalStress(steady_normal_stress=STRESS)
+    return ss.Slider(friction=friction, contact=contact, stiffness=STIFFNESS, drive=ss.machine.SteadyDrive(SLOW))
 
 
-STEP = ss.Protocol(pieces=(ss.VelocityStep(at=60.13, to=5e-6),), until=150.0)
-HOLD = ss.Protocol(pieces=(ss.Hold(at=60.13, duration=100.0), ss.VelocityStep(at=200.37, to=3e-6)), until=300.0)
+STEP = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=60.13, to=5e-6),), until=150.0)
+HOLD = ss.Protocol(
+    pieces=(ss.protocol.Hold(at=60.13, duration=100.0), ss.protocol.VelocityStep(at=200.37, to=3e-6)), until=300.0
+)
 PRESSED = ss.Protocol(
-    pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressStep(at=140.41, by=0.08 * STRESS)), until=220.0
+    pieces=(ss.protocol.VelocityStep(at=60.13, to=3e-6), ss.protocol.NormalStressStep(at=140.41, by=0.08 * STRESS)),
+    until=220.0,
 )
 PULSED = ss.Protocol(
-    pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressPulse(at=120.2, by=0.05 * STRESS, duration=40.3)),
+    pieces=(
+        ss.protocol.VelocityStep(at=60.13, to=3e-6),
+        ss.protocol.NormalStressPulse(at=120.2, by=0.05 * STRESS, duration=40.3),
+    ),
     until=220.0,
 )
 SHAKEN = ss.Protocol(
     pieces=(
-        ss.VelocityStep(at=60.13, to=3e-6),
-        ss.NormalStressHarmonic(at=120.0, amplitude=0.02 * STRESS, period=20.0),
+        ss.protocol.VelocityStep(at=60.13, to=3e-6),
+        ss.protocol.NormalStressHarmonic(at=120.0, amplitude=0.02 * STRESS, period=20.0),
     ),
     until=220.0,
 )
@@ -68,7 +74,7 @@ def columns(source: ss.Slider, protocol: ss.Protocol, count: int = 1000, uniform
 
 def record(
     source: ss.Slider, protocol: ss.Protocol, seed: int = 0, noise: float = NOISE, **options: object
-) -> ss.Record:
+) -> ss.experiments.Record:
     """A noisy record."""
     found = columns(source, protocol, **options)
     found["friction"] = found["friction"] + noise * np.random.default_rng(seed).standard_normal(len(found["time"]))

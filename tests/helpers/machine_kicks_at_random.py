@@ -24,13 +24,13 @@ TINY = 1e-30  # velocity below which a contact of the reference is at rest
 
 def as_machine(block):
     """The machine of one body that a slider without area is."""
-    links = {"spring": ss.Spring(between=("drive", "block"), stiffness=block.stiffness, damping=block.damping)}
+    links = {"spring": ss.machine.Spring(between=("drive", "block"), stiffness=block.stiffness, damping=block.damping)}
     if block.radiation_damping:
-        links["waves"] = ss.Spring(between=("ground", "block"), damping=block.radiation_damping)
+        links["waves"] = ss.machine.Spring(between=("ground", "block"), damping=block.radiation_damping)
     return ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=block.mass)}, links=links,
-        contacts={"base": ss.Surface(body="block", friction=block.friction, contact=block.contact)},
-        drive=ss.Pull(velocity=block.drive.velocity),
+        bodies={"block": ss.machine.SlidingBody(mass=block.mass)}, links=links,
+        contacts={"base": ss.machine.Surface(body="block", friction=block.friction, contact=block.contact)},
+        drive=ss.machine.Pull(velocity=block.drive.velocity),
     )  # fmt: skip
 
 
@@ -69,18 +69,22 @@ def chained(seed):
     count = int(random.integers(2, 4))
     names = [f"b{i}" for i in range(count)]
     aging = bool(random.random() < 0.5)
-    evolution = ss.Aging() if aging else ss.Slip()
+    evolution = ss.laws.Aging() if aging else ss.laws.Slip()
     links, contacts = {}, {}
     for i, name in enumerate(names):
         before = "drive" if i == 0 else names[i - 1]
-        links[f"l{i}"] = ss.Spring(between=(before, name), stiffness=size(-0.5, 1.5), damping=size(-2.0, 0.0))
+        links[f"l{i}"] = ss.machine.Spring(between=(before, name), stiffness=size(-0.5, 1.5), damping=size(-2.0, 0.0))
         a = 0.05 * size(-0.5, 0.5)
         b = a * (1 + random.uniform(-0.5, 1.0))
-        law = ss.RateState(a=a, b=b, d_c=size(-0.5, 0.5), mu_ref=0.6, v_ref=1.0, evolution=evolution, regularised=True)
-        contacts[f"c{i}"] = ss.Surface(body=name, friction=law, contact=ss.Constant(preload=size(-0.5, 0.5)))
+        law = ss.laws.RateState(
+            a=a, b=b, d_c=size(-0.5, 0.5), mu_ref=0.6, v_ref=1.0, evolution=evolution, regularised=True
+        )
+        contacts[f"c{i}"] = ss.machine.Surface(
+            body=name, friction=law, contact=ss.laws.ConstantNormalStress(preload=size(-0.5, 0.5))
+        )
     machine = ss.Machine(
-        bodies={name: ss.SlidingBody(mass=size(-1.5, 0.5)) for name in names}, links=links, contacts=contacts,
-        drive=ss.Pull(velocity=1.0),
+        bodies={name: ss.machine.SlidingBody(mass=size(-1.5, 0.5)) for name in names}, links=links, contacts=contacts,
+        drive=ss.machine.Pull(velocity=1.0),
     )  # fmt: skip
     kick = str(random.choice(["velocity", "force", "impulse"]))
     at = None if kick == "velocity" else str(random.choice(names))
@@ -107,7 +111,7 @@ def by_radau(case):
     laws = [machine.contacts[f"c{i}"].friction for i in range(n)]
     load = np.array([machine.contacts[f"c{i}"].contact.preload for i in range(n)])
     a, b, d_c, mu = (np.array([getattr(law, name) for law in laws]) for name in ("a", "b", "d_c", "mu_ref"))
-    aging = type(laws[0].evolution) is ss.Aging
+    aging = type(laws[0].evolution) is ss.laws.Aging
     new = amount if case.kick == "velocity" else 1.0
     push = np.zeros(n)
     if case.kick == "force":

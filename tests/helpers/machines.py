@@ -13,41 +13,43 @@ def leading(machine):
 
 def rate_state(f, slope, r, mu=0.6, load=1.0, **further):
     """Friction with theory's f, S and r at unit velocity under a load."""
-    return ss.RateState(a=f / load, b=(f - slope) / load, d_c=1 / r, mu_ref=mu, v_ref=1.0, **further)
+    return ss.laws.RateState(a=f / load, b=(f - slope) / load, d_c=1 / r, mu_ref=mu, v_ref=1.0, **further)
 
 
 def coulomb(mu):
-    return ss.CoulombStribeck(mu_coulomb=mu, mu_static=mu, v_stribeck=1.0)
+    return ss.laws.CoulombStribeck(mu_coulomb=mu, mu_static=mu, v_stribeck=1.0)
 
 
 def surface(body, friction, load=1.0, **further):
-    return ss.Surface(body=body, friction=friction, contact=ss.Constant(preload=load), **further)
+    return ss.machine.Surface(
+        body=body, friction=friction, contact=ss.laws.ConstantNormalStress(preload=load), **further
+    )
 
 
 def two_mass(kp=1.0, kd=0.1, measured=None, friction=None):
     """The feed axis of theory 11."""
     return ss.Machine(
-        bodies={"motor": ss.SlidingBody(mass=2.0), "table": ss.SlidingBody(mass=5.0)},
-        links={"screw": ss.Spring(between=("motor", "table"), stiffness=100.0, damping=0.5)},
+        bodies={"motor": ss.machine.SlidingBody(mass=2.0), "table": ss.machine.SlidingBody(mass=5.0)},
+        links={"screw": ss.machine.Spring(between=("motor", "table"), stiffness=100.0, damping=0.5)},
         contacts={"guide": surface("table", friction or rate_state(0.5, -0.3, 1.0))},
-        drive=ss.PositionPD(velocity=1.0, body="motor", measured=measured, kp=kp, kd=kd),
+        drive=ss.machine.PositionPD(velocity=1.0, body="motor", measured=measured, kp=kp, kd=kd),
     )
 
 
 def two_blocks(k, second_slope, coupling):
     """Two blocks on a common load point, coupled by a spring."""
     return ss.Machine(
-        bodies={"one": ss.SlidingBody(mass=0.1), "two": ss.SlidingBody(mass=0.1)},
+        bodies={"one": ss.machine.SlidingBody(mass=0.1), "two": ss.machine.SlidingBody(mass=0.1)},
         links={
-            "first": ss.Spring(between=("drive", "one"), stiffness=k),
-            "second": ss.Spring(between=("drive", "two"), stiffness=k),
-            "between": ss.Spring(between=("one", "two"), stiffness=coupling),
+            "first": ss.machine.Spring(between=("drive", "one"), stiffness=k),
+            "second": ss.machine.Spring(between=("drive", "two"), stiffness=k),
+            "between": ss.machine.Spring(between=("one", "two"), stiffness=coupling),
         },
         contacts={
             "one": surface("one", rate_state(2.0, -0.5, 1.0)),
             "two": surface("two", rate_state(2.0, second_slope, 1.0)),
         },
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -55,14 +57,16 @@ def brake(friction, k1=1.0, press=1.0):
     """Mode coupling of theory 11: stiffness k1 along the slide, k2 = 1.2 normal, coupled by k12 = 0.3."""
     to = ("drive", "pad")
     return ss.Machine(
-        bodies={"pad": ss.PlanarBody(mass=1.0, press=press)},
+        bodies={"pad": ss.machine.PlanarBody(mass=1.0, press=press)},
         links={
-            "arm": ss.Spring(between=to, stiffness=k1 - 0.3),
-            "lining": ss.Spring(between=to, stiffness=0.1, direction="normal"),
-            "caliper": ss.Spring(between=to, stiffness=0.6, angle=np.pi / 4),
+            "arm": ss.machine.Spring(between=to, stiffness=k1 - 0.3),
+            "lining": ss.machine.Spring(between=to, stiffness=0.1, direction="normal"),
+            "caliper": ss.machine.Spring(between=to, stiffness=0.6, angle=np.pi / 4),
         },
-        contacts={"disc": ss.Surface(body="pad", friction=friction, contact=ss.Compliant(normal_stiffness=0.8))},
-        drive=ss.Pull(velocity=1.0),
+        contacts={
+            "disc": ss.machine.Surface(body="pad", friction=friction, contact=ss.laws.Compliant(normal_stiffness=0.8))
+        },
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -71,38 +75,38 @@ def stacked_pads(count, mass=1.0, slope=-0.02):
     names = [f"pad{i}" for i in range(count)]
     links = {}
     for before, name in zip(["drive", *names], names, strict=False):
-        links[f"along-{name}"] = ss.Spring(between=(before, name), stiffness=50.0, damping=0.5)
-        links[f"aslant-{name}"] = ss.Spring(between=(before, name), stiffness=20.0, damping=0.2, angle=0.5)
+        links[f"along-{name}"] = ss.machine.Spring(between=(before, name), stiffness=50.0, damping=0.5)
+        links[f"aslant-{name}"] = ss.machine.Spring(between=(before, name), stiffness=20.0, damping=0.2, angle=0.5)
     friction = rate_state(0.05, slope, 2.0, mu=0.4)
-    touch = ss.Compliant(normal_stiffness=30.0, normal_damping=0.1)
+    touch = ss.laws.Compliant(normal_stiffness=30.0, normal_damping=0.1)
     return ss.Machine(
-        bodies={name: ss.PlanarBody(mass=mass * (i + 1), press=5.0) for i, name in enumerate(names)},
+        bodies={name: ss.machine.PlanarBody(mass=mass * (i + 1), press=5.0) for i, name in enumerate(names)},
         links=links,
-        contacts={f"at-{name}": ss.Surface(body=name, friction=friction, contact=touch) for name in names},
-        drive=ss.Pull(velocity=1.0),
+        contacts={f"at-{name}": ss.machine.Surface(body=name, friction=friction, contact=touch) for name in names},
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
 def three_bodies():
     """Motor, screw and table with a carriage on two guides: the machine whose speed is measured."""
-    deep = {"normal_memory": ss.LinkerDieterich(alpha=0.2, sigma_ref=1.0)}
+    deep = {"normal_memory": ss.laws.LinkerDieterich(alpha=0.2, sigma_ref=1.0)}
     return ss.Machine(
         bodies={
-            "motor": ss.RotatingBody(inertia=0.5),
-            "table": ss.SlidingBody(mass=5.0),
-            "head": ss.SlidingBody(mass=1.0),
+            "motor": ss.machine.RotatingBody(inertia=0.5),
+            "table": ss.machine.SlidingBody(mass=5.0),
+            "head": ss.machine.SlidingBody(mass=1.0),
         },
         links={
-            "screw": ss.Screw(between=("motor", "table"), lead=0.5, stiffness=100.0, damping=0.5),
-            "column": ss.Spring(between=("table", "head"), stiffness=300.0, damping=0.2),
-            "hose": ss.Spring(between=("ground", "table"), damping=0.3),
+            "screw": ss.machine.Screw(between=("motor", "table"), lead=0.5, stiffness=100.0, damping=0.5),
+            "column": ss.machine.Spring(between=("table", "head"), stiffness=300.0, damping=0.2),
+            "hose": ss.machine.Spring(between=("ground", "table"), damping=0.3),
         },
         contacts={
             "left": surface("table", rate_state(0.5, -0.3, 1.0)),
             "right": surface("table", rate_state(0.4, -0.1, 2.0, **deep)),
             "seal": surface("head", rate_state(0.1, 0.05, 1.0)),
         },
-        drive=ss.RotaryPD(velocity=2.0, body="motor", kp=2.0, kd=0.3),
+        drive=ss.machine.RotaryPD(velocity=2.0, body="motor", kp=2.0, kd=0.3),
     )
 
 
@@ -126,7 +130,7 @@ def at_random(seed, delay=0.0):
 
     def link(a, b, k, c):
         spring = {"stiffness": k} if k else {}
-        links[f"l{len(links)}"] = ss.Spring(between=(a, b), damping=c, **spring)
+        links[f"l{len(links)}"] = ss.machine.Spring(between=(a, b), damping=c, **spring)
         row = np.zeros(n + 2)
         row[ends[b]], row[ends[a]] = 1.0, -1.0
         stiff[:], damp[:] = stiff + k * np.outer(row, row), damp + c * np.outer(row, row)
@@ -146,9 +150,9 @@ def at_random(seed, delay=0.0):
     kp, kd, seen = size(0, 2), size(-2, 0), int(random.integers(0, count))
     controlled = random.random() < 0.5 or delay > 0
     drive = (
-        ss.PositionPD(velocity=1.0, body="b0", measured=names[seen], kp=kp, kd=kd, delay=delay)
+        ss.machine.PositionPD(velocity=1.0, body="b0", measured=names[seen], kp=kp, kd=kd, delay=delay)
         if controlled
-        else ss.Pull(velocity=1.0)
+        else ss.machine.Pull(velocity=1.0)
     )
 
     touches, contacts = [], {}
@@ -159,14 +163,18 @@ def at_random(seed, delay=0.0):
             further = {}
             if random.random() < 0.5:
                 alpha = 0.5 * mu
-                further["normal_memory"] = ss.LinkerDieterich(alpha=alpha, sigma_ref=1.0)
+                further["normal_memory"] = ss.laws.LinkerDieterich(alpha=alpha, sigma_ref=1.0)
             tilt = random.uniform(-0.6, 0.6) if random.random() < 0.5 else 0.0
-            press = ss.InclinedSpring(steady_normal_stress=load, angle=tilt) if tilt else ss.Constant(preload=load)
+            press = (
+                ss.laws.InclinedSpring(steady_normal_stress=load, angle=tilt)
+                if tilt
+                else ss.laws.ConstantNormalStress(preload=load)
+            )
             friction = rate_state(f, slope, r, mu, load, **further)
-            contacts[f"c{i}"] = ss.Surface(body=names[i], against=against, friction=friction, contact=press)
+            contacts[f"c{i}"] = ss.machine.Surface(body=names[i], against=against, friction=friction, contact=press)
             touches.append((i, ends[against], f, slope, r, mu, mu - alpha, np.tan(tilt)))
     machine = ss.Machine(
-        bodies={name: ss.SlidingBody(mass=m) for name, m in zip(names, mass, strict=True)}, links=links,
+        bodies={name: ss.machine.SlidingBody(mass=m) for name, m in zip(names, mass, strict=True)}, links=links,
         contacts=contacts, drive=drive,
     )  # fmt: skip
 
@@ -200,16 +208,20 @@ def same_block(seed):
     mu, load = 0.3 + 0.3 * random.random(), size(0, 1)
     own = rate_state(size(-1.5, -0.5), -size(-2, -1), size(), mu, load, regularised=seed % 4 == 1)
     tilt = float(random.uniform(-0.4, 0.4)) if seed % 3 else 0.0
-    contact = ss.InclinedSpring(steady_normal_stress=load, angle=tilt) if tilt else ss.Constant(preload=load)
+    contact = (
+        ss.laws.InclinedSpring(steady_normal_stress=load, angle=tilt)
+        if tilt
+        else ss.laws.ConstantNormalStress(preload=load)
+    )
     mass, damping, k = (0.0 if seed % 5 == 2 else size()), size(-2, 0), size(0, 2)
     block = ss.Slider(
-        friction=own, contact=contact, stiffness=k, damping=damping, mass=mass, drive=ss.Steady(1.0)
+        friction=own, contact=contact, stiffness=k, damping=damping, mass=mass, drive=ss.machine.SteadyDrive(1.0)
     )  # fmt: skip
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=mass)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
-        contacts={"base": ss.Surface(body="block", friction=own, contact=contact)},
-        drive=ss.Pull(velocity=1.0),
+        bodies={"block": ss.machine.SlidingBody(mass=mass)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
+        contacts={"base": ss.machine.Surface(body="block", friction=own, contact=contact)},
+        drive=ss.machine.Pull(velocity=1.0),
     )
     return block, machine
 

@@ -73,14 +73,14 @@ class _Drawn:
         self._coordinate(f"{name}.x", mass, force, 0.0 if name == "post" else 1.0)
         if self.plane[name]:
             press = self.size(0, 1)
-            self.bodies[name] = ss.PlanarBody(mass=mass, press=press, force=force)
+            self.bodies[name] = ss.machine.PlanarBody(mass=mass, press=press, force=force)
             self._coordinate(f"{name}.y", mass, -press, 0.0)
         else:
-            self.bodies[name] = ss.SlidingBody(mass=mass, force=force)
+            self.bodies[name] = ss.machine.SlidingBody(mass=mass, force=force)
 
     def _rotor(self, name, speed):
         inertia = self.size()
-        self.bodies[name] = ss.RotatingBody(inertia=inertia)
+        self.bodies[name] = ss.machine.RotatingBody(inertia=inertia)
         self._coordinate(f"{name}.x", inertia, 0.0, speed)
 
     def row(self, end, axis=".x", share=1.0):
@@ -100,7 +100,7 @@ class _Drawn:
     def _spring(self, a, b, angle=0.0):
         along, away = (self.row(b, axis) - self.row(a, axis) for axis in (".x", ".y"))
         further = {"angle": angle} if angle else {}
-        self._link(ss.Spring, (a, b), np.cos(angle) * along + np.sin(angle) * away, **further)
+        self._link(ss.machine.Spring, (a, b), np.cos(angle) * along + np.sin(angle) * away, **further)
 
     def _tilted(self, a, b):
         """A second spring beside one, at an angle where both ends may have one."""
@@ -118,22 +118,22 @@ class _Drawn:
         for name in self.names:
             if self.plane[name] and (name == "post" or self.chance(0.5)):
                 end = "ground" if name == "post" else holder
-                self._link(ss.Spring, (end, name), self.row(name, ".y"), direction="normal")
+                self._link(ss.machine.Spring, (end, name), self.row(name, ".y"), direction="normal")
         if self.posts:
             self._spring("ground", "post")
             self._tilted("ground", "post")
         if self.turns:
             row = self.row("b0") - self.row("motor", share=self.lead)
-            self._link(ss.Screw, ("motor", "b0"), row, lead=self.lead)
+            self._link(ss.machine.Screw, ("motor", "b0"), row, lead=self.lead)
         if self.kind == "shaft":
             row = self.row("motor") - self.row("rotor", share=self.gear)
-            self._link(ss.Shaft, ("rotor", "motor"), row, gear=self.gear)
-            self._link(ss.Shaft, ("drive", "rotor"), self.row("rotor"), gear=1.0)
+            self._link(ss.machine.Shaft, ("rotor", "motor"), row, gear=self.gear)
+            self._link(ss.machine.Shaft, ("drive", "rotor"), self.row("rotor"), gear=1.0)
 
     def _drive(self):
         self.acts, self.delay, self.gain, self.place = None, 0.0, lambda s: np.zeros(self.n), np.zeros(self.n)
         if self.kind in ("pull", "shaft"):
-            self.drive = (ss.RotaryPull if self.turns else ss.Pull)(velocity=self.velocity)
+            self.drive = (ss.machine.RotaryPull if self.turns else ss.machine.Pull)(velocity=self.velocity)
             return
         self.acts = "motor" if self.turns else "b0"
         measured, other = (str(self.random.choice([self.acts, *self.names[: self.count]])) for _ in range(2))
@@ -144,13 +144,16 @@ class _Drawn:
         common = {"velocity": self.velocity, "body": self.acts, "measured": measured, "delay": self.delay}
         law = self.kind.removeprefix("rotary-")
         if law == "pd":
-            kind, own = (ss.PositionPD, ss.RotaryPD), {"kp": kp, "kd": kd}
+            kind, own = (ss.machine.PositionPD, ss.machine.RotaryPD), {"kp": kp, "kd": kd}
             self.gain = lambda s: (kp + kd * s) * self.place
         elif law == "pid":
-            kind, own = (ss.PositionPID, ss.RotaryPID), {"kp": kp, "kd": kd, "ki": ki}
+            kind, own = (ss.machine.PositionPID, ss.machine.RotaryPID), {"kp": kp, "kd": kd, "ki": ki}
             self.gain = lambda s: (kp + kd * s + ki / s) * self.place
         else:
-            kind, own = (ss.Cascade, ss.RotaryCascade), {"kv": kv, "kp": kd, "tn": tn, "speed_measured": other}
+            kind, own = (
+                (ss.machine.Cascade, ss.machine.RotaryCascade),
+                {"kv": kv, "kp": kd, "tn": tn, "speed_measured": other},
+            )
             self.gain = lambda s: kd * ((kv + kv / (tn * s)) * self.place + (s + 1 / tn) * speed)
         self.drive = kind[self.turns](**own, **common)
 
@@ -160,15 +163,19 @@ class _Drawn:
         a, b, length, mu, reference = (self.size(-2, -1), self.size(-2, -1), self.size(),
                                        0.2 + 0.3 * self.random.random(), self.size())  # fmt: skip
         alpha = 0.3 * mu if self.chance(0.5) else 0.0
-        memory = {"normal_memory": ss.LinkerDieterich(alpha=alpha)} if alpha else {}
-        friction = ss.RateState(a=a, b=b, d_c=length, mu_ref=mu, v_ref=reference, **memory)
+        memory = {"normal_memory": ss.laws.LinkerDieterich(alpha=alpha)} if alpha else {}
+        friction = ss.laws.RateState(a=a, b=b, d_c=length, mu_ref=mu, v_ref=reference, **memory)
         slip, away = (self.row(name, axis) - self.row(against, axis) for axis in (".x", ".y"))
         k, c, load = (self.size(0, 2), self.size(-2, 0), 0.0) if np.any(away) else (0.0, 0.0, self.size())
         per = area or 1.0
         contact = (
-            ss.Compliant(normal_stiffness=k / per, normal_damping=c / per) if k else ss.Constant(preload=load / per)
+            ss.laws.Compliant(normal_stiffness=k / per, normal_damping=c / per)
+            if k
+            else ss.laws.ConstantNormalStress(preload=load / per)
         )
-        self.contacts[f"c{i}"] = ss.Surface(body=name, against=against, friction=friction, contact=contact, area=area)
+        self.contacts[f"c{i}"] = ss.machine.Surface(
+            body=name, against=against, friction=friction, contact=contact, area=area
+        )
         level = mu - (a - b) * np.log(reference)
         self.touches.append(SimpleNamespace(slip=slip, away=away, k=k, c=c, load=load, a=a, b=b, rate=1 / length,
                                             mu=level, at_once=level - alpha))  # fmt: skip

@@ -22,8 +22,13 @@ ROWS, COLUMNS, CHUNK = 12, 9, 5  # chunks of 5 and 4: the last one of a row is c
 
 
 def rig():
-    friction = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6)
-    return ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=9e9, drive=ss.Steady(1e-6))
+    friction = ss.laws.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6)
+    return ss.Slider(
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        stiffness=9e9,
+        drive=ss.machine.SteadyDrive(1e-6),
+    )
 
 
 class Costly:
@@ -54,8 +59,8 @@ def plan(log, pause=0.01):
     stiffness = [1e9 * (i + 1) for i in range(ROWS)]
     return ss.Map(
         rig(),
-        {"stiffness": stiffness, "friction.a": ss.Grid(0.01, 0.02, COLUMNS)},
-        compute=[ss.measure(Costly()), "status"],
+        {"stiffness": stiffness, "friction.a": ss.maps.Grid(0.01, 0.02, COLUMNS)},
+        compute=[ss.maps.measure(Costly()), "status"],
         chunk=CHUNK,
     )
 

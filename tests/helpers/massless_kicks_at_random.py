@@ -28,22 +28,26 @@ def tied(seed):
     names = [f"b{i}" for i in range(count)]
     heavy = random.random(count) < 0.25
     heavy[random.choice(count, 2, replace=False)] = False  # two at least have none
-    evolution = ss.Aging() if random.random() < 0.5 else ss.Slip()
+    evolution = ss.laws.Aging() if random.random() < 0.5 else ss.laws.Slip()
     links, contacts = {}, {}
     for i, name in enumerate(names):
         before = "drive" if i == 0 else names[i - 1]
         damping = 0.0 if i == 0 else size(-1.5, 0.5)
-        links[f"l{i}"] = ss.Spring(between=(before, name), stiffness=size(-0.5, 1.5), damping=damping)
+        links[f"l{i}"] = ss.machine.Spring(between=(before, name), stiffness=size(-0.5, 1.5), damping=damping)
         a = 0.05 * size(-0.5, 0.5)
         b = a * (1 + random.uniform(-0.5, 1.0))
-        law = ss.RateState(a=a, b=b, d_c=size(-0.5, 0.5), mu_ref=0.6, v_ref=1.0, evolution=evolution, regularised=True)
-        contacts[f"c{i}"] = ss.Surface(body=name, friction=law, contact=ss.Constant(preload=size(-0.5, 0.5)))
+        law = ss.laws.RateState(
+            a=a, b=b, d_c=size(-0.5, 0.5), mu_ref=0.6, v_ref=1.0, evolution=evolution, regularised=True
+        )
+        contacts[f"c{i}"] = ss.machine.Surface(
+            body=name, friction=law, contact=ss.laws.ConstantNormalStress(preload=size(-0.5, 0.5))
+        )
     for i, name in enumerate(names):  # something holds each back, the more the faster it is: no jumps
-        links[f"g{i}"] = ss.Spring(between=("ground", name), damping=size(-2.0, -0.5))
+        links[f"g{i}"] = ss.machine.Spring(between=("ground", name), damping=size(-2.0, -0.5))
     masses = [size(-1.5, 0.5) if own else 0.0 for own in heavy]
     machine = ss.Machine(
-        bodies={name: ss.SlidingBody(mass=mass) for name, mass in zip(names, masses, strict=True)}, links=links,
-        contacts=contacts, drive=ss.Pull(velocity=1.0),
+        bodies={name: ss.machine.SlidingBody(mass=mass) for name, mass in zip(names, masses, strict=True)}, links=links,
+        contacts=contacts, drive=ss.machine.Pull(velocity=1.0),
     )  # fmt: skip
     kick = str(random.choice(["velocity", "displacement", "force"]))
     at = str(random.choice(names)) if kick == "force" else None
@@ -75,7 +79,7 @@ class Typed:
         self.a, self.b, self.d_c, self.mu = (
             np.array([getattr(law, name) for law in laws]) for name in ("a", "b", "d_c", "mu_ref")
         )
-        self.aging = type(laws[0].evolution) is ss.Aging
+        self.aging = type(laws[0].evolution) is ss.laws.Aging
         self.push, self.drive, self.near = np.zeros(n), 1.0, np.zeros(n)
 
     def rub(self, v, theta):

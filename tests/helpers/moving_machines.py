@@ -43,16 +43,16 @@ def aging(own, v, theta):
 def two_tables(**changes):
     """Two tables on one belt, each on its own guide; the second one's law goes through rest."""
     return ss.Machine(
-        bodies={"front": ss.SlidingBody(mass=1.0), "back": ss.SlidingBody(mass=1.0)},
+        bodies={"front": ss.machine.SlidingBody(mass=1.0), "back": ss.machine.SlidingBody(mass=1.0)},
         links={
-            "belt": ss.Spring(between=("drive", "front"), stiffness=5.0, damping=0.2),
-            "bar": ss.Spring(between=("front", "back"), stiffness=8.0, damping=0.2),
+            "belt": ss.machine.Spring(between=("drive", "front"), stiffness=5.0, damping=0.2),
+            "bar": ss.machine.Spring(between=("front", "back"), stiffness=8.0, damping=0.2),
         },
         contacts={
             "dry": surface("front", rate_state(0.3, 0.1, 1.0), load=2.0),
             "oiled": surface("back", rate_state(0.1, 0.05, 1.0, regularised=True), load=1.0),
         },
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 

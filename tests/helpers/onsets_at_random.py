@@ -44,7 +44,7 @@ def drawn(seed):
     """
     random = np.random.default_rng([seed, 6])
     machine, _ = at_random(seed)
-    law = (ss.Slip(), ss.Aging(), ss.PRZ())[int(random.integers(3))]
+    law = (ss.laws.Slip(), ss.laws.Aging(), ss.laws.PRZ())[int(random.integers(3))]
     contacts = {
         name: replace(one, friction=replace(one.friction, evolution=law)) for name, one in machine.contacts.items()
     }
@@ -56,14 +56,16 @@ def drawn(seed):
     elif kind == 2:
         machine = machine.with_values({springs[-1]: 10.0 ** random.uniform(3, 9)})
     elif kind == 3:
-        friction = ss.RateState(a=0.1, b=random.uniform(0.12, 0.5), d_c=1.0, mu_ref=0.6, v_ref=1.0,
-                                evolution=(ss.Slip(), ss.Aging())[int(random.integers(2))])  # fmt: skip
-        block = ss.Surface(body="block", friction=friction, contact=ss.Constant(preload=random.uniform(0.5, 5)))
+        friction = ss.laws.RateState(a=0.1, b=random.uniform(0.12, 0.5), d_c=1.0, mu_ref=0.6, v_ref=1.0,
+                                evolution=(ss.laws.Slip(), ss.laws.Aging())[int(random.integers(2))])  # fmt: skip
+        block = ss.machine.Surface(
+            body="block", friction=friction, contact=ss.laws.ConstantNormalStress(preload=random.uniform(0.5, 5))
+        )
         machine = ss.Machine(
-            bodies={"block": ss.SlidingBody(mass=0.0), "end": ss.SlidingBody(mass=0.0)},
-            links={"one": ss.Spring(between=("drive", "end"), stiffness=random.uniform(0.2, 1)),
-                   "two": ss.Spring(between=("end", "block"), stiffness=random.uniform(0.2, 1))},
-            contacts={"base": block}, drive=ss.Pull(velocity=1.0),
+            bodies={"block": ss.machine.SlidingBody(mass=0.0), "end": ss.machine.SlidingBody(mass=0.0)},
+            links={"one": ss.machine.Spring(between=("drive", "end"), stiffness=random.uniform(0.2, 1)),
+                   "two": ss.machine.Spring(between=("end", "block"), stiffness=random.uniform(0.2, 1))},
+            contacts={"base": block}, drive=ss.machine.Pull(velocity=1.0),
         )  # fmt: skip
         springs = ["links.one.stiffness"]
     return machine, (*springs, *(f"contacts.{name}.friction.b" for name in machine.contacts))

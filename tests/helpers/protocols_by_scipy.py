@@ -39,12 +39,12 @@ class RandomProtocol:
         self.pieces = [pieces[i] for i in self._orders(pieces)]
 
     def rig(self):
-        contact = ss.Constant(preload=1.0)
+        contact = ss.laws.ConstantNormalStress(preload=1.0)
         if self.contact == "wet":
-            contact = ss.PoreFluid(preload=1.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
+            contact = ss.laws.PoreFluid(preload=1.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
         if self.contact == "prescribed":
-            contact = ss.Prescribed(preload=1.0, amplitude=0.05, period=2.3)
-        return ss.Slider(friction=LAW, contact=contact, drive=ss.Steady(1.0), stiffness=K, mass=self.mass)
+            contact = ss.laws.Prescribed(preload=1.0, amplitude=0.05, period=2.3)
+        return ss.Slider(friction=LAW, contact=contact, drive=ss.machine.SteadyDrive(1.0), stiffness=K, mass=self.mass)
 
     def _when(self):
         """Quarters, so that pieces often begin together."""
@@ -67,7 +67,7 @@ class RandomProtocol:
         ]
 
     def _stress(self, start, size, shape):
-        law, by = getattr(ss, start + shape), float(size * self.random.uniform(-1, 1))
+        law, by = getattr(ss.protocol, start + shape), float(size * self.random.uniform(-1, 1))
         if shape == "Harmonic":
             return self._wave(law, size)
         if shape == "Table":
@@ -85,20 +85,26 @@ class RandomProtocol:
             to = float(self.random.uniform(0.5, 2.0))
             found.append(
                 {
-                    "step": lambda at=at, to=to: ss.VelocityStep(at=at, to=to),
-                    "ramp": lambda at=at, to=to, length=length: ss.VelocityRamp(at=at, to=to, duration=length),
-                    "hold": lambda at=at, length=length: ss.Hold(at=at, duration=length),
+                    "step": lambda at=at, to=to: ss.protocol.VelocityStep(at=at, to=to),
+                    "ramp": lambda at=at, to=to, length=length: ss.protocol.VelocityRamp(at=at, to=to, duration=length),
+                    "hold": lambda at=at, length=length: ss.protocol.Hold(at=at, duration=length),
                 }[str(kind)]()
             )
             now = at + (0 if kind == "step" else length)
-        found += [self._wave(ss.VelocityHarmonic, 0.25) for _ in range(self.random.integers(2, 4))]
-        jumps = [ss.DisplacementStep(at=self._when(), by=float(self.random.uniform(-0.1, 0.1))) for _ in range(2)]
+        found += [self._wave(ss.protocol.VelocityHarmonic, 0.25) for _ in range(self.random.integers(2, 4))]
+        jumps = [
+            ss.protocol.DisplacementStep(at=self._when(), by=float(self.random.uniform(-0.1, 0.1))) for _ in range(2)
+        ]
         return found + jumps[: self.random.integers(0, 3)]
 
     def _orders(self, pieces):
         """Shuffled, but for those that set the velocity."""
         order = list(self.random.permutation(len(pieces)))
-        setting = [i for i in order if isinstance(pieces[i], (ss.VelocityStep, ss.VelocityRamp, ss.Hold))]
+        setting = [
+            i
+            for i in order
+            if isinstance(pieces[i], (ss.protocol.VelocityStep, ss.protocol.VelocityRamp, ss.protocol.Hold))
+        ]
         places = sorted(order.index(i) for i in setting)
         for place, i in zip(places, sorted(setting), strict=True):
             order[place] = i
@@ -134,13 +140,13 @@ def speed(pieces, t, inside):
     """Velocity of the load point."""
     found = 1.0
     for piece in pieces:
-        if isinstance(piece, ss.VelocityStep) and inside >= piece.at:
+        if isinstance(piece, ss.protocol.VelocityStep) and inside >= piece.at:
             found = piece.to
-        elif isinstance(piece, ss.Hold):
+        elif isinstance(piece, ss.protocol.Hold):
             found = 0.0 if piece.at <= inside < piece.at + piece.duration else found
-        elif isinstance(piece, ss.VelocityRamp) and inside >= piece.at:
+        elif isinstance(piece, ss.protocol.VelocityRamp) and inside >= piece.at:
             found += (piece.to - found) * min((t - piece.at) / piece.duration, 1)
-    return found + sum(value(piece, t, inside) for piece in pieces if isinstance(piece, ss.VelocityHarmonic))
+    return found + sum(value(piece, t, inside) for piece in pieces if isinstance(piece, ss.protocol.VelocityHarmonic))
 
 
 def solved(case, pieces, times=TIMES):
@@ -176,7 +182,7 @@ def solved(case, pieces, times=TIMES):
     y, found = np.array([0.0] * 5 + [1.0] * (case.mass > 0)), {}
     for start, end in zip(cut := edges(pieces), cut[1:], strict=False):
         inside = (start + end) / 2
-        y[1] += sum(one.by for one in pieces if isinstance(one, ss.DisplacementStep) and one.at == start)
+        y[1] += sum(one.by for one in pieces if isinstance(one, ss.protocol.DisplacementStep) and one.at == start)
         wanted = [t for t in times if start <= t < end or t == end == UNTIL]
         done = solve_ivp(right, (start, end), y, "LSODA", sorted({*wanted, end}), args=(inside,), rtol=1e-9, atol=1e-11)
         assert done.success, done.message

@@ -30,10 +30,10 @@ NAMES = WORDS.split()
 def laws(*pairs):
     """Classes of both laws in which the first of each pair is called by the second."""
     names = PLAIN | dict(pairs)
-    families = (ss.FrictionLaw, ss.ContactLaw)
+    families = (ss.laws.FrictionLaw, ss.laws.ContactLaw)
     before = [dict(family.registry) for family in families]
 
-    class Aging(ss.FrictionLaw, name="renamed-friction"):
+    class Aging(ss.laws.FrictionLaw, name="renamed-friction"):
         """The slip law with viscous friction that saturates."""
 
         __annotations__ = {names[one]: "float" for one in NUMBERS}
@@ -52,7 +52,7 @@ def laws(*pairs):
         def steady_memory(self, v, sigma):
             return (-sp.log(v / V0),)
 
-    class Film(ss.PreloadedContact, name="renamed-contact"):
+    class Film(ss.laws.PreloadedContact, name="renamed-contact"):
         """A film that follows the velocity over some distance and carries a share of the load."""
 
         __annotations__ = {names[one]: "float" for one in ("share", "distance")}
@@ -82,7 +82,9 @@ def renamed(own=(), contact=None, **slider):
     aging, film = laws(*own)
     friction = aging(**{names[one]: value for one, value in NUMBERS.items()})
     touch = film(**{names.get(one, one): value for one, value in OF_CONTACT.items()}) if contact is None else contact
-    return ss.Slider(**{"friction": friction, "contact": touch, "drive": ss.Steady(V0), "stiffness": 6e9} | slider)
+    return ss.Slider(
+        **{"friction": friction, "contact": touch, "drive": ss.machine.SteadyDrive(V0), "stiffness": 6e9} | slider
+    )
 
 
 def machine(own=(), mass=1e3):
@@ -90,11 +92,14 @@ def machine(own=(), mass=1e3):
     rig = renamed(own)
     surface = {"friction": rig.friction, "contact": rig.contact}
     return ss.Machine(
-        bodies={"one": ss.SlidingBody(mass=mass), "two": ss.SlidingBody(mass=mass)},
+        bodies={"one": ss.machine.SlidingBody(mass=mass), "two": ss.machine.SlidingBody(mass=mass)},
         links={
-            "belt": ss.Spring(between=("drive", "one"), stiffness=8e9, damping=1e6),
-            "bar": ss.Spring(between=("one", "two"), stiffness=9e9, damping=1e6),
+            "belt": ss.machine.Spring(between=("drive", "one"), stiffness=8e9, damping=1e6),
+            "bar": ss.machine.Spring(between=("one", "two"), stiffness=9e9, damping=1e6),
         },
-        contacts={"first": ss.Surface(body="one", **surface), "second": ss.Surface(body="two", **surface)},
-        drive=ss.Pull(velocity=V0),
+        contacts={
+            "first": ss.machine.Surface(body="one", **surface),
+            "second": ss.machine.Surface(body="two", **surface),
+        },
+        drive=ss.machine.Pull(velocity=V0),
     )

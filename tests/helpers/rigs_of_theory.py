@@ -10,33 +10,38 @@ EPS = np.finfo(float).eps
 
 
 def rate_state(**changes):
-    return ss.RateState(**({"a": A, "b": B, "d_c": D_C, "mu_ref": 0.7, "v_ref": V0} | changes))
+    return ss.laws.RateState(**({"a": A, "b": B, "d_c": D_C, "mu_ref": 0.7, "v_ref": V0} | changes))
 
 
 def rig(**changes):
-    parts = {"friction": rate_state(), "contact": ss.Constant(preload=SIGMA), "stiffness": 7e9, "drive": ss.Steady(V0)}
+    parts = {
+        "friction": rate_state(),
+        "contact": ss.laws.ConstantNormalStress(preload=SIGMA),
+        "stiffness": 7e9,
+        "drive": ss.machine.SteadyDrive(V0),
+    }
     return ss.Slider(**(parts | changes))
 
 
 CONTACTS = (
-    ss.Constant(preload=SIGMA),
-    ss.InclinedSpring(preload=SIGMA, angle=-0.5),
-    ss.SliderCrank(preload=SIGMA, crank_angle=1.0, crank_radius=0.1, rod_length=0.3),
-    ss.Triaxial(confining_pressure=SIGMA, angle=0.5),
-    ss.SelfEnergising(preload=SIGMA, gain=0.4),
-    ss.LeadScrew(axial_load=SIGMA, lead_angle=0.2, direction="lowering"),
-    ss.DilatingLayer(preload=SIGMA, ram_stiffness=1e11, dilatancy=1e-8, v_ref=V0),
-    ss.Lift(preload=SIGMA, lift=1e11, v_ref=V0),
-    ss.SlopedGuide(preload=SIGMA, guide_stiffness=1e10, slope=0.1),
-    ss.Linear(steady_normal_stress=SIGMA, b0=2e9, b1=1e10, b2=0.3, b3=2e9),
+    ss.laws.ConstantNormalStress(preload=SIGMA),
+    ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5),
+    ss.laws.SliderCrank(preload=SIGMA, crank_angle=1.0, crank_radius=0.1, rod_length=0.3),
+    ss.laws.Triaxial(confining_pressure=SIGMA, angle=0.5),
+    ss.laws.SelfEnergising(preload=SIGMA, gain=0.4),
+    ss.laws.LeadScrew(axial_load=SIGMA, lead_angle=0.2, direction="lowering"),
+    ss.laws.DilatingLayer(preload=SIGMA, ram_stiffness=1e11, dilatancy=1e-8, v_ref=V0),
+    ss.laws.Lift(preload=SIGMA, lift=1e11, v_ref=V0),
+    ss.laws.SlopedGuide(preload=SIGMA, guide_stiffness=1e10, slope=0.1),
+    ss.laws.LinearNormalStress(steady_normal_stress=SIGMA, b0=2e9, b1=1e10, b2=0.3, b3=2e9),
 )
 ONE_MEMORY = (
     rate_state(),
-    rate_state(evolution=ss.Aging(), normal_memory=ss.LinkerDieterich(alpha=0.4)),
-    rate_state(evolution=ss.PRZ(), regularised=True, normal_memory=ss.LinkerDieterich(alpha=0.4)),
-    rate_state(evolution=ss.Nagata(c_nagata=0.7), normal_memory=ss.LinkerDieterich(alpha=0.4)),
-    rate_state(evolution=ss.Nagata(c_nagata=0.7), regularised=True),
-    ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10, viscous=5),
+    rate_state(evolution=ss.laws.Aging(), normal_memory=ss.laws.LinkerDieterich(alpha=0.4)),
+    rate_state(evolution=ss.laws.PRZ(), regularised=True, normal_memory=ss.laws.LinkerDieterich(alpha=0.4)),
+    rate_state(evolution=ss.laws.Nagata(c_nagata=0.7), normal_memory=ss.laws.LinkerDieterich(alpha=0.4)),
+    rate_state(evolution=ss.laws.Nagata(c_nagata=0.7), regularised=True),
+    ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10, viscous=5),
 )
 
 
@@ -47,11 +52,13 @@ LAWS = {
     "nagata+ld": ONE_MEMORY[3],
     "nagata regularised": ONE_MEMORY[4],
     "lugre": ONE_MEMORY[5],
-    "two states": rate_state(b=None, d_c=None, states=(ss.State(b=0.01, d_c=1e-6), ss.State(b=0.008, d_c=2e-5))),
-    "prakash-clifton": rate_state(normal_memory=ss.PrakashClifton()),
-    "prakash-clifton g": rate_state(normal_memory=ss.PrakashClifton(direct_share=0.5)),
+    "two states": rate_state(
+        b=None, d_c=None, states=(ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=0.008, d_c=2e-5))
+    ),
+    "prakash-clifton": rate_state(normal_memory=ss.laws.PrakashClifton()),
+    "prakash-clifton g": rate_state(normal_memory=ss.laws.PrakashClifton(direct_share=0.5)),
     "b=0": rate_state(b=0.0),
-    "aging b<0": rate_state(evolution=ss.Aging(), b=-0.002),
+    "aging b<0": rate_state(evolution=ss.laws.Aging(), b=-0.002),
 }
 
 

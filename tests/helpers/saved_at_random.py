@@ -280,8 +280,10 @@ def draws(random, folder):
     values = {name: odd_columns(random, count * chains) for name in fit.names}
     worth = odd_columns(random, count * chains) if random.random() < 0.5 else None
     kind = str(random.choice(["bootstrap", "posterior", "normal"]))
-    one = ss.Draws(fit, kind, values, {"acceptance": odd(random, 0.3)}, bool(random.integers(2)), chains, worth)
-    found = saved_twice(one, ss.load_draws, folder / "draws.nc")
+    one = ss.experiments.Draws(
+        fit, kind, values, {"acceptance": odd(random, 0.3)}, bool(random.integers(2)), chains, worth
+    )
+    found = saved_twice(one, ss.experiments.load_draws, folder / "draws.nc")
     path = str(folder / f"draws-{random.integers(10**9)}.nc")
     one.to_arviz().to_netcdf(path)
     with xr.open_dataset(path, group="posterior") as read:
@@ -312,10 +314,10 @@ def populations(random, folder):
     unknowns = tuple(
         next(one for one in next(iter(fits.values())).space.unknowns if one.name == name) for name in names
     )
-    one = ss.Population(
+    one = ss.experiments.Population(
         fits, names, {name: odd_columns(random, members) for name in given}, odd(random, 1.0), unknowns, pooled
     )
-    return saved_twice(one, ss.load_population, folder / "population.nc")
+    return saved_twice(one, ss.experiments.load_population, folder / "population.nc")
 
 
 def saved_twice(one, load, path):

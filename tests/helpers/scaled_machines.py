@@ -23,31 +23,34 @@ def drawn(random):
         "above": random.uniform(1.05, 1.6),  # times the edge
         "a": random.uniform(0.05, 0.2),
         "falls": random.uniform(0.2, 0.8),
-        "evolution": (ss.Slip(), ss.Aging())[int(random.integers(2))],
+        "evolution": (ss.laws.Slip(), ss.laws.Aging())[int(random.integers(2))],
     }
 
 
 def built(numbers, length=1.0, force=1.0, time=1.0, turned=False, pull=1.0):
     """The machine of some numbers, in units so many metres, newtons and seconds large."""
     mass, rate = force * time**2 / length, length / time
-    friction = ss.RateState(
+    friction = ss.laws.RateState(
         a=numbers["a"], b=numbers["a"] * (1 + numbers["falls"]), d_c=length, mu_ref=0.6, v_ref=rate,
         evolution=numbers["evolution"],
     )  # fmt: skip
     bodies = {
-        name: ss.SlidingBody(mass=own * mass) for name, own in zip(("front", "back"), numbers["masses"], strict=True)
+        name: ss.machine.SlidingBody(mass=own * mass)
+        for name, own in zip(("front", "back"), numbers["masses"], strict=True)
     }
     links = {
-        "pull": ss.Spring(between=("drive", "front"), stiffness=pull * force / length),
-        "bar": ss.Spring(
+        "pull": ss.machine.Spring(between=("drive", "front"), stiffness=pull * force / length),
+        "bar": ss.machine.Spring(
             between=("front", "back"), stiffness=numbers["stiffness"] * force / length,
             damping=numbers["damping"] * force / rate,
         ),
     }  # fmt: skip
     if turned:
         bodies, links = dict(reversed(bodies.items())), dict(reversed(links.items()))
-    contacts = {"guide": ss.Surface(body="back", friction=friction, contact=ss.Constant(preload=force))}
-    return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.Pull(velocity=rate))
+    contacts = {
+        "guide": ss.machine.Surface(body="back", friction=friction, contact=ss.laws.ConstantNormalStress(preload=force))
+    }
+    return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.machine.Pull(velocity=rate))
 
 
 def answers(numbers, **units):

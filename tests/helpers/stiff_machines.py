@@ -11,7 +11,7 @@ SHARE = 0.3  # of the digits: decades from which on an eigenvalue is one of thos
 def lugre(chance, velocity, ratio):
     """A law at so many times its Stribeck velocity."""
     coulomb = chance.uniform(0.1, 0.4)
-    return ss.LuGre(
+    return ss.laws.LuGre(
         mu_coulomb=coulomb, mu_static=coulomb * chance.choice([0.4, 1.6]), v_stribeck=velocity / ratio,
         bristle_stiffness=10 ** chance.uniform(4, 6), bristle_damping=10 ** chance.uniform(-2, 1),
         viscous=chance.choice([0.0, 10 ** chance.uniform(-3, 0)]),
@@ -19,7 +19,7 @@ def lugre(chance, velocity, ratio):
 
 
 def rate_state(chance, velocity):
-    return ss.RateState(
+    return ss.laws.RateState(
         a=10 ** chance.uniform(-3, -1.5), b=10 ** chance.uniform(-3, -1.5), d_c=10 ** chance.uniform(-6, -3),
         mu_ref=0.5, v_ref=velocity,
     )  # fmt: skip
@@ -44,15 +44,19 @@ def at_random(chance, decades=10.0, ratio=None):
         turns = i == 0 and count > 1 and chance.random() < 0.3
         lead = 10 ** chance.uniform(-3, -1) if turns else 1.0
         mass = chance.choice([0.0, 10 ** chance.uniform(-6, 2)]) * lead**2
-        bodies[name] = ss.RotatingBody(inertia=mass) if turns else ss.SlidingBody(mass=mass)
+        bodies[name] = ss.machine.RotatingBody(inertia=mass) if turns else ss.machine.SlidingBody(mass=mass)
         stiffness = 10 ** (6 + chance.uniform(-decades, decades))
         damping = chance.choice([0.0, stiffness * 10 ** chance.uniform(-6, -2)])
         if turns:
-            links[f"l{i}"] = ss.Shaft(between=(before, name), stiffness=stiffness * lead**2, damping=damping * lead**2)
+            links[f"l{i}"] = ss.machine.Shaft(
+                between=(before, name), stiffness=stiffness * lead**2, damping=damping * lead**2
+            )
         elif leads.get(before, 1.0) != 1.0:
-            links[f"l{i}"] = ss.Screw(between=(before, name), lead=leads[before], stiffness=stiffness, damping=damping)
+            links[f"l{i}"] = ss.machine.Screw(
+                between=(before, name), lead=leads[before], stiffness=stiffness, damping=damping
+            )
         else:
-            links[f"l{i}"] = ss.Spring(between=(before, name), stiffness=stiffness, damping=damping)
+            links[f"l{i}"] = ss.machine.Spring(between=(before, name), stiffness=stiffness, damping=damping)
         names.append(name)
         leads[name] = lead
     sliding = [name for name in names if leads[name] == 1.0]
@@ -61,10 +65,10 @@ def at_random(chance, decades=10.0, ratio=None):
     for i, name in enumerate(touched):
         own = ratio or 10 ** chance.uniform(0, 1.5)
         law = lugre(chance, velocity, own) if chance.random() < 0.6 else rate_state(chance, velocity)
-        load = ss.Constant(preload=10 ** chance.uniform(0, 4))
-        contacts[f"c{i}"] = ss.Surface(body=str(name), friction=law, contact=load)
+        load = ss.laws.ConstantNormalStress(preload=10 ** chance.uniform(0, 4))
+        contacts[f"c{i}"] = ss.machine.Surface(body=str(name), friction=law, contact=load)
     turning = leads["b0"] != 1.0
-    pull = ss.RotaryPull if turning else ss.Pull
+    pull = ss.machine.RotaryPull if turning else ss.machine.Pull
     return ss.Machine(
         bodies=bodies,
         links=links,
@@ -81,7 +85,7 @@ def pencil(machine):
     speeds = {name: mpmath.mpf(speed) for name, speed in machine.speeds().items()}
     for i, body in enumerate(machine.bodies.values()):
         a[i, n + i] = e[i, i] = 1
-        e[n + i, n + i] = mpmath.mpf(body.inertia if isinstance(body, ss.RotatingBody) else body.mass)
+        e[n + i, n + i] = mpmath.mpf(body.inertia if isinstance(body, ss.machine.RotatingBody) else body.mass)
     for link in machine.links.values():
         row = mpmath.zeros(1, n)
         for end, share in zip(link.between, (-mpmath.mpf(link.ratio()), mpmath.mpf(1)), strict=True):
@@ -95,7 +99,7 @@ def pencil(machine):
         i, v, load = names.index(touch.body), speeds[touch.body], mpmath.mpf(touch.contact.preload)
         law, z = touch.friction, 2 * n + k
         e[z, z] = 1
-        if isinstance(law, ss.LuGre):
+        if isinstance(law, ss.laws.LuGre):
             weakening = mpmath.mpf(law.mu_static) - mpmath.mpf(law.mu_coulomb)
             bell = weakening * mpmath.exp(-((v / law.v_stribeck) ** 2))
             g, slope = law.mu_coulomb + bell, -2 * v / mpmath.mpf(law.v_stribeck) ** 2 * bell

@@ -31,7 +31,7 @@ class Drawn:
 
     rig: ss.Slider
     label: str
-    record: ss.Record
+    record: ss.experiments.Record
 
 
 def _rig(rng: np.random.Generator, evolution: str, memory: str) -> ss.Slider:
@@ -39,19 +39,22 @@ def _rig(rng: np.random.Generator, evolution: str, memory: str) -> ss.Slider:
     a, d_c, rate = rng.uniform(0.006, 0.014), 10 ** rng.uniform(-5.3, -4.5), 10 ** rng.uniform(-6, -5)
     b, stress = a * rng.uniform(0.6, 1.4), 10 ** rng.uniform(6.7, 7.6)
     memories = {
-        "none": ss.NoMemory(),
-        "linker-dieterich": ss.LinkerDieterich(alpha=rng.uniform(0.05, 0.6)),
-        "prakash-clifton": ss.PrakashClifton(
+        "none": ss.laws.NoMemory(),
+        "linker-dieterich": ss.laws.LinkerDieterich(alpha=rng.uniform(0.05, 0.6)),
+        "prakash-clifton": ss.laws.PrakashClifton(
             direct_share=rng.uniform(0.1, 0.9), slip_distance=d_c * 10 ** rng.uniform(-0.5, 0.7)
         ),
     }
-    friction = ss.RateState(
+    friction = ss.laws.RateState(
         a=a, b=b, d_c=d_c, mu_ref=rng.uniform(0.5, 0.7), v_ref=rate,
-        evolution=ss.Slip() if evolution == "slip" else ss.Aging(), normal_memory=memories[memory],
+        evolution=ss.laws.Slip() if evolution == "slip" else ss.laws.Aging(), normal_memory=memories[memory],
     )  # fmt: skip
     stiffness = stress * a / d_c * 10 ** rng.uniform(0.3, 1.0)
     return ss.Slider(
-        friction=friction, contact=ss.Constant(steady_normal_stress=stress), stiffness=stiffness, drive=ss.Steady(rate)
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(steady_normal_stress=stress),
+        stiffness=stiffness,
+        drive=ss.machine.SteadyDrive(rate),
     )
 
 
@@ -60,17 +63,17 @@ def _protocol(rng: np.random.Generator, rig: ss.Slider) -> ss.Protocol:
     stress, rate = ss.steady_state(rig).normal_stress, rig.drive.velocity
     span = SPAN * rig.value("friction.d_c") / rate
     moments = (np.array([0.15, 0.4, 0.65, 0.85]) + rng.uniform(-0.03, 0.03, 4)) * span
-    pieces: list[ss.Piece] = []
+    pieces: list[ss.protocol.Piece] = []
     above = 0.0
     for i, at in enumerate(moments):
         if i == 1 and rng.random() < 0.5:
-            pieces.append(ss.VelocityStep(at=at, to=rate * rng.uniform(2, 4)))
+            pieces.append(ss.protocol.VelocityStep(at=at, to=rate * rng.uniform(2, 4)))
             continue
         by = -above if above and rng.random() < 0.6 else stress * rng.uniform(0.02, 0.15) * rng.choice([-1, 1])
         if rng.random() < 0.3:
-            pieces.append(ss.NormalStressRamp(at=at, by=by, duration=span * rng.uniform(0.002, 0.01)))
+            pieces.append(ss.protocol.NormalStressRamp(at=at, by=by, duration=span * rng.uniform(0.002, 0.01)))
         else:
-            pieces.append(ss.NormalStressStep(at=at, by=by))
+            pieces.append(ss.protocol.NormalStressStep(at=at, by=by))
         above += by
     return ss.Protocol(pieces=tuple(pieces), until=span)
 
@@ -110,7 +113,7 @@ def drawn(seed: int, count: int, samples: int = 400) -> Iterator[Drawn]:
         yield Drawn(rig, label, record)
 
 
-def told(one: Drawn) -> tuple[ss.LawComparison, dict[str, bool]]:
+def told(one: Drawn) -> tuple[ss.experiments.LawComparison, dict[str, bool]]:
     """The comparison of all laws, and which intervals of the right one contain the truth."""
     compared = ss.compare_laws(ss.lab_rig(v_ref=one.rig.drive.velocity), one.record, LABELS)
     fit = compared.fits[one.label]

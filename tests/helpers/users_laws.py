@@ -6,18 +6,18 @@ import steadyslip as ss
 from rigs_of_theory import SIGMA, V0, rig
 from steadyslip.core.domains import positive
 
-FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
+FAMILIES = (ss.laws.FrictionLaw, ss.laws.ContactLaw)
 BEFORE = [dict(family.registry) for family in FAMILIES]
 
 
-class Viscous(ss.FrictionLaw, name="viscous-of-tests"):
+class Viscous(ss.laws.FrictionLaw, name="viscous-of-tests"):
     """A user's law: the slip law with viscous friction that saturates."""
 
-    a: float = ss.parameter("1", positive, "direct effect")
-    b: float = ss.parameter("1", positive, "evolution effect")
-    d_c: float = ss.parameter("m", positive, "slip distance")
-    level: float = ss.parameter("1", positive, "friction at 1 µm/s")
-    film: float = ss.parameter("Pa", positive, "viscous stress of a fast block")
+    a: float = ss.laws.parameter("1", positive, "direct effect")
+    b: float = ss.laws.parameter("1", positive, "evolution effect")
+    d_c: float = ss.laws.parameter("m", positive, "slip distance")
+    level: float = ss.laws.parameter("1", positive, "friction at 1 µm/s")
+    film: float = ss.laws.parameter("Pa", positive, "viscous stress of a fast block")
 
     def memory(self):
         return ("age",)
@@ -33,17 +33,17 @@ class Viscous(ss.FrictionLaw, name="viscous-of-tests"):
         return (-sp.log(v / V0),)
 
 
-class Asperities(ss.PreloadedContact, name="asperities-of-tests"):
+class Asperities(ss.laws.PreloadedContact, name="asperities-of-tests"):
     """A user's contact, not linear in the stresses: σ = σ0 + c √(T p)."""
 
-    share: float = ss.parameter("1", positive, "share c")
-    pressure: float = ss.parameter("Pa", positive, "pressure p")
+    share: float = ss.laws.parameter("1", positive, "share c")
+    pressure: float = ss.laws.parameter("Pa", positive, "pressure p")
 
     def coupling(self, motion):
         return self.share * sp.sqrt(motion.spring * self.pressure)
 
 
-class Turning(ss.PreloadedContact, name="turning-of-tests"):
+class Turning(ss.laws.PreloadedContact, name="turning-of-tests"):
     """A user's contact with a function that no kernel has."""
 
     def coupling(self, motion):
@@ -56,7 +56,7 @@ for family, registry in zip(FAMILIES, BEFORE, strict=True):
 FRICTION = Viscous(a=0.0145, b=0.016, d_c=1e-6, level=0.7, film=1e5)
 CONTACT = Asperities(preload=SIGMA, share=0.3, pressure=2e6)
 USERS = {
-    "friction law": rig(friction=FRICTION, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5)),
+    "friction law": rig(friction=FRICTION, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5)),
     "contact law": rig(contact=CONTACT),
     "both": rig(friction=FRICTION, contact=CONTACT),
 }

@@ -27,49 +27,53 @@ def some_rig(rng):
     b = a * rng.choice([rng.uniform(1.02, 3), rng.uniform(0.2, 1)], p=[0.8, 0.2])
     d_c = 10 ** rng.uniform(-6.5, -4.5)
     alpha = rng.choice([0.0, rng.uniform(0.05, 1.2)])
-    memory = [NoMemory(), ss.LinkerDieterich(alpha=alpha), ss.PrakashClifton(direct_share=rng.uniform(0, 1))]
+    memory = [NoMemory(), ss.laws.LinkerDieterich(alpha=alpha), ss.laws.PrakashClifton(direct_share=rng.uniform(0, 1))]
     common = {"a": a, "mu_ref": rng.uniform(0.2, 0.9), "v_ref": V0, "normal_memory": memory[rng.integers(3)]}
-    evolution = [ss.Slip(), ss.Aging(), ss.PRZ(), ss.Nagata(c_nagata=rng.uniform(0.1, 2))][rng.integers(4)]
+    evolution = [ss.laws.Slip(), ss.laws.Aging(), ss.laws.PRZ(), ss.laws.Nagata(c_nagata=rng.uniform(0.1, 2))][
+        rng.integers(4)
+    ]
     law = rng.integers(6)
     if law == 0:
         size = 10 ** rng.uniform(3, 5)
-        friction = ss.LuGre(mu_coulomb=0.2, mu_static=rng.uniform(0.15, 0.4), v_stribeck=10 ** rng.uniform(-7, -4),
+        friction = ss.laws.LuGre(mu_coulomb=0.2, mu_static=rng.uniform(0.15, 0.4), v_stribeck=10 ** rng.uniform(-7, -4),
                             bristle_stiffness=size, bristle_damping=10 ** rng.uniform(-1, 2),
                             viscous=rng.choice([0.0, 10 ** rng.uniform(0, 4)]))  # fmt: skip
     elif law == 1:
         states = [State(b=b, d_c=d_c), State(b=a * rng.uniform(-0.5, 1), d_c=d_c * 10 ** rng.uniform(-2, 2))]
-        friction = ss.RateState(
-            **(common | {"normal_memory": memory[rng.integers(2)]}), states=states, evolution=ss.Slip()
+        friction = ss.laws.RateState(
+            **(common | {"normal_memory": memory[rng.integers(2)]}), states=states, evolution=ss.laws.Slip()
         )
     else:
-        friction = ss.RateState(**common, b=b, d_c=d_c, evolution=evolution, regularised=bool(rng.integers(2)))
+        friction = ss.laws.RateState(**common, b=b, d_c=d_c, evolution=evolution, regularised=bool(rng.integers(2)))
     sigma = 10 ** rng.uniform(5, 7.5)
     k = sigma * abs(b - a) / d_c * 10 ** rng.uniform(-1, 1)
     angle = rng.uniform(-1.2, 1.4)
     sign = rng.choice([-1.0, 1.0])
     contact = [
-        lambda: ss.Constant(preload=sigma),
-        lambda: ss.InclinedSpring(preload=sigma, angle=angle),
-        lambda: ss.InclinedSpring(preload=sigma, angle=angle),
-        lambda: ss.Triaxial(confining_pressure=sigma, angle=abs(angle)),
-        lambda: ss.SelfEnergising(preload=sigma, gain=rng.uniform(-2, 2)),
-        lambda: ss.DilatingLayer(
+        lambda: ss.laws.ConstantNormalStress(preload=sigma),
+        lambda: ss.laws.InclinedSpring(preload=sigma, angle=angle),
+        lambda: ss.laws.InclinedSpring(preload=sigma, angle=angle),
+        lambda: ss.laws.Triaxial(confining_pressure=sigma, angle=abs(angle)),
+        lambda: ss.laws.SelfEnergising(preload=sigma, gain=rng.uniform(-2, 2)),
+        lambda: ss.laws.DilatingLayer(
             preload=sigma, ram_stiffness=1e11, dilatancy=sign * 10 ** rng.uniform(-9, -6), v_ref=V0
         ),
-        lambda: ss.Lift(preload=sigma, lift=sign * sigma * 10 ** rng.uniform(-3, 0) / V0 * a, v_ref=V0),
-        lambda: ss.SlopedGuide(preload=sigma, guide_stiffness=10 ** rng.uniform(8, 11), slope=rng.uniform(-0.5, 0.5)),
-        lambda: ss.Linear(steady_normal_stress=sigma, b0=rng.choice([0, 1e9, -1e7, 1e11]), b1=rng.choice([0, 1, -1])
+        lambda: ss.laws.Lift(preload=sigma, lift=sign * sigma * 10 ** rng.uniform(-3, 0) / V0 * a, v_ref=V0),
+        lambda: ss.laws.SlopedGuide(preload=sigma, guide_stiffness=10 ** rng.uniform(8, 11),
+        slope=rng.uniform(-0.5, 0.5)),
+        lambda: ss.laws.LinearNormalStress(steady_normal_stress=sigma, b0=rng.choice([0, 1e9, -1e7, 1e11]),
+        b1=rng.choice([0, 1, -1])
                           * a * sigma / V0 * rng.uniform(0, 2), b2=rng.uniform(-2, 2), b3=rng.choice([0, 1, -1]) * k),
     ][rng.integers(9)]()  # fmt: skip
     rest = {"mass": rng.choice([0.0, a * sigma * d_c / V0**2 * 10 ** rng.uniform(-6, 1.5)])}
     rest["damping"] = rng.choice([0.0, a * sigma / V0 * 10 ** rng.uniform(-4, 0.5)], p=[0.7, 0.3])
     rest["radiation_damping"] = rng.choice([0.0, a * sigma / V0 * 10 ** rng.uniform(-4, 0.5)], p=[0.6, 0.4])
-    drive = ss.Steady(V0)
+    drive = ss.machine.SteadyDrive(V0)
     kind = rng.integers(6)
     if kind == 0:
-        drive = ss.PD(V0, kp=k, kd=rest.pop("damping") + 1.0)
+        drive = ss.machine.PD(V0, kp=k, kd=rest.pop("damping") + 1.0)
     if kind == 1:
-        drive = ss.PID(V0, kp=k, ki=k * V0 / d_c * 10 ** rng.uniform(-3, 1), kd=rest.pop("damping") + 1.0)
+        drive = ss.machine.PID(V0, kp=k, ki=k * V0 / d_c * 10 ** rng.uniform(-3, 1), kd=rest.pop("damping") + 1.0)
     return ss.Slider(friction=friction, contact=contact, stiffness=k * rng.uniform(0.3, 2), drive=drive, **rest)
 
 
@@ -129,7 +133,7 @@ def false_sentences(rig):
         return found
     found += [*_stiffness(rig, verdict, text), *_edges(rig, verdict, str(verdict)), *_causes(rig, verdict, text)]
     if ("run-away (blow-up)" in text) != (
-        own in ("oscillation", "growth") and isinstance(rig.friction, ss.RateState)
+        own in ("oscillation", "growth") and isinstance(rig.friction, ss.laws.RateState)
         and not (rig.mass or rig.damping or rig.radiation_damping or rig.drive.derivative())
     ):  # fmt: skip
         found.append("run-away")

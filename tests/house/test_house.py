@@ -36,10 +36,10 @@ FOUNDED = {"velocity", "stiffness", "axial_stiffness", "mass", "damping", "radia
 
 def laws_and_their_fields():
     """Classes of every family, the words that rig files use for them, and the names of their parameters."""
-    families = (ss.FrictionLaw, ss.ContactLaw, ss.Evolution, ss.NormalMemory, ss.Drive)
+    families = (ss.laws.FrictionLaw, ss.laws.ContactLaw, ss.laws.Evolution, ss.laws.NormalMemory, ss.machine.Drive)
     laws = [law for family in families for law in family.registry.values()]
     laws = [law for law in laws if law.__module__.startswith("steadyslip.")]
-    fields = {item.name for law in (*laws, ss.State) for item in dataclasses.fields(law)} - {
+    fields = {item.name for law in (*laws, ss.laws.State) for item in dataclasses.fields(law)} - {
         "direction"
     }  # a method too
     roles = {item.name for family in families for item in dataclasses.fields(family)} - {"velocity"}

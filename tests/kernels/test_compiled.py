@@ -107,9 +107,9 @@ def test_measured_order(case):
     method, order, varying, changes, until, counts = ORDERS[case]
     a_rig = rig(contact=CONTACTS[1], friction=ONE_MEMORY[1], **changes)
     waves = [
-        ss.VelocityHarmonic(amplitude=1e-7, period=7.0),
-        ss.NormalStressHarmonic(amplitude=1e4, period=6.0, phase=0.5),
-        ss.DisturbanceRamp(at=0.0, by=3e3, duration=90.0),
+        ss.protocol.VelocityHarmonic(amplitude=1e-7, period=7.0),
+        ss.protocol.NormalStressHarmonic(amplitude=1e4, period=6.0, phase=0.5),
+        ss.protocol.DisturbanceRamp(at=0.0, by=3e3, duration=90.0),
     ]
     squares = np.zeros(2)
     for kick in (-2e-6, -1e-6, 1e-6, 2e-6):
@@ -236,9 +236,9 @@ BRANCHES = {
     "implicit massless": {"friction": ONE_MEMORY[4]},
     "explicit mass": {"mass": 1e9, "contact": CONTACTS[1]},
     "implicit mass": {"contact": CONTACTS[-1], "friction": ONE_MEMORY[1]},
-    "integral": {"drive": ss.PID(1e-6, kp=2e10, kd=1e9, ki=1e9), "stiffness": None, "mass": 1e9},
+    "integral": {"drive": ss.machine.PID(1e-6, kp=2e10, kd=1e9, ki=1e9), "stiffness": None, "mass": 1e9},
     "bristles": {"friction": ONE_MEMORY[5], "mass": 1e9, "radiation_damping": 0.0},
-    "imposed": {"contact": ss.Prescribed(preload=5e6, amplitude=1e5, period=0.9)},
+    "imposed": {"contact": ss.laws.Prescribed(preload=5e6, amplitude=1e5, period=0.9)},
 }
 
 
@@ -247,7 +247,7 @@ BRANCHES = {
 def test_machine_code_equals_the_text(branch):
     a_rig = rig(**({"stiffness": 2e10, "radiation_damping": 2e10} | BRANCHES[branch]))
     kick = {"x": 1e-10 if branch == "bristles" else 2e-7}
-    protocol = [ss.VelocityHarmonic(amplitude=1e-7, period=1.0), ss.NormalStressStep(at=0.1, by=1e4)]
+    protocol = [ss.protocol.VelocityHarmonic(amplitude=1e-7, period=1.0), ss.protocol.NormalStressStep(at=0.1, by=1e4)]
     jobs = prepare(a_rig, protocol, 0.3, {}, kick, Options())
     ends = []
     for is_plain in (False, True):

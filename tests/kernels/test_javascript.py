@@ -225,18 +225,20 @@ def test_every_module_of_the_driver_can_be_written():
 
 LUGRE = ONE_MEMORY[-1]
 MOVING = {
-    "massless": (rig(stiffness=9e9), ss.VelocityStep(at=1.0, to=2e-6), 60.0),
-    "stick-slip": (rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e4, stiffness=3e9),
-                   ss.VelocityStep(at=1.0, to=1.3e-6), 60.0),
-    "with mass": (rig(mass=1e3, stiffness=6e9), ss.VelocityStep(at=1.0, to=2e-6), 20.0),
-    "two segments": (rig(stiffness=9e9), [ss.VelocityStep(at=1.0, to=3e-6), ss.VelocityStep(at=20.0, to=1e-6)], 60.0),
-    "bristles": (rig(friction=LUGRE, stiffness=1e8, mass=1.0, drive=ss.Steady(1e-3)),
-                 ss.VelocityStep(at=0.1, to=2e-3), 1.0),
-    "controller": (rig(stiffness=None, drive=ss.PID(V0, kp=9e9, ki=1e8), mass=1e3),
-                   ss.VelocityStep(at=1.0, to=2e-6), 20.0),
-    "regularised": (rig(friction=ONE_MEMORY[2], contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9),
-                    ss.VelocityStep(at=1.0, to=2e-6), 40.0),
-    "solved": (rig(friction=ONE_MEMORY[3], stiffness=2e10), ss.VelocityStep(at=1.0, to=2e-6), 40.0),
+    "massless": (rig(stiffness=9e9), ss.protocol.VelocityStep(at=1.0, to=2e-6), 60.0),
+    "stick-slip": (rig(friction=rate_state(evolution=ss.laws.Aging()), radiation_damping=1e4, stiffness=3e9),
+                   ss.protocol.VelocityStep(at=1.0, to=1.3e-6), 60.0),
+    "with mass": (rig(mass=1e3, stiffness=6e9), ss.protocol.VelocityStep(at=1.0, to=2e-6), 20.0),
+    "two segments": (rig(stiffness=9e9), [ss.protocol.VelocityStep(at=1.0, to=3e-6),
+    ss.protocol.VelocityStep(at=20.0, to=1e-6)], 60.0),
+    "bristles": (rig(friction=LUGRE, stiffness=1e8, mass=1.0, drive=ss.machine.SteadyDrive(1e-3)),
+                 ss.protocol.VelocityStep(at=0.1, to=2e-3), 1.0),
+    "controller": (rig(stiffness=None, drive=ss.machine.PID(V0, kp=9e9, ki=1e8), mass=1e3),
+                   ss.protocol.VelocityStep(at=1.0, to=2e-6), 20.0),
+    "regularised": (rig(friction=ONE_MEMORY[2], contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5),
+    stiffness=9e9),
+                    ss.protocol.VelocityStep(at=1.0, to=2e-6), 40.0),
+    "solved": (rig(friction=ONE_MEMORY[3], stiffness=2e10), ss.protocol.VelocityStep(at=1.0, to=2e-6), 40.0),
 }  # fmt: skip
 
 

@@ -53,15 +53,15 @@ def test_kernels_follow_the_model(law, contact, mass):
     friction, plain, until, kick = LAWS[law], law == "lugre", 3.0, 0.3e-6
     if plain:
         until, kick = 0.3, 1e-10
-        if isinstance(contact, ss.Lift):
+        if isinstance(contact, ss.laws.Lift):
             pytest.skip("bristles ring at velocities at which this lift takes the contact off")
-    plain = plain and not isinstance(contact, ss.DilatingLayer)  # that one has ln v in it
+    plain = plain and not isinstance(contact, ss.laws.DilatingLayer)  # that one has ln v in it
     if law == "lugre" and not plain:
         pytest.skip("bristles ring through zero velocity, where this contact law ends")
     if law == "prakash-clifton" and contact.name == "linear" and not mass:
         pytest.skip("friction does not answer at once to a normal stress that feels acceleration: ill-posed, see below")
     a_rig = rig(friction=friction, contact=contact, mass=mass, radiation_damping=0.0 if law == "lugre" else 2e10)
-    got, outcome = interpreted(a_rig, ss.NormalStressStep(at=until / 3, by=1e5), until, {"x": kick}, 1e-9)
+    got, outcome = interpreted(a_rig, ss.protocol.NormalStressStep(at=until / 3, by=1e5), until, {"x": kick}, 1e-9)
     assert outcome.status[0] == 1
     method = "LSODA" if mass or law == "lugre" else "DOP853"  # for what may be stiff, and what is not
     x, v, *memory = Oracle(a_rig, plain=plain).run(until / 3, x=kick, method=method)
@@ -74,11 +74,17 @@ def test_kernels_follow_the_model(law, contact, mass):
 @pytest.mark.parametrize("exponent", [0.7, 3.0])
 def test_bristles_with_a_stribeck_exponent(exponent):
     """Another exponent than 2 takes a power of velocity instead of a square."""
-    friction = ss.LuGre(
+    friction = ss.laws.LuGre(
         mu_coulomb=0.1, mu_static=0.2, v_stribeck=1e-3, viscous=10.0, bristle_stiffness=1e5, bristle_damping=100.0,
         stribeck_exponent=exponent,
     )  # fmt: skip
-    a_rig = rig(friction=friction, contact=ss.Constant(preload=5e6), mass=1e3, stiffness=1e9, drive=ss.Steady(1e-4))
+    a_rig = rig(
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        mass=1e3,
+        stiffness=1e9,
+        drive=ss.machine.SteadyDrive(1e-4),
+    )
     got, _ = interpreted(a_rig, None, 0.01, {"v": 1.3e-4}, 1e-9)
     x, v, *memory = Oracle(a_rig, plain=True).run(0.01, v=1.3e-4, method="LSODA")
     assert got == pytest.approx([x, v, *memory], rel=1e-7)
@@ -90,7 +96,7 @@ def test_times_are_exact(seed):
     random = np.random.default_rng(seed)
     until = random.uniform(0.5, 5.0)
     breakpoints = np.sort(random.uniform(0, until, 6))
-    pieces = [ss.VelocityStep(at=t, to=1e-6 * (1 + i % 2)) for i, t in enumerate(breakpoints)]
+    pieces = [ss.protocol.VelocityStep(at=t, to=1e-6 * (1 + i % 2)) for i, t in enumerate(breakpoints)]
     jobs = prepare(rig(stiffness=2e10), ss.Protocol.of(pieces), until, {}, {}, Options(rtol=1e-4))
     machine = Runner(jobs.reduction, jobs.choice(1, True), plain=True)
     requested = np.sort(np.concatenate([[0.0, until], breakpoints, random.uniform(0, until, 5)]))
@@ -107,19 +113,19 @@ def test_times_are_exact(seed):
 
 INPUTS = {
     "ramp of velocity": (
-        ss.VelocityRamp(at=0.5, to=3e-6, duration=1.0),
+        ss.protocol.VelocityRamp(at=0.5, to=3e-6, duration=1.0),
         {"velocity": lambda t: 1e-6 + 2e-6 * np.clip(t - 0.5, 0, 1)},
     ),
     "wave of velocity": (
-        ss.VelocityHarmonic(amplitude=3e-7, period=0.7, phase=0.3),
+        ss.protocol.VelocityHarmonic(amplitude=3e-7, period=0.7, phase=0.3),
         {"velocity": lambda t: 1e-6 + 3e-7 * np.sin(2 * np.pi * t / 0.7 + 0.3)},
     ),
     "wave of normal stress": (
-        ss.NormalStressHarmonic(amplitude=1e5, period=0.5),
+        ss.protocol.NormalStressHarmonic(amplitude=1e5, period=0.5),
         {"pressure": lambda t: 1e5 * np.sin(2 * np.pi * t / 0.5)},
     ),
     "ramp of disturbance": (
-        ss.DisturbanceRamp(at=0.0, by=5e4, duration=3.0),
+        ss.protocol.DisturbanceRamp(at=0.0, by=5e4, duration=3.0),
         {"disturbance": lambda t: 5e4 * t / 3},
     ),
 }
@@ -132,9 +138,9 @@ CHANGES = [
     {"damping": 1e10, "mass": 1e9, "friction": LAWS["aging+ld"], "contact": CONTACTS[1]},
     {"friction": LAWS["nagata regularised"], "radiation_damping": 1e10},
     {"contact": CONTACTS[-1], "friction": LAWS["aging+ld"]},
-    {"drive": ss.PID(1e-6, kp=2e10, kd=1e9, ki=1e9), "stiffness": None},
-    {"contact": ss.Prescribed(preload=5e6, amplitude=1e5, period=0.9)},
-    {"contact": ss.Prescribed(preload=5e6, amplitude=1e5, period=0.9), "mass": 1e9},
+    {"drive": ss.machine.PID(1e-6, kp=2e10, kd=1e9, ki=1e9), "stiffness": None},
+    {"contact": ss.laws.Prescribed(preload=5e6, amplitude=1e5, period=0.9)},
+    {"contact": ss.laws.Prescribed(preload=5e6, amplitude=1e5, period=0.9), "mass": 1e9},
 ]
 
 

@@ -32,7 +32,9 @@ def smooth(own, v, theta):
 
 def test_two_blocks_without_mass_on_laws_that_go_through_rest_joined_by_a_dashpot():
     run = ss.simulate(
-        two_smooth(), [ss.VelocityStep(at=1.0, to=1.5), ss.DisturbanceStep(at=3.0, by=0.2, on="two")], **FINE
+        two_smooth(),
+        [ss.protocol.VelocityStep(at=1.0, to=1.5), ss.protocol.DisturbanceStep(at=3.0, by=0.2, on="two")],
+        **FINE,
     )
 
     def velocities(t, x, theta, near):
@@ -94,7 +96,7 @@ def compare_memory(run, kept):
 
 
 def test_frictions_that_change_their_own_normal_forces_at_two_contacts():
-    run = ss.simulate(wedges(one=1.0, two=2.0), ss.VelocityStep(at=1.0, to=1.3), **FINE)
+    run = ss.simulate(wedges(one=1.0, two=2.0), ss.protocol.VelocityStep(at=1.0, to=1.3), **FINE)
     assert len(slopes_of_motion(wedges(one=1.0, two=2.0))[2].unknowns) == 2
     near = [np.array([tau]) for tau in RESTING]
 
@@ -116,7 +118,9 @@ def test_frictions_that_change_their_own_normal_forces_at_two_contacts():
 def test_a_carriage_without_mass_on_two_such_guides():
     """Its velocity and both frictions are found together after each jump; before and between one of them is."""
     run = ss.simulate(
-        wedges(car=0.0), [ss.VelocityStep(at=1.0, to=1.3), ss.DisturbanceStep(at=4.0, by=-0.01, on="car")], **FINE
+        wedges(car=0.0),
+        [ss.protocol.VelocityStep(at=1.0, to=1.3), ss.protocol.DisturbanceStep(at=4.0, by=-0.01, on="car")],
+        **FINE,
     )
     reduction = slopes_of_motion(wedges(car=0.0))[2]
     assert (reduction.form, len(reduction.unknowns), len(reduction.restarts)) == ("eliminated", 1, 2)
@@ -193,7 +197,7 @@ def test_small_motion_has_the_eigenvalues_of_the_linear_verdict(made):
 
 def test_blocks_that_a_stiff_dashpot_ties_together_move_as_one():
     """Each solved for with the other as it is would take thousands of rounds."""
-    pulse = ss.DisturbancePulse(at=1.0, by=0.2, duration=3.0, on="two")
+    pulse = ss.protocol.DisturbancePulse(at=1.0, by=0.2, duration=3.0, on="two")
     apart = []
     for dashpot in (1e3, 1e4):
         run = ss.simulate(two_smooth(dashpot=dashpot), pulse, times=TIMES, until=8.0)
@@ -207,11 +211,11 @@ def test_a_lane_moves_as_a_run_alone():
     many = ss.simulate_many(
         two_smooth(),
         {"protocol.pieces.1.by": forces},
-        ss.DisturbanceStep(at=1.0, by=0.2, on="two"),
+        ss.protocol.DisturbanceStep(at=1.0, by=0.2, on="two"),
         times=TIMES,
         until=8.0,
     )
-    alone = ss.simulate(two_smooth(), ss.DisturbanceStep(at=1.0, by=0.3, on="two"), times=TIMES, until=8.0)
+    alone = ss.simulate(two_smooth(), ss.protocol.DisturbanceStep(at=1.0, by=0.3, on="two"), times=TIMES, until=8.0)
     assert many.samples["first.slip_rate"][2] == pytest.approx(alone["first.slip_rate"], rel=1e-12)
 
 
@@ -246,7 +250,7 @@ def test_machines_at_random_on_laws_that_go_through_rest(seed):
     contacts = {
         name: replace(one, friction=replace(one.friction, regularised=True)) for name, one in machine.contacts.items()
     }
-    light = {name: ss.SlidingBody() for name in machine.bodies} if seed % 2 else {}
+    light = {name: ss.machine.SlidingBody() for name in machine.bodies} if seed % 2 else {}
     machine = replace(machine, contacts=contacts, bodies={**machine.bodies, **light})
     jacobian, rates, _ = slopes_of_motion(machine)
     if not np.all(np.isfinite(rates)):

@@ -13,12 +13,12 @@ FAST = 1e30  # m/s, beyond all velocities: the law without cut-offs
 
 
 def law_with(**own):
-    return ss.RateState(**({"a": 0.006, "b": 0.010, "d_c": 8e-6, "mu_ref": 0.6, "v_ref": 1e-5} | own))
+    return ss.laws.RateState(**({"a": 0.006, "b": 0.010, "d_c": 8e-6, "mu_ref": 0.6, "v_ref": 1e-5} | own))
 
 
 def rig_of(law, **own):
-    drive = {"stiffness": 1e9, "drive": ss.Steady(1e-5)}
-    return ss.Slider(friction=law, contact=ss.Constant(preload=1e7), **(drive | own))
+    drive = {"stiffness": 1e9, "drive": ss.machine.SteadyDrive(1e-5)}
+    return ss.Slider(friction=law, contact=ss.laws.ConstantNormalStress(preload=1e7), **(drive | own))
 
 
 cutoffs = st.floats(1e-9, 1e-2)
@@ -31,8 +31,8 @@ cutoffs = st.floats(1e-9, 1e-2)
 )  # fmt: skip
 def test_small_perturbations(a, b, v, v_a, v_b, alpha, which):
     """f, S, r, f1 and μ of theory 12; α is its value far below the cut-off."""
-    memory = ss.LinkerDieterich(alpha=alpha)
-    law = ss.RateState(
+    memory = ss.laws.LinkerDieterich(alpha=alpha)
+    law = ss.laws.RateState(
         a=a, b=b, d_c=2e-6, mu_ref=0.7, v_ref=1e-6, evolution=which, normal_memory=memory,
         a_cutoff_velocity=v_a, b_cutoff_velocity=v_b,
     )  # fmt: skip
@@ -47,7 +47,7 @@ def test_small_perturbations(a, b, v, v_a, v_b, alpha, which):
 
 
 def test_critical_stiffness_of_the_theory():
-    law = law_with(evolution=ss.Aging(), b_cutoff_velocity=1e-4)
+    law = law_with(evolution=ss.laws.Aging(), b_cutoff_velocity=1e-4)
     assert ss.critical_stiffness(rig_of(law)) == pytest.approx(42.5e9 / 11, rel=1e-12)
     (edge,) = ss.boundary(rig_of(law, stiffness=1.0), "drive.velocity")
     assert (edge.value, edge.stable) == (pytest.approx(200e-6 / 3, rel=1e-6), "above")
@@ -55,9 +55,9 @@ def test_critical_stiffness_of_the_theory():
 
 @pytest.mark.parametrize("evolution", EVOLUTIONS, ids=lambda one: one.name)
 def test_cutoffs_beyond_all_velocities_are_none(evolution):
-    memory = ss.LinkerDieterich(alpha=0.3)
-    without = ss.RateState(**ROCK, **ONE, evolution=evolution, normal_memory=memory)
-    far = ss.RateState(
+    memory = ss.laws.LinkerDieterich(alpha=0.3)
+    without = ss.laws.RateState(**ROCK, **ONE, evolution=evolution, normal_memory=memory)
+    far = ss.laws.RateState(
         **ROCK, **ONE, evolution=evolution, normal_memory=memory, a_cutoff_velocity=FAST, b_cutoff_velocity=FAST
     )
     for v in (1e-12, 1e-6, 1.0):
@@ -70,11 +70,11 @@ def test_cutoffs_beyond_all_velocities_are_none(evolution):
 
 @pytest.mark.parametrize("evolution", EVOLUTIONS, ids=lambda one: one.name)
 def test_everything_is_finite_from_creep_to_slip(evolution):
-    memory = ss.LinkerDieterich(alpha=0.2)
+    memory = ss.laws.LinkerDieterich(alpha=0.2)
     law = law_with(a_cutoff_velocity=1e-2, b_cutoff_velocity=1e-4, normal_memory=memory, evolution=evolution)
     speeds = np.logspace(-30, 1, 63)
     assert np.all(np.isfinite(ss.growth_rate(rig_of(law), {"drive.velocity": speeds})))
-    steady = [ss.steady_state(rig_of(law, drive=ss.Steady(v))).shear_stress for v in speeds[::10]]
+    steady = [ss.steady_state(rig_of(law, drive=ss.machine.SteadyDrive(v))).shear_stress for v in speeds[::10]]
     assert np.all(np.isfinite(steady))
 
 
@@ -109,10 +109,10 @@ PEAKS = {  # mm/s at κ = .75, .78, .89 (theory 12), silent at 1.1
 @pytest.mark.campaign
 @pytest.mark.parametrize(("evolution", "v_b"), PEAKS, ids=str)
 def test_peak_velocities_of_slow_slip(evolution, v_b):
-    law = law_with(evolution={"slip": ss.Slip(), "aging": ss.Aging()}[evolution], b_cutoff_velocity=v_b)
+    law = law_with(evolution={"slip": ss.laws.Slip(), "aging": ss.laws.Aging()}[evolution], b_cutoff_velocity=v_b)
     rig = rig_of(law, mass=500)
     critical = 1e7 * (0.010 * v_b / (v_b + 1e-5) - 0.006) / 8e-6
-    kick = [ss.VelocityStep(at=0.1, to=1.05e-5), ss.VelocityStep(at=0.2, to=1e-5)]
+    kick = [ss.protocol.VelocityStep(at=0.1, to=1.05e-5), ss.protocol.VelocityStep(at=0.2, to=1e-5)]
     for kappa, peak in zip((0.75, 0.78, 0.89), PEAKS[evolution, v_b], strict=True):
         run = ss.simulate(rig.with_values({"stiffness": kappa * critical}), kick, until=1500)
         late = run["v"][run["t"] > 1000]
@@ -123,7 +123,7 @@ def test_peak_velocities_of_slow_slip(evolution, v_b):
 
 def test_a_law_that_fades_at_speed_does_not_run_away():
     """Without mass the direct effect outlasts evolution, unless it fades too."""
-    kick = ss.VelocityStep(at=1, to=1.2e-5)
+    kick = ss.protocol.VelocityStep(at=1, to=1.2e-5)
     bounded = ss.simulate(rig_of(law_with(b_cutoff_velocity=1e-4), stiffness=3e9), kick, until=60)
     assert bounded.status == "done"
     text = str(ss.analyze(rig_of(law_with(b_cutoff_velocity=1e-4))))
@@ -134,11 +134,11 @@ def test_a_law_that_fades_at_speed_does_not_run_away():
 def test_refusals():
     with pytest.raises(ss.ParameterError, match="a_cutoff_velocity: not defined for the regularised law"):
         law_with(regularised=True, a_cutoff_velocity=1e-3)
-    states = (ss.State(b=0.01, d_c=1e-5),)
+    states = (ss.laws.State(b=0.01, d_c=1e-5),)
     with pytest.raises(ss.ParameterError, match="b_cutoff_velocity: given beside states"):
         law_with(b=None, d_c=None, states=states, b_cutoff_velocity=1e-3)
     with pytest.raises(ss.ParameterError, match="b: got 0; "):
-        law_with(b=0.0, b_cutoff_velocity=1e-3, normal_memory=ss.LinkerDieterich(alpha=0.3))
+        law_with(b=0.0, b_cutoff_velocity=1e-3, normal_memory=ss.laws.LinkerDieterich(alpha=0.3))
     assert law_with(b=0.0, b_cutoff_velocity=1e-3).b == 0
 
 
@@ -150,7 +150,11 @@ def test_the_onset_of_creep_is_that_without_cutoffs(evolution):
     """What cut-offs add to the cubic coefficient goes to zero with v/v_b, in units of v/d_c."""
 
     def coefficient(v, **own):
-        return ss.hopf(rig_of(law_with(evolution=evolution, **own), drive=ss.Steady(v))).coefficient * 8e-6 / v
+        return (
+            ss.hopf(rig_of(law_with(evolution=evolution, **own), drive=ss.machine.SteadyDrive(v))).coefficient
+            * 8e-6
+            / v
+        )
 
     added = [(coefficient(v, **FADING) - coefficient(v)) * 1e-4 / v for v in (1e-30, 1e-20, 1e-12)]
     if abs(coefficient(1e-30)) < 1e-9:  # without cut-offs neither kind: digits are left to see that it is linear
@@ -163,9 +167,11 @@ def test_motion_of_creep_is_that_of_any_other_creep(mass):
     """Far below the cut-offs only the drive's own velocity counts; at speeds where both have faded runs are finite."""
     found = []
     for v in (1e-30, 1e-20, 10.0):
-        own = rig_of(law_with(evolution=ss.Aging(), **FADING), stiffness=5.5e9, mass=mass, drive=ss.Steady(v))
+        own = rig_of(
+            law_with(evolution=ss.laws.Aging(), **FADING), stiffness=5.5e9, mass=mass, drive=ss.machine.SteadyDrive(v)
+        )
         times = np.linspace(0, 100e-6 / v, 50)
-        run = ss.simulate(own, ss.VelocityStep(at=8e-6 / v, to=1.2 * v), until=times[-1], times=times)
+        run = ss.simulate(own, ss.protocol.VelocityStep(at=8e-6 / v, to=1.2 * v), until=times[-1], times=times)
         assert run.status == "done"
         found.append(run["v"] / v)
     assert np.all(np.isfinite(found))
@@ -191,9 +197,9 @@ def test_maps_are_finite_from_creep_to_slip(tmp_path):
 def test_kicks_of_creep_that_just_run_away():
     """Cut-offs end slip that runs away: the smallest kick that does reaches them from fifteen decades below."""
     v = 1e-20
-    own = rig_of(law_with(evolution=ss.Aging(), **FADING), stiffness=6e9, drive=ss.Steady(v))
+    own = rig_of(law_with(evolution=ss.laws.Aging(), **FADING), stiffness=6e9, drive=ss.machine.SteadyDrive(v))
     size = ss.threshold(own, "velocity").size
-    steps = [ss.VelocityStep(at=0.0, to=v * np.exp(share * size)) for share in (0.99, 1.01)]
+    steps = [ss.protocol.VelocityStep(at=0.0, to=v * np.exp(share * size)) for share in (0.99, 1.01)]
     ends = [ss.simulate(own, step, until=200 * 8e-6 / step.to).status for step in steps]
     assert ends == ["done", "blow-up"]
 
@@ -202,7 +208,7 @@ def test_kicks_of_creep_that_just_run_away():
 def test_cycles_of_creep_are_those_of_any_other_creep():
     periods = []
     for v in (1e-30, 1e-20):
-        rig = rig_of(law_with(evolution=ss.Slip(), **FADING), stiffness=3e9, drive=ss.Steady(v))
+        rig = rig_of(law_with(evolution=ss.laws.Slip(), **FADING), stiffness=3e9, drive=ss.machine.SteadyDrive(v))
         branch = ss.cycles(rig, "stiffness", between=(2e9, 6e9))
         assert np.all(np.isfinite(branch["period"]))
         periods.append(branch["period"][:20] * v)
@@ -211,11 +217,13 @@ def test_cycles_of_creep_are_those_of_any_other_creep():
 
 @pytest.mark.parametrize("mass", [0.0, 500.0])
 def test_pages_from_creep_to_slip_are_those_of_python(mass):
-    kept = {"friction": law_with(evolution=ss.PRZ(), **FADING), "mass": mass}
-    explored = Explored(rig_of(law_with(evolution=ss.PRZ(), **FADING), mass=mass))
+    kept = {"friction": law_with(evolution=ss.laws.PRZ(), **FADING), "mass": mass}
+    explored = Explored(rig_of(law_with(evolution=ss.laws.PRZ(), **FADING), mass=mass))
     for v in (1e-30, 1e-12, 1e-5, 1e-3, 10.0):
         for k in (1e9, 1e10):
-            own = ss.Slider(contact=ss.Constant(preload=1e7), stiffness=k, drive=ss.Steady(v), **kept)
+            own = ss.Slider(
+                contact=ss.laws.ConstantNormalStress(preload=1e7), stiffness=k, drive=ss.machine.SteadyDrive(v), **kept
+            )
             apart = compared(explored, own)
             assert apart.verdicts[0] == apart.verdicts[1]
             assert max(apart.critical, apart.ends, apart.eigenvalues) < 1e-12
@@ -228,7 +236,8 @@ def test_a_fit_tells_both_cutoffs(faster):
     truth = law_with(v_ref=1e-6 * faster, d_c=1e-5, **cutoffs)
     rig = rig_of(truth, stiffness=2e10).with_values({"drive.velocity": 1e-6 * faster})
     steps = [
-        ss.VelocityStep(at=at / faster, to=to * faster) for at, to in ((20, 1e-5), (40, 1e-4), (44, 1e-3), (44.5, 3e-3))
+        ss.protocol.VelocityStep(at=at / faster, to=to * faster)
+        for at, to in ((20, 1e-5), (40, 1e-4), (44, 1e-3), (44.5, 3e-3))
     ]
     times = np.concatenate([np.linspace(0, 40, 400), 40 + np.linspace(0.01, 4, 400), 44 + np.linspace(0.001, 0.7, 400)])
     times = times / faster

@@ -19,33 +19,33 @@ def test_contract(law, check):
 @pytest.mark.parametrize(
     ("arguments", "name", "words"),
     [
-        (TWO | {"evolution": ss.Nagata(c_nagata=1.0)}, "evolution", "nagata is defined for one state"),
+        (TWO | {"evolution": ss.laws.Nagata(c_nagata=1.0)}, "evolution", "nagata is defined for one state"),
         (
-            ONE | {"evolution": ss.Nagata(c_nagata=1.0), "normal_memory": ss.PrakashClifton()},
+            ONE | {"evolution": ss.laws.Nagata(c_nagata=1.0), "normal_memory": ss.laws.PrakashClifton()},
             "normal_memory",
             "use none or linker-dieterich",
         ),
-        ({"b": 0.0, "d_c": 1e-6, "evolution": ss.Nagata(c_nagata=1.0)}, "b", "use aging instead"),
+        ({"b": 0.0, "d_c": 1e-6, "evolution": ss.laws.Nagata(c_nagata=1.0)}, "b", "use aging instead"),
         (TWO | {"b": 0.01}, "b", "given beside states"),
         (TWO | {"d_c": 1e-6}, "d_c", "given beside states"),
         ({"b": 0.016}, "d_c", "missing"),
         ({"d_c": 1e-6}, "b", "missing"),
-        (TWO | {"normal_memory": ss.PrakashClifton()}, "normal_memory.slip_distance", "no default with several"),
-        (ONE | {"normal_memory": ss.LinkerDieterich()}, "normal_memory.alpha", "missing"),
+        (TWO | {"normal_memory": ss.laws.PrakashClifton()}, "normal_memory.slip_distance", "no default with several"),
+        (ONE | {"normal_memory": ss.laws.LinkerDieterich()}, "normal_memory.alpha", "missing"),
         (OWN_ALPHA, "states", "alpha needs normal_memory linker-dieterich"),
-        (OWN_ALPHA | {"normal_memory": ss.LinkerDieterich(alpha=0.3)}, "normal_memory.alpha", "their sum is α"),
+        (OWN_ALPHA | {"normal_memory": ss.laws.LinkerDieterich(alpha=0.3)}, "normal_memory.alpha", "their sum is α"),
         (
             {
-                "states": [ss.State(b=0.01, d_c=1e-6, alpha=0.1), ss.State(b=0.01, d_c=1e-5)],
-                "normal_memory": ss.LinkerDieterich(),
+                "states": [ss.laws.State(b=0.01, d_c=1e-6, alpha=0.1), ss.laws.State(b=0.01, d_c=1e-5)],
+                "normal_memory": ss.laws.LinkerDieterich(),
             },
             "states",
             "for all or none",
         ),
         (
             {
-                "states": [ss.State(b=0.01, d_c=1e-6), ss.State(b=-0.01, d_c=1e-5)],
-                "normal_memory": ss.LinkerDieterich(alpha=0.3),
+                "states": [ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=-0.01, d_c=1e-5)],
+                "normal_memory": ss.laws.LinkerDieterich(alpha=0.3),
             },
             "states",
             "give each state its own alpha",
@@ -60,12 +60,12 @@ def test_contract(law, check):
 )
 def test_refused(arguments, name, words):
     with pytest.raises(ss.ParameterError) as caught:
-        ss.RateState(**(ROCK | arguments))
+        ss.laws.RateState(**(ROCK | arguments))
     assert [p.name for p in caught.value.problems] == [name]
     assert words in str(caught.value)
 
 
 def test_all_problems_of_a_law_come_at_once():
     with pytest.raises(ss.ParameterError) as caught:
-        ss.RateState(a=-1, b=0.016, d_c=0, mu_ref=0.7, v_ref="1 Pa")
+        ss.laws.RateState(a=-1, b=0.016, d_c=0, mu_ref=0.7, v_ref="1 Pa")
     assert [p.name for p in caught.value.problems] == ["a", "d_c", "v_ref"]

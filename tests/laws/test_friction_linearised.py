@@ -21,8 +21,8 @@ from friction_laws import (
 @modest
 @given(a=small, b=st.floats(-0.02, 0.03), v=velocities, alpha=st.floats(0, 0.6), which=st.sampled_from(EVOLUTIONS[:3]))
 def test_one_state_laws_share_one_linearisation(a, b, v, alpha, which):
-    memory = ss.LinkerDieterich(alpha=alpha)
-    law = ss.RateState(a=a, b=b, d_c=2e-6, mu_ref=0.7, v_ref=1e-6, evolution=which, normal_memory=memory)
+    memory = ss.laws.LinkerDieterich(alpha=alpha)
+    law = ss.laws.RateState(a=a, b=b, d_c=2e-6, mu_ref=0.7, v_ref=1e-6, evolution=which, normal_memory=memory)
     sigma, mu = 3e6, 0.7 + (a - b) * np.log(v / 1e-6)
     expected = [a * sigma / v, -(b - a) * sigma / v, v / 2e-6, mu - alpha, mu]
     size = [sigma / v * (a + abs(b)), sigma / v * (a + abs(b)), v / 2e-6, 1, 1]
@@ -33,8 +33,8 @@ def test_one_state_laws_share_one_linearisation(a, b, v, alpha, which):
 @given(mu=st.floats(0.005, 0.1), b=small, v=velocities, alpha=st.floats(0, 0.6), which=st.sampled_from(EVOLUTIONS[:3]))
 def test_regularised_law(mu, b, v, alpha, which):
     """With w = tanh(μss/a); friction as low as a here, so that w is far from 1."""
-    a, sigma, memory = 0.02, 3e6, ss.LinkerDieterich(alpha=alpha)
-    law = ss.RateState(
+    a, sigma, memory = 0.02, 3e6, ss.laws.LinkerDieterich(alpha=alpha)
+    law = ss.laws.RateState(
         a=a, b=b, d_c=2e-6, mu_ref=mu, v_ref=1e-6, evolution=which, normal_memory=memory, regularised=True
     )
     steady = float(law.steady_strength(v, sigma)) / sigma
@@ -48,14 +48,14 @@ def test_regularised_law(mu, b, v, alpha, which):
 @given(c=st.floats(0, 5), v=velocities, alpha=st.floats(0, 0.6), regularised=st.booleans(), low=st.booleans())
 def test_nagata_law(c, v, alpha, regularised, low):
     a, b, sigma, mu_ref = 0.012, 0.017, 3e6, 0.02 if low and regularised else 0.7
-    law = ss.RateState(
+    law = ss.laws.RateState(
         a=a,
         b=b,
         d_c=2e-6,
         mu_ref=mu_ref,
         v_ref=1e-6,
-        evolution=ss.Nagata(c_nagata=c),
-        normal_memory=ss.LinkerDieterich(alpha=alpha),
+        evolution=ss.laws.Nagata(c_nagata=c),
+        normal_memory=ss.laws.LinkerDieterich(alpha=alpha),
         regularised=regularised,
     )
     mu = float(law.steady_strength(v, sigma)) / sigma
@@ -77,7 +77,7 @@ def test_nagata_law(c, v, alpha, regularised, low):
 def test_lugre_closed_forms(v, sigma0, sigma1, viscous, static):
     """Theory 4: r = σ0 v0/g, f = σ2 + σ1 v0 g'/g, S = σ2 + g', μ = g + σ2 v0, f1 = μ; per unit normal stress."""
     sigma, v_s = 3e6, 1e-5
-    law = ss.LuGre(
+    law = ss.laws.LuGre(
         mu_coulomb=0.3,
         mu_static=static,
         v_stribeck=v_s,
@@ -98,7 +98,7 @@ def test_lugre_closed_forms(v, sigma0, sigma1, viscous, static):
 
 def test_lugre_weakening_at_once():
     """f < 0: without mass no stiffness is stable; with mass those below rS(mr + f)/(−f), where S > 0."""
-    falling = ss.LuGre(
+    falling = ss.laws.LuGre(
         mu_coulomb=0.3,
         mu_static=0.5,
         v_stribeck=1e-3,
@@ -121,15 +121,15 @@ def test_lugre_weakening_at_once():
 @pytest.mark.parametrize("evolution", EVOLUTIONS[:3])
 def test_prakash_clifton_characteristic_equation(share, evolution):
     """(ms² + k)(s + r)(s + r_σ) + s(fs + rS)(s + r_σ) + μ(gs + r_σ)(s + r)B(s) = 0 (theory 2)."""
-    law = ss.RateState(
-        **ROCK, **ONE, evolution=evolution, normal_memory=ss.PrakashClifton(direct_share=share, slip_distance=3e-6)
+    law = ss.laws.RateState(
+        **ROCK, **ONE, evolution=evolution, normal_memory=ss.laws.PrakashClifton(direct_share=share, slip_distance=3e-6)
     )
     v, sigma, m, k, c, eta = 2e-6, 5e6, 1e10, 7e9, 2e9, 3e9
     b0, b1, b2, b3 = 4e9, -1e10, 0.3, 2e9
     rig = rig_with(
         law,
         v,
-        contact=ss.Linear(steady_normal_stress=sigma, b0=b0, b1=b1, b2=b2, b3=b3),
+        contact=ss.laws.LinearNormalStress(steady_normal_stress=sigma, b0=b0, b1=b1, b2=b2, b3=b3),
         stiffness=k,
         mass=m,
         damping=c,
@@ -147,8 +147,8 @@ def test_prakash_clifton_characteristic_equation(share, evolution):
 
 
 def test_prakash_clifton_distance_is_d_c_unless_given():
-    law = ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton())
-    same = ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton(slip_distance=ONE["d_c"]))
-    angled = ss.InclinedSpring(preload=5e6, angle=0.5)
+    law = ss.laws.RateState(**ROCK, **ONE, normal_memory=ss.laws.PrakashClifton())
+    same = ss.laws.RateState(**ROCK, **ONE, normal_memory=ss.laws.PrakashClifton(slip_distance=ONE["d_c"]))
+    angled = ss.laws.InclinedSpring(preload=5e6, angle=0.5)
     found, expected = (polynomial(rig_with(one, contact=angled)) for one in (law, same))
     np.testing.assert_allclose(found, expected, rtol=1e-13)

@@ -17,9 +17,9 @@ from steadyslip.testing.symbolic import symbolic_law
 @given(ratio=st.floats(0.2, 5), alpha=st.floats(0.01, 0.6), which=st.sampled_from(EVOLUTIONS), two=st.booleans())
 def test_sudden_change_of_normal_stress_moves_theta(ratio, alpha, which, two):
     """By −(α/b) ln(σ2/σ1), at fixed memory variables; with Nagata's coupling by 1/(1 + c_N) of it at fixed v."""
-    nagata = isinstance(which, ss.Nagata)
+    nagata = isinstance(which, ss.laws.Nagata)
     states = TWO if two and not nagata else ONE
-    law = ss.RateState(**ROCK, **states, evolution=which, normal_memory=ss.LinkerDieterich(alpha=alpha))
+    law = ss.laws.RateState(**ROCK, **states, evolution=which, normal_memory=ss.laws.LinkerDieterich(alpha=alpha))
     v, before = 3e-6, 4e6
     after = before * ratio
     memory = tuple(float(y) for y in law.steady_memory(v, before))
@@ -31,7 +31,7 @@ def test_sudden_change_of_normal_stress_moves_theta(ratio, alpha, which, two):
         thetas.append([float(value) for name, (value, _) in seen.items() if name.startswith("Theta")])
         times = [float(value) for name, (value, _) in seen.items() if name.startswith("theta")]
         slip = [1e-6, 2e-5][: len(times)]
-        factor = 2 if isinstance(which, ss.PRZ) else 1
+        factor = 2 if isinstance(which, ss.laws.PRZ) else 1
         np.testing.assert_allclose(np.log(np.divide(times, slip) * 1e-6 / factor), thetas[-1], atol=1e-11)
     total = sum(s.b for s in TWO["states"]) if states is TWO else ONE["b"]
     share = 1 + which.c_nagata if nagata else 1.0
@@ -45,7 +45,9 @@ def test_nagata_in_its_own_words():
     v, sigma = 2e-6 * (1 + 0.3 * sp.sin(t)), 4e6 * (1 + 0.2 * sp.cos(2 * t))
     psi = sp.Function("psi")(t)
     alpha, c, b, d_c = 0.3, 2.0, ONE["b"], ONE["d_c"]
-    law = ss.RateState(**ROCK, **ONE, evolution=ss.Nagata(c_nagata=c), normal_memory=ss.LinkerDieterich(alpha=alpha))
+    law = ss.laws.RateState(
+        **ROCK, **ONE, evolution=ss.laws.Nagata(c_nagata=c), normal_memory=ss.laws.LinkerDieterich(alpha=alpha)
+    )
     unknown = sp.Symbol("tau")
     (tau,) = sp.solve(law.strength(v, sigma, (psi,), unknown) - unknown, unknown)
     theta = law.observables(v, sigma, (psi,), tau)["theta"][0]
@@ -63,7 +65,7 @@ def test_linker_dieterich_in_its_own_words(evolution):
     t = sp.Symbol("t", real=True)
     v, sigma = 2e-6 * (1 + 0.3 * sp.sin(t)), 4e6 * (1 + 0.2 * sp.cos(2 * t))
     psi = sp.Function("psi")(t)
-    law = ss.RateState(**ROCK, **ONE, evolution=evolution, normal_memory=ss.LinkerDieterich(alpha=0.3))
+    law = ss.laws.RateState(**ROCK, **ONE, evolution=evolution, normal_memory=ss.laws.LinkerDieterich(alpha=0.3))
     theta = law.observables(v, sigma, (psi,), sp.nan)["Theta"][0]
     (rate,) = law.rates(v, sigma, (psi,), sp.nan)
     constant = evolution.rate(v, theta, ONE["d_c"], ROCK["v_ref"])
@@ -74,9 +76,9 @@ def test_linker_dieterich_in_its_own_words(evolution):
 @pytest.mark.parametrize(
     ("evolution", "in_seconds"),
     [
-        (ss.Aging(), lambda v, theta, d_c: 1 - v * theta / d_c),
-        (ss.PRZ(), lambda v, theta, d_c: 1 - (v * theta / (2 * d_c)) ** 2),
-        (ss.Slip(), lambda v, theta, d_c: -v * theta / d_c * np.log(v * theta / d_c)),
+        (ss.laws.Aging(), lambda v, theta, d_c: 1 - v * theta / d_c),
+        (ss.laws.PRZ(), lambda v, theta, d_c: 1 - (v * theta / (2 * d_c)) ** 2),
+        (ss.laws.Slip(), lambda v, theta, d_c: -v * theta / d_c * np.log(v * theta / d_c)),
     ],
 )
 def test_evolution_in_seconds(evolution, in_seconds):
@@ -104,7 +106,7 @@ def test_asinh_exp_differentiates():
 
 
 def test_regularised_law_is_odd_in_velocity():
-    law = ss.RateState(**ROCK, **ONE, regularised=True)
+    law = ss.laws.RateState(**ROCK, **ONE, regularised=True)
     forward, back = (float(law.strength(v, 5e6, (0.3,), 0)) for v in (2e-6, -2e-6))
     assert forward == -back
     assert float(law.strength(0.0, 5e6, (0.3,), 0)) == 0
@@ -113,7 +115,7 @@ def test_regularised_law_is_odd_in_velocity():
 @pytest.mark.parametrize("evolution", EVOLUTIONS)
 def test_regularised_memory_evolves_alike_in_reverse(evolution):
     """State rates use |v| (theory 2)."""
-    law = ss.RateState(**ROCK, **ONE, evolution=evolution, regularised=True)
+    law = ss.laws.RateState(**ROCK, **ONE, evolution=evolution, regularised=True)
     memory = tuple(float(y) + 0.01 for y in law.steady_memory(1e-6, 5e6))
     forward, back = (float(law.rates(v, 5e6, memory, tau)[0]) for v, tau in ((2e-6, 3e6), (-2e-6, 3e6)))
     assert forward == back != 0
@@ -136,7 +138,7 @@ def curve(v, exponent):
 @pytest.mark.parametrize("exponent", [None, 0.5, 1.0, 1.7, 2.0, 4.0])
 def test_stribeck_exponent(exponent):
     """Strength and its slope are those of the curve; the exponent is 2 unless given."""
-    law = ss.CoulombStribeck(**BRISTLE, stribeck_exponent=exponent)
+    law = ss.laws.CoulombStribeck(**BRISTLE, stribeck_exponent=exponent)
     v = np.geomspace(1e-9, 1e-3, 60)
     expected = curve(v, exponent or 2.0) + 0.1 * v
     found = np.array([float(law.strength(one, 1.0, (), 0)) for one in v])
@@ -148,8 +150,14 @@ def test_stribeck_exponent(exponent):
 def test_stribeck_exponent_can_flip_a_verdict(exponent, stable):
     """With mass and without memory the rig is stable where friction rises: m s² + σ μ'(v) s + k = 0."""
     v, sigma = 0.5e-6, 5e6
-    law = ss.CoulombStribeck(**(BRISTLE | {"viscous": 2.6e4}), stribeck_exponent=exponent)
-    a_rig = ss.Slider(friction=law, contact=ss.Constant(preload=sigma), mass=1e6, stiffness=1e10, drive=ss.Steady(v))
+    law = ss.laws.CoulombStribeck(**(BRISTLE | {"viscous": 2.6e4}), stribeck_exponent=exponent)
+    a_rig = ss.Slider(
+        friction=law,
+        contact=ss.laws.ConstantNormalStress(preload=sigma),
+        mass=1e6,
+        stiffness=1e10,
+        drive=ss.machine.SteadyDrive(v),
+    )
     u = (v / 2e-6) ** exponent
     slope = -0.15 * exponent / v * u * np.exp(-u) + 2.6e4
     roots = np.roots([1e6, sigma * slope, 1e10])

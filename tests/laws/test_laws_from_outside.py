@@ -17,14 +17,14 @@ from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.experiments.answers.laws import with_law
 from steadyslip.experiments.spec import spec_from_text
 from steadyslip.linear.state_space import jacobian
-from steadyslip.model import operating_point
+from steadyslip.model.point import operating_point
 from steadyslip.nonlinear.onset.hopf import onset_map
 
-FAMILIES = (ss.FrictionLaw, ss.ContactLaw, ss.Drive, ss.Evolution, ss.NormalMemory)
+FAMILIES = (ss.laws.FrictionLaw, ss.laws.ContactLaw, ss.machine.Drive, ss.laws.Evolution, ss.laws.NormalMemory)
 BEFORE = [dict(family.registry) for family in FAMILIES]
 
 
-class Halfway(ss.Evolution, name="halfway"):
+class Halfway(ss.laws.Evolution, name="halfway"):
     """Between slip and aging: the mean of their rates."""
 
     def rate(self, v, state, d_c, v_ref):
@@ -32,10 +32,10 @@ class Halfway(ss.Evolution, name="halfway"):
         return (slip + v_ref / d_c * sp.exp(-state) - v / d_c) / 2
 
 
-class TimeLag(ss.NormalMemory, name="time-lag"):
+class TimeLag(ss.laws.NormalMemory, name="time-lag"):
     """Friction feels a stress that follows σ in time, however far the block slides."""
 
-    lag: float = ss.parameter("s", positive, "time constant of the lag", standing=5.0)
+    lag: float = ss.laws.parameter("s", positive, "time constant of the lag", standing=5.0)
 
     def memory(self):
         return ("sigma_l",)
@@ -50,23 +50,27 @@ class TimeLag(ss.NormalMemory, name="time-lag"):
         return (sigma,)
 
 
-class Saturating(ss.NormalMemory, name="saturating"):
+class Saturating(ss.laws.NormalMemory, name="saturating"):
     """The state answers to the logarithm of normal stress, less so below some stress."""
 
-    gamma: float = ss.parameter("1", nonnegative, "evolutionary share at high stress", kind="stress share", size=0.2)
-    knee: float = ss.parameter("Pa", positive, "stress below which it fades", default=1e6)
+    gamma: float = ss.laws.parameter(
+        "1", nonnegative, "evolutionary share at high stress", kind="stress share", size=0.2
+    )
+    knee: float = ss.laws.parameter("Pa", positive, "stress below which it fades", default=1e6)
 
     def offset(self, sigma):
         return self.gamma * sp.log(1 + sigma / self.knee)
 
 
-class Plain(ss.FrictionLaw, name="plain"):
+class Plain(ss.laws.FrictionLaw, name="plain"):
     """The slip law with names of its own, and without a reference rate."""
 
-    direct: float = ss.parameter("1", positive, "direct effect", kind="direct effect", standing=0.01)
-    fall: float = ss.parameter("1", real, "evolution effect", kind="evolution effect", size=0.01, standing=0.01)
-    run_in: float = ss.parameter("m", positive, "slip distance", kind="slip distance", standing=1e-5)
-    level: float = ss.parameter("1", positive, "friction at 1 µm/s", kind="friction level", size=0.01, standing=0.6)
+    direct: float = ss.laws.parameter("1", positive, "direct effect", kind="direct effect", standing=0.01)
+    fall: float = ss.laws.parameter("1", real, "evolution effect", kind="evolution effect", size=0.01, standing=0.01)
+    run_in: float = ss.laws.parameter("m", positive, "slip distance", kind="slip distance", standing=1e-5)
+    level: float = ss.laws.parameter(
+        "1", positive, "friction at 1 µm/s", kind="friction level", size=0.01, standing=0.6
+    )
 
     def memory(self):
         return ("age",)
@@ -81,11 +85,11 @@ class Plain(ss.FrictionLaw, name="plain"):
         return (-sp.log(v / 1e-6),)
 
 
-class Belt(ss.ContactLaw, name="belt"):
+class Belt(ss.laws.ContactLaw, name="belt"):
     """A belt round a drum: normal stress rises in proportion to the pull."""
 
-    tension: float = ss.parameter("Pa", positive, "normal stress without pull", kind="normal stress")
-    wrap: float = ss.parameter("1", nonnegative, "rise of normal stress with the pull")
+    tension: float = ss.laws.parameter("Pa", positive, "normal stress without pull", kind="normal stress")
+    wrap: float = ss.laws.parameter("1", nonnegative, "rise of normal stress with the pull")
 
     def load(self):
         return self.tension
@@ -94,12 +98,12 @@ class Belt(ss.ContactLaw, name="belt"):
         return self.wrap * motion.spring
 
 
-class Geared(ss.Drive, name="geared", kw_only=False):
+class Geared(ss.machine.Drive, name="geared", kw_only=False):
     """A position controller behind a gear: the gain at the slide is that of the motor times the ratio squared."""
 
-    motor_gain: float = ss.parameter("Pa/m", nonnegative, "gain at the motor", default=0.0, structural=True,
+    motor_gain: float = ss.laws.parameter("Pa/m", nonnegative, "gain at the motor", default=0.0, structural=True,
                                      kind="stiffness")  # fmt: skip
-    ratio: float = ss.parameter("1", positive, "of the gear", default=2.0)
+    ratio: float = ss.laws.parameter("1", positive, "of the gear", default=2.0)
 
     def proportional(self):
         return self.motor_gain * self.ratio**2
@@ -205,7 +209,7 @@ def _edge_in_k(rig):
     return edge.value * per - (0.0 if rig.stiffness is not None else float(rig.drive.proportional()))
 
 
-STEP = ss.VelocityStep(at=5.0, to=1.5e-6)
+STEP = ss.protocol.VelocityStep(at=5.0, to=1.5e-6)
 
 
 @CASES

@@ -13,13 +13,13 @@ A, B, F0 = 0.01, 0.015, 0.6
 
 def layer(k=0.005, suction=0.003 / F0, drainage=1.0, mass=0.0, **further):
     """A block on a wet layer; d_c = v0 = σ' = 1, so that suction is E, drainage χ and k κ."""
-    friction = ss.RateState(a=A, b=B, d_c=1.0, mu_ref=F0, v_ref=1.0)
-    contact = ss.PoreFluid(preload=1.0, suction=suction, drainage=drainage, slip_distance=1.0, v_ref=0.3)
+    friction = ss.laws.RateState(a=A, b=B, d_c=1.0, mu_ref=F0, v_ref=1.0)
+    contact = ss.laws.PoreFluid(preload=1.0, suction=suction, drainage=drainage, slip_distance=1.0, v_ref=0.3)
     return ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=mass)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k)},
-        contacts={"layer": ss.Surface(body="block", friction=friction, contact=contact, **further)},
-        drive=ss.Pull(velocity=1.0),
+        bodies={"block": ss.machine.SlidingBody(mass=mass)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=k)},
+        contacts={"layer": ss.machine.Surface(body="block", friction=friction, contact=contact, **further)},
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -86,11 +86,11 @@ def test_wet_layers_in_a_machine_of_several_bodies():
     one = layer(k=0.005).with_values({"contacts.layer.contact.slip_distance": 0.7})
     contacts = {"left": one.contacts["layer"], "right": replace(one.contacts["layer"], body="other")}
     both = ss.Machine(
-        bodies={"block": ss.SlidingBody(), "other": ss.SlidingBody()},
+        bodies={"block": ss.machine.SlidingBody(), "other": ss.machine.SlidingBody()},
         links={
-            "spring": ss.Spring(between=("drive", "block"), stiffness=0.005),
-            "second": ss.Spring(between=("drive", "other"), stiffness=0.005),
-            "coupling": ss.Spring(between=("block", "other"), stiffness=0.02),
+            "spring": ss.machine.Spring(between=("drive", "block"), stiffness=0.005),
+            "second": ss.machine.Spring(between=("drive", "other"), stiffness=0.005),
+            "coupling": ss.machine.Spring(between=("block", "other"), stiffness=0.02),
         },
         contacts=contacts,
         drive=one.drive,

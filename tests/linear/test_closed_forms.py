@@ -19,7 +19,7 @@ from steadyslip.model.point import operating_point
 
 
 @pytest.mark.parametrize("mass", [0.0, 1e9, 1e12])
-@pytest.mark.parametrize("evolution", [ss.Slip(), ss.Aging(), ss.PRZ()])
+@pytest.mark.parametrize("evolution", [ss.laws.Slip(), ss.laws.Aging(), ss.laws.PRZ()])
 def test_constant_normal_stress(mass, evolution):
     r = rig(friction=rate_state(evolution=evolution), mass=mass)
     expected = SIGMA * (B - A) / D_C * (1 + mass * V0**2 / (A * SIGMA * D_C))
@@ -47,8 +47,8 @@ BETA = {-45: 0.189964754254, 0: 0.321633760451, 45: 0.392765798889}
 
 @pytest.mark.parametrize("angle", KAPPA)
 def test_paper_numbers(angle):
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
-    a = ss.analyze(rig(friction=friction, contact=ss.InclinedSpring(preload=5e6, angle=f"{angle} deg")))
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56))
+    a = ss.analyze(rig(friction=friction, contact=ss.laws.InclinedSpring(preload=5e6, angle=f"{angle} deg")))
     assert a.critical_stiffness * D_C / a.steady.normal_stress == pytest.approx(KAPPA[angle], rel=1e-11)
     if angle in BETA:
         assert a.critical_angular_frequency * D_C / V0 == pytest.approx(BETA[angle], rel=1e-11)
@@ -56,9 +56,9 @@ def test_paper_numbers(angle):
 
 def test_masses_of_the_paper():
     """m*_cr1 = .003625; m*_cr2 at 15° and 45°, where the last stabilising stiffness goes to infinity."""
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56))
     for angle, expected in ((15, 0.1002584584), (45, 0.02951785714)):
-        r = rig(friction=friction, contact=ss.InclinedSpring(steady_normal_stress=SIGMA, angle=f"{angle} deg"))
+        r = rig(friction=friction, contact=ss.laws.InclinedSpring(steady_normal_stress=SIGMA, angle=f"{angle} deg"))
         size = SIGMA * D_C / V0**2
         k = ss.critical_stiffness(r, {"mass": expected * size * np.array([1 - 1e-6, 1 + 1e-6])})
         assert k[0] > 1e3 * ss.critical_stiffness(r)
@@ -72,8 +72,8 @@ def test_masses_of_the_paper():
 def test_two_states():
     """Slip law with β = (1, .84), ρ = .048: κ_cr = .08027556564916812."""
     a = 0.01
-    states = [ss.State(b=a, d_c=0.048e-5), ss.State(b=0.84 * a, d_c=1e-5)]
-    friction = ss.RateState(a=a, states=states, mu_ref=0.6, v_ref=V0)
+    states = [ss.laws.State(b=a, d_c=0.048e-5), ss.laws.State(b=0.84 * a, d_c=1e-5)]
+    friction = ss.laws.RateState(a=a, states=states, mu_ref=0.6, v_ref=V0)
     r = rig(friction=friction)
     k = ss.critical_stiffness(r) * states[0].d_c / (a * SIGMA)
     assert k == pytest.approx(0.08027556564916812, rel=1e-12)
@@ -91,7 +91,7 @@ def test_position_control():
     """PD: k = Kp, c = Kd; PID: the quartic of theory 4."""
     mass, kd, kp, ki = 1e9, 2e9, 6e9, 1e8
     f, slope, rate = A * SIGMA / V0, -(B - A) * SIGMA / V0, V0 / D_C
-    held = rig(stiffness=None, mass=mass, drive=ss.PD(V0, kp=kp, kd=kd))
+    held = rig(stiffness=None, mass=mass, drive=ss.machine.PD(V0, kp=kp, kd=kd))
     critical = -rate * (slope + kd) * (1 + mass * rate / (f + kd))
     (edge,) = [e for e in ss.boundary(held, "drive.kp") if e.kind == "oscillatory"]
     assert edge.value == pytest.approx(critical, rel=1e-12)
@@ -99,7 +99,7 @@ def test_position_control():
     assert not ss.boundary(strong, "drive.kp", between=(1.0, 1e15))
     assert ss.analyze(strong).stable
     quartic = [rate * ki, ki + rate * kp, kp + rate * kd + rate * slope, mass * rate + kd + f, mass]
-    full = rig(stiffness=None, mass=mass, drive=ss.PID(V0, kp=kp, kd=kd, ki=ki))
+    full = rig(stiffness=None, mass=mass, drive=ss.machine.PID(V0, kp=kp, kd=kd, ki=ki))
     np.testing.assert_allclose(
         np.sort_complex(ss.eigenvalues(full)), np.sort_complex(np.roots(quartic[::-1])), rtol=1e-11
     )
@@ -108,12 +108,12 @@ def test_position_control():
 def test_lugre():
     """r = σ0 v0/g, f = σ2 + σ1 v0 g'/g, S = σ2 + g' per unit normal stress; the bound of theory 4."""
     v, n = 1e-3, 1e5
-    law = ss.LuGre(
+    law = ss.laws.LuGre(
         mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800, viscous=80
     )
     g = 0.3 + 0.1 * math.exp(-1)
     dg = -0.2 * math.exp(-1) / 1e-3
-    r = rig(friction=law, contact=ss.Constant(preload=n), mass=5e5, drive=ss.Steady(v))
+    r = rig(friction=law, contact=ss.laws.ConstantNormalStress(preload=n), mass=5e5, drive=ss.machine.SteadyDrive(v))
     known = ss.small_signal(r)
     rate, f, slope = 1e4 * v / g, 80 + 800 * v * dg / g, 80 + dg
     assert (known.r, known.f / n, known.S / n) == pytest.approx((rate, f, slope), rel=1e-12)
@@ -128,9 +128,9 @@ def test_lugre():
 
 def test_memoryless_friction_misses_the_critical_stiffness():
     """Stribeck friction: no stiffness at all or every stiffness, with or without mass."""
-    law = ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3)
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3)
     for velocity, mass in product((1e-4, 1e-3), (0.0, 1e3)):
-        falling = rig(friction=law, mass=mass, drive=ss.Steady(velocity))
+        falling = rig(friction=law, mass=mass, drive=ss.machine.SteadyDrive(velocity))
         assert np.isnan(ss.critical_stiffness(falling))
         assert np.all(np.isnan(ss.stable_stiffness(falling)))
         damped = falling.with_values({"friction.viscous": 1e3})
@@ -141,8 +141,8 @@ def test_oscillating_normal_stress():
     """Perfettini et al. (2001): φ̂/ε̂ = −s[(μ−α)s + μ]/[a s² + (κ̃−(b−a))s + κ̃], resonance at 2π√(a/κ̃)."""
     alpha, k = 0.3, 2e10
     r = rig(
-        friction=rate_state(normal_memory=ss.LinkerDieterich(alpha=alpha)),
-        contact=ss.Prescribed(preload=SIGMA),
+        friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=alpha)),
+        contact=ss.laws.Prescribed(preload=SIGMA),
         stiffness=k,
     )
     kappa = k * D_C / SIGMA
@@ -224,17 +224,17 @@ def test_formula_gives_the_number(contact, mass):
 
 def test_formula_of_the_inclined_spring_and_of_what_has_none():
     r = rig(
-        friction=rate_state(normal_memory=ss.LinkerDieterich(alpha=0.5)),
-        contact=ss.InclinedSpring(preload=1e6, angle=0.1),
+        friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.5)),
+        contact=ss.laws.InclinedSpring(preload=1e6, angle=0.1),
     )
     assert str(ss.formula(r).rhs) == "sigma_ss*(-a + b)/(d_c*(-alpha*tan(psi) + mu_ss*tan(psi) + 1))"
-    two = rig(friction=ss.RateState(a=A, states=[ss.State(b=B, d_c=1.0)] * 2, mu_ref=0.7, v_ref=V0))
+    two = rig(friction=ss.laws.RateState(a=A, states=[ss.laws.State(b=B, d_c=1.0)] * 2, mu_ref=0.7, v_ref=V0))
     with pytest.raises(ss.NotAvailable, match="2 memory variables"):
         ss.formula(two)
 
 
 def test_model_prints_itself():
-    r = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=0.1), mass=1.0)
+    r = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=0.1), mass=1.0)
     model = build_model(r)
     text = str(model)
     for words in ("with inertia", "slip of the block", "contact.angle", "dv/dt = a_x", "tan(psi)"):
@@ -270,14 +270,14 @@ def test_names_of_a_law_never_clash_with_those_of_the_model():
 
         body = {
             "__annotations__": {first: float, second: float},
-            first: ss.parameter("1", positive, "direct effect"),
-            second: ss.parameter("1", positive, "evolution effect"),
+            first: ss.laws.parameter("1", positive, "direct effect"),
+            second: ss.laws.parameter("1", positive, "evolution effect"),
             "memory": lambda self: (memory,),
             "strength": strength,
             "rates": rates,
             "steady_memory": steady_memory,
         }
-        return type("Renamed", (ss.FrictionLaw,), body)(**{first: 0.01, second: 0.015})
+        return type("Renamed", (ss.laws.FrictionLaw,), body)(**{first: 0.01, second: 0.015})
 
     def answers(friction):
         r = rig(friction=friction, damping=1e9, radiation_damping=1e9, mass=1e9, contact=CONTACTS[1])

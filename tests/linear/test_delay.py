@@ -16,7 +16,8 @@ from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.waves import Waves
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
-from steadyslip.model import build_model, operating_point
+from steadyslip.model import build_model
+from steadyslip.model.point import operating_point
 from steadyslip.model.range import quasipolynomial as operating_quasi
 from steadyslip.model.reducing import reduce_model
 
@@ -24,22 +25,22 @@ from steadyslip.model.reducing import reduce_model
 def servo(gain, delay, mass=0.0):
     """x' = −gain x(t − delay): a body without mass in oil, held by a controller that acts late."""
     return ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=mass)},
-        links={"oil": ss.Spring(between=("ground", "block"), damping=1.0)},
+        bodies={"block": ss.machine.SlidingBody(mass=mass)},
+        links={"oil": ss.machine.Spring(between=("ground", "block"), damping=1.0)},
         contacts={"guide": surface("block", coulomb(0.3))},
-        drive=ss.PositionPD(velocity=1.0, body="block", kp=gain, delay=delay),
+        drive=ss.machine.PositionPD(velocity=1.0, body="block", kp=gain, delay=delay),
     )
 
 
 def lagging(k, damping=0.05, slope=0.1, lag=1.0):
     """theory 10's lag check: m s² + (c + S exp(−sδ)) s + k with m = 1, S and δ = `slope` and `lag` of the friction."""
     difference = slope / (-2 * np.exp(-1.0))
-    friction = ss.CoulombStribeck(mu_coulomb=0.6, mu_static=0.6 + difference, v_stribeck=1.0, lag=lag)
+    friction = ss.laws.CoulombStribeck(mu_coulomb=0.6, mu_static=0.6 + difference, v_stribeck=1.0, lag=lag)
     return ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1.0)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
         contacts={"guide": surface("block", friction)},
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -188,8 +189,8 @@ def test_two_crossings_that_nearly_touch_are_found_and_what_only_touches_is_told
 def test_stable_values_with_two_delays_are_those_of_a_typed_equation():
     """Late controller and late friction: of each delay and of a gain, counted by how the typed function winds."""
     machine = replace(
-        lagging(10.0), drive=ss.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
-        links={"spring": ss.Spring(between=("ground", "block"), damping=0.4)},
+        lagging(10.0), drive=ss.machine.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.machine.Spring(between=("ground", "block"), damping=0.4)},
     )  # fmt: skip
 
     def whole(s, kp=2.0, lag=1.0, delay=0.2):
@@ -224,7 +225,9 @@ def test_late_machines_at_random_have_the_roots_of_theory_11s_matrix(seed):
 
 
 def late_axis(delay="0 s"):
-    return replace(two_mass(kp=4.0, kd=3.0), drive=ss.PositionPD(velocity=1.0, body="motor", kp=4, kd=3, delay=delay))
+    return replace(
+        two_mass(kp=4.0, kd=3.0), drive=ss.machine.PositionPD(velocity=1.0, body="motor", kp=4, kd=3, delay=delay)
+    )
 
 
 def test_a_verdict_with_delay():
@@ -261,8 +264,8 @@ def test_edges_of_other_parameters_are_on_the_axis(name):
 def test_a_late_controller_and_late_friction_together():
     """Products of both delays: counted by the argument principle; each delay alone is the edge without the other."""
     machine = replace(
-        lagging(10.0), drive=ss.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
-        links={"spring": ss.Spring(between=("ground", "block"), damping=0.4)},
+        lagging(10.0), drive=ss.machine.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.machine.Spring(between=("ground", "block"), damping=0.4)},
     )  # fmt: skip
     point = operating_point(machine)
     assert len(point.model.delays) == 2
@@ -282,8 +285,8 @@ def test_a_late_controller_and_late_friction_together():
 def test_a_scan_with_two_delays_goes_on_where_some_far_samples_cannot_be_counted():
     """A lag of ten natural times, of which some samples decades off the own value oscillate millions of times."""
     machine = replace(
-        lagging(10.0, lag=10.0), drive=ss.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
-        links={"spring": ss.Spring(between=("ground", "block"), damping=0.4)},
+        lagging(10.0, lag=10.0), drive=ss.machine.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.machine.Spring(between=("ground", "block"), damping=0.4)},
     )  # fmt: skip
     assert ss.boundary(machine, "friction.v_stribeck") == ()
     assert set(ss.stability(machine, {"friction.v_stribeck": [0.1, 1.0, 10.0]}).tolist()) == {"stable"}
@@ -342,7 +345,7 @@ def test_roots_that_are_too_many_to_be_counted_are_refused_in_words():
 
 def test_all_that_a_controller_does_is_late():
     """A cascade: place of the table, speed of the motor and integral, all one delay ago."""
-    drive = ss.Cascade(velocity=1.0, body="motor", measured="table", kv=0.8, kp=3.0, tn=2.5, delay=0.05)
+    drive = ss.machine.Cascade(velocity=1.0, body="motor", measured="table", kv=0.8, kp=3.0, tn=2.5, delay=0.05)
     found = ss.eigenvalues(replace(two_mass(), drive=drive))
     friction = rate_state(0.5, -0.3, 1.0)
 
@@ -372,7 +375,7 @@ def test_what_is_not_offered_with_delay_says_so(tmp_path):
     with pytest.raises(ss.NotAvailable, match="motion with a delay is not offered"):
         reduce_model(build_model(late_axis("0.1 s")))
     with pytest.raises(ss.ParameterError, match="delay"):
-        ss.PositionPD(velocity=1.0, body="motor", kp=1.0, delay=-0.1)
+        ss.machine.PositionPD(velocity=1.0, body="motor", kp=1.0, delay=-0.1)
 
 
 @np.errstate(all="ignore")  # as where it is used

@@ -10,8 +10,8 @@ from rigs_of_theory import D_C, SIGMA, V0, A, B, rate_state, rig
 
 
 def test_edge_values_invert_the_closed_forms():
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
-    r = rig(friction=friction, contact=ss.InclinedSpring(steady_normal_stress=SIGMA, angle=-0.5), stiffness=7.8e9)
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56))
+    r = rig(friction=friction, contact=ss.laws.InclinedSpring(steady_normal_stress=SIGMA, angle=-0.5), stiffness=7.8e9)
     t = math.tan(-0.5)
     expected = {
         "friction.b": A + 7.8e9 * D_C / SIGMA * (1 + 0.14 * t),
@@ -31,7 +31,7 @@ def test_edge_values_invert_the_closed_forms():
 
 
 def test_lock_up_edge_and_its_kind():
-    r = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=1e12)
+    r = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=1e12)
     lock = [e for e in ss.boundary(r, "angle") if e.kind == "lock-up"]
     assert [e.value for e in lock] == pytest.approx([-math.atan(1 / 0.7)], rel=1e-12)
 
@@ -40,8 +40,8 @@ def test_a_window_between_samples_is_found():
     """A narrow unstable window in velocity: friction weakens only around one speed."""
     from steadyslip.core.domains import positive
 
-    class Dip(ss.FrictionLaw):
-        centre: float = ss.parameter("m/s", positive, "velocity of the dip")
+    class Dip(ss.laws.FrictionLaw):
+        centre: float = ss.laws.parameter("m/s", positive, "velocity of the dip")
 
         def memory(self):
             return ("Theta",)
@@ -59,7 +59,7 @@ def test_a_window_between_samples_is_found():
 
             return (-1e-3 * sp.tanh(80 * sp.log(v / self.centre)),)
 
-    r = rig(friction=Dip(centre=2.3041e-6), contact=ss.Constant(preload=SIGMA), stiffness=1.0)
+    r = rig(friction=Dip(centre=2.3041e-6), contact=ss.laws.ConstantNormalStress(preload=SIGMA), stiffness=1.0)
     edges = ss.boundary(r, "velocity")
     assert [e.stable for e in edges] == ["below", "above"]
     assert (
@@ -68,7 +68,7 @@ def test_a_window_between_samples_is_found():
 
 
 def test_range_is_checked():
-    r = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5))
+    r = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5))
     assert ss.boundary(r, "angle", between=("-60 deg", "-50 deg"))[0].kind == "lock-up"
     with pytest.raises(ss.ParameterError, match="between -90 deg and 90 deg"):
         ss.boundary(r, "angle", between=("-100 deg", 0))
@@ -81,8 +81,8 @@ def test_range_is_checked():
 
 
 def test_arrays_equal_one_at_a_time():
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
-    r = rig(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=0.1))
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56))
+    r = rig(friction=friction, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=0.1))
     angles, masses = np.radians([-70, -40, 0.0, 30])[:, None], np.array([0.0, 1e9, 1e11])
     vary = {"contact.angle": angles, "slider.mass": masses}
     k, sets, growth = ss.critical_stiffness(r, vary), ss.stable_stiffness(r, vary), ss.growth_rate(r, vary)
@@ -97,12 +97,14 @@ def test_arrays_equal_one_at_a_time():
 
 
 def test_large_arrays_go_in_pieces():
-    r = rig(friction=rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56)))
+    r = rig(friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56)))
     a = np.linspace(0.005, 0.02, 100_003)
     whole = ss.critical_stiffness(r, {"friction.a": a})
     np.testing.assert_array_equal(whole[::97], ss.critical_stiffness(r, {"friction.a": a[::97]}))
     two = rig(
-        friction=ss.RateState(a=A, states=[ss.State(b=B, d_c=D_C), ss.State(b=0.1, d_c=1.0)], mu_ref=0.7, v_ref=V0)
+        friction=ss.laws.RateState(
+            a=A, states=[ss.laws.State(b=B, d_c=D_C), ss.laws.State(b=0.1, d_c=1.0)], mu_ref=0.7, v_ref=V0
+        )
     )
     sets = ss.stable_stiffness(two, {"friction.a": a})
     few = ss.stable_stiffness(two, {"friction.a": a[:100]})
@@ -114,7 +116,7 @@ def test_labelled_arrays_keep_labels_and_gain_units():
 
     angle = xr.DataArray(np.radians([-30, 0, 30]), dims="angle", coords={"angle": [-30, 0, 30]})
     mass = xr.DataArray([0.0, 1e9], dims="mass")
-    r = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=0.1))
+    r = rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=0.1))
     k = ss.critical_stiffness(r, {"contact.angle": angle, "mass": mass})
     assert k.dims == ("angle", "mass")
     assert (k.name, k.attrs["units"]) == ("critical_stiffness", "Pa/m")
@@ -161,9 +163,9 @@ def test_search_ends_with_floating_point(name, value):
 @pytest.mark.parametrize("alpha", [0.0, 0.4])
 def test_a_pull_that_locks_up_is_said_to(alpha, b):
     """Where μ(v) reaches 1/gain steady sliding ends; next to it only rounding calls it a slow growth."""
-    friction = rate_state(a=0.01, b=b, mu_ref=0.5, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=alpha))
-    pull = ss.SelfEnergising(preload=5e6, gain=1.98)
-    held = ss.Slider(friction=friction, contact=pull, stiffness=1e9, drive=ss.Steady(1e-6))
+    friction = rate_state(a=0.01, b=b, mu_ref=0.5, v_ref=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=alpha))
+    pull = ss.laws.SelfEnergising(preload=5e6, gain=1.98)
+    held = ss.Slider(friction=friction, contact=pull, stiffness=1e9, drive=ss.machine.SteadyDrive(1e-6))
     edges = [e for e in ss.boundary(held, "drive.velocity") if e.stable == "below"]
     last = 1e-6 * math.exp((1 / 1.98 - 0.5) / (0.01 - b))
     if last < 1.0:

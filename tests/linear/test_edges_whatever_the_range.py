@@ -16,8 +16,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.mark.parametrize("apart", [math.radians(0.18), 1e-5, 1e-7])
 def test_a_strip_beside_lock_up_is_found_whatever_the_range(apart):
     """Sliding is made to change so near to lock-up, where it would be unstable from there to the next sample."""
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
-    plain = rig(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5))
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56))
+    plain = rig(friction=friction, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5))
     lock = -math.atan(1 / 0.7)
     held = plain.with_values({"stiffness": float(ss.critical_stiffness(plain, {"contact.angle": lock + apart}))})
     edges = ss.boundary(held, "contact.angle")

@@ -5,7 +5,7 @@ import pytest
 
 import steadyslip as ss
 from machines import brake, coulomb, rate_state, three_bodies, two_mass
-from steadyslip.model import operating_point
+from steadyslip.model.point import operating_point
 
 
 def test_forces_of_steady_sliding():
@@ -24,18 +24,18 @@ def test_forces_of_steady_sliding():
 def self_pressing(gain, load=1.0):
     """Two blocks in a row; the second is pressed by the pull that drags the first."""
     friction = rate_state(0.5, -0.3, 1.0)
-    tooth = ss.InclinedSpring(preload=load, angle=float(-np.arctan(gain)))
+    tooth = ss.laws.InclinedSpring(preload=load, angle=float(-np.arctan(gain)))
     return ss.Machine(
-        bodies={"one": ss.SlidingBody(), "two": ss.SlidingBody()},
+        bodies={"one": ss.machine.SlidingBody(), "two": ss.machine.SlidingBody()},
         links={
-            "front": ss.Spring(between=("drive", "one"), stiffness=10.0),
-            "back": ss.Spring(between=("one", "two"), stiffness=10.0),
+            "front": ss.machine.Spring(between=("drive", "one"), stiffness=10.0),
+            "back": ss.machine.Spring(between=("one", "two"), stiffness=10.0),
         },
         contacts={
-            "fore": ss.Surface(body="one", friction=friction, contact=tooth, loaded_by="front"),
-            "aft": ss.Surface(body="two", friction=friction, contact=ss.Constant(preload=2.0)),
+            "fore": ss.machine.Surface(body="one", friction=friction, contact=tooth, loaded_by="front"),
+            "aft": ss.machine.Surface(body="two", friction=friction, contact=ss.laws.ConstantNormalStress(preload=2.0)),
         },
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 

@@ -28,14 +28,18 @@ def test_places_answer_to_forces_as_the_matrix_typed_by_hand(seed):
 def nut(damping=0.0):
     """A motor, a nut without mass between two springs, and a table: the nut's place follows from its neighbours'."""
     return ss.Machine(
-        bodies={"motor": ss.SlidingBody(mass=2.0), "nut": ss.SlidingBody(mass=0.0), "table": ss.SlidingBody(mass=5.0)},
-        links={
-            "shaft": ss.Spring(between=("drive", "motor"), stiffness=3.0, damping=0.7),
-            "screw": ss.Spring(between=("motor", "nut"), stiffness=40.0, damping=damping),
-            "bracket": ss.Spring(between=("nut", "table"), stiffness=60.0),
+        bodies={
+            "motor": ss.machine.SlidingBody(mass=2.0),
+            "nut": ss.machine.SlidingBody(mass=0.0),
+            "table": ss.machine.SlidingBody(mass=5.0),
         },
-        contacts={"guide": surface("table", ss.RateState(a=0.5, b=0.8, d_c=1.0, mu_ref=0.6, v_ref=1.0))},
-        drive=ss.Pull(velocity=1.0),
+        links={
+            "shaft": ss.machine.Spring(between=("drive", "motor"), stiffness=3.0, damping=0.7),
+            "screw": ss.machine.Spring(between=("motor", "nut"), stiffness=40.0, damping=damping),
+            "bracket": ss.machine.Spring(between=("nut", "table"), stiffness=60.0),
+        },
+        contacts={"guide": surface("table", ss.laws.RateState(a=0.5, b=0.8, d_c=1.0, mu_ref=0.6, v_ref=1.0))},
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 

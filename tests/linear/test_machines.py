@@ -28,7 +28,7 @@ def test_flutter_with_rate_and_state_and_what_memory_of_normal_stress_does():
     """f = .02, S = −.01, r = .5, μ = .6 at the load that the pad has; memory of normal stress weakens the flutter."""
 
     def pad(alpha):
-        memory = {"normal_memory": ss.LinkerDieterich(alpha=alpha, sigma_ref=1.0)} if alpha else {}
+        memory = {"normal_memory": ss.laws.LinkerDieterich(alpha=alpha, sigma_ref=1.0)} if alpha else {}
         load = 0.0
         for _ in range(60):  # the load depends on friction, which is given per load
             machine = brake(rate_state(0.02, -0.01, 0.5, load=load or 1.0, **memory))
@@ -142,7 +142,7 @@ def test_stable_values_are_where_scans_find_the_edges():
 
 def test_a_machine_is_ill_posed_where_friction_falls_at_once():
     machine = two_mass().with_values({"bodies.table.mass": 0.0, "links.screw.damping": 0.0})
-    falling = ss.LuGre(mu_coulomb=0.2, mu_static=0.6, v_stribeck=1.0, bristle_stiffness=1.0, bristle_damping=50.0)
+    falling = ss.laws.LuGre(mu_coulomb=0.2, mu_static=0.6, v_stribeck=1.0, bristle_stiffness=1.0, bristle_damping=50.0)
     worse = replace(machine, contacts={"guide": surface("table", falling)})
     assert ss.growth_rate(worse) == np.inf
     assert "ill-posed" in ss.analyze(worse).reason
@@ -150,14 +150,14 @@ def test_a_machine_is_ill_posed_where_friction_falls_at_once():
 
 def test_what_cancels_in_the_structure_cancels_exactly():
     """Dashpots between bodies without mass: the highest coefficients are absent, not rounded."""
-    bodies = {name: ss.SlidingBody() for name in ("a", "b", "c")}
+    bodies = {name: ss.machine.SlidingBody() for name in ("a", "b", "c")}
     links = {
-        "pull": ss.Spring(between=("drive", "a"), stiffness=1.0, damping=0.7),
-        "one": ss.Spring(between=("a", "b"), stiffness=1.1, damping=0.3),
-        "two": ss.Spring(between=("b", "c"), stiffness=1.3, damping=0.9),
+        "pull": ss.machine.Spring(between=("drive", "a"), stiffness=1.0, damping=0.7),
+        "one": ss.machine.Spring(between=("a", "b"), stiffness=1.1, damping=0.3),
+        "two": ss.machine.Spring(between=("b", "c"), stiffness=1.3, damping=0.9),
     }
     contacts = {"slide": surface("c", rate_state(0.5, -0.3, 1.0))}
-    machine = ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.Pull(velocity=1.0))
+    machine = ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.machine.Pull(velocity=1.0))
     coefficients = characteristic_coefficients(build_model(machine))
     assert len(coefficients) == 5
     assert len(roots(np.array(ss.analyze(machine).characteristic_polynomial))) == 4

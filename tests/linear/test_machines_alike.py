@@ -25,7 +25,9 @@ def test_names_and_their_order_do_not_matter():
 
 def test_a_rigid_link_makes_one_body_of_two():
     """The error falls with the stiffness, order one; damping grows with it."""
-    whole = replace(two_mass(kd=3.0), bodies={"motor": ss.SlidingBody(mass=0.0), "table": ss.SlidingBody(mass=7.0)})
+    whole = replace(
+        two_mass(kd=3.0), bodies={"motor": ss.machine.SlidingBody(mass=0.0), "table": ss.machine.SlidingBody(mass=7.0)}
+    )
     tied = {k: two_mass(kd=3.0).with_values({"links.screw.stiffness": k, "links.screw.damping": 1e-2 * k}) for k in
             (1e4, 1e5, 1e6, 1e7)}  # fmt: skip
     exact = leading(whole.with_values({"links.screw.stiffness": 1e12}))
@@ -37,7 +39,7 @@ def test_a_rigid_link_makes_one_body_of_two():
 def test_two_guides_are_one_with_their_loads_together():
     one = two_mass()
     guide = one.contacts["guide"]
-    half = {name: replace(guide, contact=ss.Constant(preload=0.5)) for name in ("left", "right")}
+    half = {name: replace(guide, contact=ss.laws.ConstantNormalStress(preload=0.5)) for name in ("left", "right")}
     both = replace(one, contacts=half)
     a, b = ss.eigenvalues(one), ss.eigenvalues(both)
     extra = np.argmin([np.min(np.abs(a - s)) < 1e-9 for s in b])  # the states may differ: that decays at v/d_c
@@ -48,7 +50,7 @@ def test_two_guides_are_one_with_their_loads_together():
 def test_an_area_only_says_in_what_the_laws_are_given():
     one = two_mass()
     guide = one.contacts["guide"]
-    spread = replace(guide, area=0.25, contact=ss.Constant(preload=4.0))
+    spread = replace(guide, area=0.25, contact=ss.laws.ConstantNormalStress(preload=4.0))
     assert ss.eigenvalues(replace(one, contacts={"guide": spread})) == pytest.approx(ss.eigenvalues(one), rel=1e-12)
     assert ss.steady_state(replace(one, contacts={"guide": spread})).contacts["guide"].normal_force == pytest.approx(
         1.0
@@ -59,10 +61,10 @@ def test_a_motor_behind_a_screw_is_a_mass_on_the_slide():
     """J = m l², gains times l², speed over l: the same axis."""
     one, lead = two_mass(kp=4.0, kd=0.7), 0.3
     turning = ss.Machine(
-        bodies={"motor": ss.RotatingBody(inertia=2.0 * lead**2), "table": ss.SlidingBody(mass=5.0)},
-        links={"screw": ss.Screw(between=("motor", "table"), lead=lead, stiffness=100.0, damping=0.5)},
+        bodies={"motor": ss.machine.RotatingBody(inertia=2.0 * lead**2), "table": ss.machine.SlidingBody(mass=5.0)},
+        links={"screw": ss.machine.Screw(between=("motor", "table"), lead=lead, stiffness=100.0, damping=0.5)},
         contacts=one.contacts,
-        drive=ss.RotaryPD(velocity=1 / lead, body="motor", kp=4.0 * lead**2, kd=0.7 * lead**2),
+        drive=ss.machine.RotaryPD(velocity=1 / lead, body="motor", kp=4.0 * lead**2, kd=0.7 * lead**2),
     )
     assert ss.eigenvalues(turning) == pytest.approx(ss.eigenvalues(one), rel=1e-11)
     away = replace(turning, drive=replace(turning.drive, measured="table"))
@@ -75,23 +77,26 @@ def test_a_gear_and_a_radius_change_speed_torque_and_stiffness_as_they_should():
     n, radius = 5.0, 0.2
     friction = rate_state(0.5, -0.3, 1.0)
     geared = ss.Machine(
-        bodies={"motor": ss.RotatingBody(inertia=0.1), "wheel": ss.RotatingBody(inertia=1e-3)},
+        bodies={"motor": ss.machine.RotatingBody(inertia=0.1), "wheel": ss.machine.RotatingBody(inertia=1e-3)},
         links={
-            "shaft": ss.Shaft(between=("drive", "motor"), stiffness=10.0),
-            "gear": ss.Shaft(between=("motor", "wheel"), gear=n, stiffness=1e3, damping=1.0),
+            "shaft": ss.machine.Shaft(between=("drive", "motor"), stiffness=10.0),
+            "gear": ss.machine.Shaft(between=("motor", "wheel"), gear=n, stiffness=1e3, damping=1.0),
         },
         contacts={"rim": surface("wheel", friction, radius=radius)},
-        drive=ss.RotaryPull(velocity=1.0),
+        drive=ss.machine.RotaryPull(velocity=1.0),
     )
     lever = n * radius
     straight = ss.Machine(
-        bodies={"motor": ss.SlidingBody(mass=0.1 / lever**2), "wheel": ss.SlidingBody(mass=1e-3 / radius**2)},
+        bodies={
+            "motor": ss.machine.SlidingBody(mass=0.1 / lever**2),
+            "wheel": ss.machine.SlidingBody(mass=1e-3 / radius**2),
+        },
         links={
-            "shaft": ss.Spring(between=("drive", "motor"), stiffness=10.0 / lever**2),
-            "gear": ss.Spring(between=("motor", "wheel"), stiffness=1e3 / radius**2, damping=1.0 / radius**2),
+            "shaft": ss.machine.Spring(between=("drive", "motor"), stiffness=10.0 / lever**2),
+            "gear": ss.machine.Spring(between=("motor", "wheel"), stiffness=1e3 / radius**2, damping=1.0 / radius**2),
         },
         contacts={"rim": surface("wheel", friction)},
-        drive=ss.Pull(velocity=lever),
+        drive=ss.machine.Pull(velocity=lever),
     )
     assert geared.speeds() == {"motor": 1.0, "wheel": 5.0}
     assert ss.steady_state(geared).contacts["rim"].slip_rate == pytest.approx(1.0)
@@ -102,8 +107,8 @@ def test_a_gear_and_a_radius_change_speed_torque_and_stiffness_as_they_should():
 def test_a_cascade_beside_its_motor_is_a_pid_controller():
     axis = two_mass()
     kv, kp, tn = 0.8, 3.0, 2.5
-    cascade = ss.Cascade(velocity=1.0, body="motor", kv=kv, kp=kp, tn=tn)
-    pid = ss.PositionPID(velocity=1.0, body="motor", kp=kp * (kv + 1 / tn), kd=kp, ki=kp * kv / tn)
+    cascade = ss.machine.Cascade(velocity=1.0, body="motor", kv=kv, kp=kp, tn=tn)
+    pid = ss.machine.PositionPID(velocity=1.0, body="motor", kp=kp * (kv + 1 / tn), kd=kp, ki=kp * kv / tn)
     one, two = (ss.eigenvalues(replace(axis, drive=drive)) for drive in (cascade, pid))
     assert one == pytest.approx(two, rel=1e-11)
     scale = replace(cascade, measured="table")
@@ -113,17 +118,17 @@ def test_a_cascade_beside_its_motor_is_a_pid_controller():
 def test_a_gear_whose_friction_grows_with_its_torque_is_an_inclined_spring():
     """σ = σ0 + g T with T the force of the link that loads it: the slider with −tan ψ in place of g."""
     gain, friction = 0.4, rate_state(0.5, -0.3, 1.0)
-    tooth = ss.InclinedSpring(preload=2.0, angle=-np.arctan(gain))
+    tooth = ss.laws.InclinedSpring(preload=2.0, angle=-np.arctan(gain))
     machine = ss.Machine(
-        bodies={"gear": ss.SlidingBody(mass=1.0), "load": ss.SlidingBody()},
+        bodies={"gear": ss.machine.SlidingBody(mass=1.0), "load": ss.machine.SlidingBody()},
         links={
-            "shaft": ss.Spring(between=("drive", "gear"), stiffness=3.0),
-            "coupling": ss.Spring(between=("gear", "load"), stiffness=5.0),
+            "shaft": ss.machine.Spring(between=("drive", "gear"), stiffness=3.0),
+            "coupling": ss.machine.Spring(between=("gear", "load"), stiffness=5.0),
         },
-        contacts={"mesh": ss.Surface(body="gear", friction=friction, contact=tooth, loaded_by="shaft")},
-        drive=ss.Pull(velocity=1.0),
+        contacts={"mesh": ss.machine.Surface(body="gear", friction=friction, contact=tooth, loaded_by="shaft")},
+        drive=ss.machine.Pull(velocity=1.0),
     )
-    slider = ss.Slider(friction=friction, contact=tooth, stiffness=3.0, mass=1.0, drive=ss.Steady(1.0))
+    slider = ss.Slider(friction=friction, contact=tooth, stiffness=3.0, mass=1.0, drive=ss.machine.SteadyDrive(1.0))
     assert ss.eigenvalues(machine) == pytest.approx(ss.eigenvalues(slider), rel=1e-11)
     dragged = replace(machine, contacts={**machine.contacts, "drum": surface("load", friction, load=3.0)})
     sigma = (2.0 + gain * 1.8) / (1 - 0.6 * gain)  # the gear carries the friction of the load as well
@@ -135,18 +140,20 @@ def _in_the_plane(belt):
     held, lean = ("ground", -1.0) if belt else ("drive", 1.0)
     rubs = {"body": "drive", "against": "pad"} if belt else {"body": "pad"}
     return ss.Machine(
-        bodies={"pad": ss.PlanarBody(mass=1.0, press=1.0), "tail": ss.SlidingBody(mass=0.2)},
+        bodies={"pad": ss.machine.PlanarBody(mass=1.0, press=1.0), "tail": ss.machine.SlidingBody(mass=0.2)},
         links={
-            "arm": ss.Spring(between=(held, "pad"), stiffness=0.7, damping=0.02),
-            "lining": ss.Spring(between=(held, "pad"), stiffness=0.1, direction="normal"),
-            "caliper": ss.Spring(between=(held, "pad"), stiffness=0.6, angle=lean * np.pi / 5),
-            "hook": ss.Spring(between=("pad", "tail"), stiffness=0.4),
-            "air": ss.Spring(between=("ground" if not belt else "drive", "tail"), damping=0.1),
+            "arm": ss.machine.Spring(between=(held, "pad"), stiffness=0.7, damping=0.02),
+            "lining": ss.machine.Spring(between=(held, "pad"), stiffness=0.1, direction="normal"),
+            "caliper": ss.machine.Spring(between=(held, "pad"), stiffness=0.6, angle=lean * np.pi / 5),
+            "hook": ss.machine.Spring(between=("pad", "tail"), stiffness=0.4),
+            "air": ss.machine.Spring(between=("ground" if not belt else "drive", "tail"), damping=0.1),
         },
         contacts={
-            "disc": ss.Surface(**rubs, friction=rate_state(0.3, -0.1, 1.0), contact=ss.Compliant(normal_stiffness=0.8))
+            "disc": ss.machine.Surface(
+                **rubs, friction=rate_state(0.3, -0.1, 1.0), contact=ss.laws.Compliant(normal_stiffness=0.8)
+            )
         },
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -162,20 +169,23 @@ def test_what_moves_and_what_stands_is_a_matter_of_view():
 
 def test_a_belt_that_a_tilted_spring_presses_on_is_the_ground_in_the_mirror():
     """The contact law sees what holds the block against what it slides on, be that the drive or the ground."""
-    for law in (ss.InclinedSpring(steady_normal_stress=1.4, angle=-0.5), ss.Linear(steady_normal_stress=1.4, b2=0.3)):
+    for law in (
+        ss.laws.InclinedSpring(steady_normal_stress=1.4, angle=-0.5),
+        ss.laws.LinearNormalStress(steady_normal_stress=1.4, b2=0.3),
+    ):
 
         def machine(belt, law=law):
             held, base = ("ground", "drive") if belt else ("drive", "ground")
             rubs = {"body": "drive", "against": "b"} if belt else {"body": "b"}
             return ss.Machine(
-                bodies={"b": ss.SlidingBody(mass=0.5), "c": ss.SlidingBody(mass=2.0)},
+                bodies={"b": ss.machine.SlidingBody(mass=0.5), "c": ss.machine.SlidingBody(mass=2.0)},
                 links={
-                    "k": ss.Spring(between=(held, "b"), stiffness=3.0, damping=0.1),
-                    "tie": ss.Spring(between=("b", "c"), stiffness=1.0, damping=0.1),
-                    "drag": ss.Spring(between=(base, "b"), damping=0.4),
+                    "k": ss.machine.Spring(between=(held, "b"), stiffness=3.0, damping=0.1),
+                    "tie": ss.machine.Spring(between=("b", "c"), stiffness=1.0, damping=0.1),
+                    "drag": ss.machine.Spring(between=(base, "b"), damping=0.4),
                 },
-                contacts={"s": ss.Surface(**rubs, friction=rate_state(0.5, -0.3, 1.0), contact=law)},
-                drive=ss.Pull(velocity=1.0),
+                contacts={"s": ss.machine.Surface(**rubs, friction=rate_state(0.5, -0.3, 1.0), contact=law)},
+                drive=ss.machine.Pull(velocity=1.0),
             )
 
         assert ss.eigenvalues(machine(True)) == pytest.approx(ss.eigenvalues(machine(False)), rel=1e-10)
@@ -185,10 +195,10 @@ def test_a_belt_moves_a_block_as_the_ground_does():
     def block(belt):
         ends, rubs = ("ground", {"body": "drive", "against": "b"}) if belt else ("drive", {"body": "b"})
         return ss.Machine(
-            bodies={"b": ss.SlidingBody(mass=0.5)},
-            links={"k": ss.Spring(between=(ends, "b"), stiffness=1.0)},
+            bodies={"b": ss.machine.SlidingBody(mass=0.5)},
+            links={"k": ss.machine.Spring(between=(ends, "b"), stiffness=1.0)},
             contacts={"c": surface(friction=rate_state(0.5, -0.3, 1.0), **rubs)},
-            drive=ss.Pull(velocity=1.0),
+            drive=ss.machine.Pull(velocity=1.0),
         )
 
     times = np.linspace(0, 20, 30)
@@ -202,15 +212,19 @@ def test_a_body_and_a_contact_may_have_the_same_name():
     """Also where the contact slides at another rate than the body moves; and a-b and a_b are two bodies."""
 
     def machine(first, second, rubs):
-        bodies = {first: ss.SlidingBody(mass=2.0), second: ss.SlidingBody(mass=0.5), "post": ss.SlidingBody(mass=0.1)}
+        bodies = {
+            first: ss.machine.SlidingBody(mass=2.0),
+            second: ss.machine.SlidingBody(mass=0.5),
+            "post": ss.machine.SlidingBody(mass=0.1),
+        }
         links = {
-            "pull": ss.Spring(between=("drive", first), stiffness=3.0, damping=0.2),
-            "tie": ss.Spring(between=(first, second), stiffness=2.0),
-            "held": ss.Spring(between=("ground", "post"), stiffness=5.0, damping=0.1),
+            "pull": ss.machine.Spring(between=("drive", first), stiffness=3.0, damping=0.2),
+            "tie": ss.machine.Spring(between=(first, second), stiffness=2.0),
+            "held": ss.machine.Spring(between=("ground", "post"), stiffness=5.0, damping=0.1),
         }
         contacts = {rubs: surface(second, rate_state(0.5, -0.3, 1.0), against="post"),
                     "other": surface(first, rate_state(0.4, 0.1, 2.0))}  # fmt: skip
-        return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.Pull(velocity=1.0))
+        return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.machine.Pull(velocity=1.0))
 
     plain = machine("one", "two", "rub")
     for names in (("one", "two", "post"), ("one", "two", "two"), ("one", "two", "one"), ("a-b", "a_b", "a-b")):
@@ -298,7 +312,7 @@ def test_stable_values_do_not_depend_on_units_names_or_idle_bodies(seed):
     np.testing.assert_allclose(ss.stable_values(other, called(along), {called(name): values}), own, rtol=1e-7)
     idle = replace(
         machine,
-        bodies={**machine.bodies, "idle": ss.SlidingBody(mass=3.0)},
-        links={**machine.links, "idle": ss.Spring(between=("ground", "idle"), stiffness=7.0, damping=1.0)},
+        bodies={**machine.bodies, "idle": ss.machine.SlidingBody(mass=3.0)},
+        links={**machine.links, "idle": ss.machine.Spring(between=("ground", "idle"), stiffness=7.0, damping=1.0)},
     )
     np.testing.assert_allclose(ss.stable_values(idle, along, {name: values}), own, rtol=1e-7)

@@ -11,7 +11,7 @@ from machines import rate_state, stacked_pads, surface, two_blocks
 from steadyslip.linear import pencil, spectrum
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.roots import roots
-from steadyslip.model import operating_point
+from steadyslip.model.point import operating_point
 from stiff_machines import at_random, eigenvalues, pencil as typed, worst
 
 
@@ -21,18 +21,22 @@ def checked(machine):
 
 def screw_axis(ratio, static=0.07):
     """Two bodies without mass, which one dashpot holds, LuGre friction at a multiple of its Stribeck velocity."""
-    friction = ss.LuGre(
+    friction = ss.laws.LuGre(
         mu_coulomb=0.2, mu_static=static, v_stribeck=1e-4, bristle_stiffness=5e5, bristle_damping=0.07
     )  # fmt: skip
     return ss.Machine(
-        bodies={"screw": ss.RotatingBody(), "nut": ss.SlidingBody(), "table": ss.SlidingBody(mass=0.6)},
+        bodies={
+            "screw": ss.machine.RotatingBody(),
+            "nut": ss.machine.SlidingBody(),
+            "table": ss.machine.SlidingBody(mass=0.6),
+        },
         links={
-            "shaft": ss.Shaft(between=("drive", "screw"), stiffness=9e7),
-            "thread": ss.Screw(between=("screw", "nut"), lead=0.006, stiffness=1e5, damping=2.0),
-            "bracket": ss.Spring(between=("nut", "table"), stiffness=1.3e4),
+            "shaft": ss.machine.Shaft(between=("drive", "screw"), stiffness=9e7),
+            "thread": ss.machine.Screw(between=("screw", "nut"), lead=0.006, stiffness=1e5, damping=2.0),
+            "bracket": ss.machine.Spring(between=("nut", "table"), stiffness=1.3e4),
         },
         contacts={"guide": surface("nut", friction, load=100.0)},
-        drive=ss.RotaryPull(velocity=ratio * 1e-4 / 0.006),
+        drive=ss.machine.RotaryPull(velocity=ratio * 1e-4 / 0.006),
     )
 
 
@@ -69,10 +73,10 @@ def test_a_double_eigenvalue_is_told_with_its_error():
     assert found.decided
     assert np.max(found.errors / np.abs(found.values)) < 1e-7
     critical = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1.0)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=1.0, damping=2.0)},
-        contacts={"guide": surface("block", ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1.0))},
-        drive=ss.Pull(velocity=1.0),
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=1.0, damping=2.0)},
+        contacts={"guide": surface("block", ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1.0))},
+        drive=ss.machine.Pull(velocity=1.0),
     )
     found = checked(critical)
     assert found.decided
@@ -114,16 +118,18 @@ def late_servo(joint):
     """A late controller pushes a motor whose joint to a carriage is stiff; the joint hides the oscillation below."""
     return ss.Machine(
         bodies={
-            "motor": ss.SlidingBody(mass=1.0),
-            "carriage": ss.SlidingBody(mass=0.1),
-            "table": ss.SlidingBody(mass=0.6),
+            "motor": ss.machine.SlidingBody(mass=1.0),
+            "carriage": ss.machine.SlidingBody(mass=0.1),
+            "table": ss.machine.SlidingBody(mass=0.6),
         },
         links={
-            "joint": ss.Spring(between=("motor", "carriage"), stiffness=joint),
-            "belt": ss.Spring(between=("carriage", "table"), stiffness=1e5, damping=1.0),
+            "joint": ss.machine.Spring(between=("motor", "carriage"), stiffness=joint),
+            "belt": ss.machine.Spring(between=("carriage", "table"), stiffness=1e5, damping=1.0),
         },
-        contacts={"guide": surface("carriage", ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.1, v_stribeck=1e-3))},
-        drive=ss.PositionPD(velocity=1e-3, body="motor", kp=1e4, kd=30.0, delay=1e-3),
+        contacts={
+            "guide": surface("carriage", ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.1, v_stribeck=1e-3))
+        },
+        drive=ss.machine.PositionPD(velocity=1e-3, body="motor", kp=1e4, kd=30.0, delay=1e-3),
     )
 
 
@@ -131,7 +137,7 @@ def late_servo(joint):
 def test_roots_under_a_delay_that_fail_are_found_by_newton_with_many_digits(joint, monkeypatch):
     """As they are with the joint rigid; where nothing else was tried they were withheld."""
     machine = late_servo(joint)
-    right = checked(ss.joined(machine, "joint"))
+    right = checked(ss.machine.joined(machine, "joint"))
     assert right.decided
     found = checked(machine)
     assert found.refined
@@ -145,10 +151,10 @@ def test_roots_under_a_delay_that_fail_are_found_by_newton_with_many_digits(join
 
 def test_roots_under_a_delay_are_counted_by_the_argument(monkeypatch):
     late = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1.0)},
-        links={"oil": ss.Spring(between=("ground", "block"), damping=1.0)},
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"oil": ss.machine.Spring(between=("ground", "block"), damping=1.0)},
         contacts={"guide": surface("block", rate_state(0.5, -0.3, 1.0))},
-        drive=ss.PositionPD(velocity=1.0, body="block", kp=4.0, kd=1.0, delay=1.0),
+        drive=ss.machine.PositionPD(velocity=1.0, body="block", kp=4.0, kd=1.0, delay=1.0),
     )
     found = checked(late)
     assert found.decided

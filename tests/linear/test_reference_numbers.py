@@ -32,30 +32,38 @@ def cancellation(f, f1, r, mu, m, B0, B1, B2):
 def general_rig(row):
     """A rate-and-state rig with exactly the f, f1, r, λ, λ1 of a row: σ = 1, v0 = 1."""
     mu = row["lam1"] * row["f1"]
-    friction = ss.RateState(
+    friction = ss.laws.RateState(
         a=row["f"],
         b=row["f"] * (1 + row["lam"]),
         d_c=1 / row["r"],
         mu_ref=mu,
         v_ref=1.0,
-        normal_memory=ss.LinkerDieterich(alpha=mu - row["f1"]),
+        normal_memory=ss.laws.LinkerDieterich(alpha=mu - row["f1"]),
     )
-    contact = ss.Linear(steady_normal_stress=1.0, b0=row["B0"], b1=row["B1"], b2=row["B2"], b3=row["B3"])
-    return ss.Slider(friction=friction, contact=contact, stiffness=row["k_cr"], mass=row["m"], drive=ss.Steady(1.0))
+    contact = ss.laws.LinearNormalStress(
+        steady_normal_stress=1.0, b0=row["B0"], b1=row["B1"], b2=row["B2"], b3=row["B3"]
+    )
+    return ss.Slider(
+        friction=friction, contact=contact, stiffness=row["k_cr"], mass=row["m"], drive=ss.machine.SteadyDrive(1.0)
+    )
 
 
 def inclined_rig(row):
-    friction = ss.RateState(
+    friction = ss.laws.RateState(
         a=row["A"],
         b=row["B"],
         d_c=row["L"],
         mu_ref=row["mu_ss"],
         v_ref=row["v0"],
-        normal_memory=ss.LinkerDieterich(alpha=row["alpha"]),
+        normal_memory=ss.laws.LinkerDieterich(alpha=row["alpha"]),
     )
-    contact = ss.InclinedSpring(steady_normal_stress=row["sigma_ss"], angle=np.radians(row["psi_deg"]))
+    contact = ss.laws.InclinedSpring(steady_normal_stress=row["sigma_ss"], angle=np.radians(row["psi_deg"]))
     return ss.Slider(
-        friction=friction, contact=contact, stiffness=row["k_cr"], mass=row["m"], drive=ss.Steady(row["v0"])
+        friction=friction,
+        contact=contact,
+        stiffness=row["k_cr"],
+        mass=row["m"],
+        drive=ss.machine.SteadyDrive(row["v0"]),
     )
 
 

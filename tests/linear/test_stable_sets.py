@@ -28,7 +28,7 @@ def test_both_routes_agree_on_random_rigs(friction, contact, inertia):
     rng = np.random.default_rng(7)
     start = rig(
         friction=friction, contact=contact, mass=1e9 if inertia else 0.0, damping=1e9, radiation_damping=1e9,
-        drive=ss.PD(V0, kp=1e9, kd=1e9),
+        drive=ss.machine.PD(V0, kp=1e9, kd=1e9),
     )  # fmt: skip
     names = [n for n, a in start.parameters().items() if a.value and not a.role.gauge and a.role.unit != "rad"]
     vary = {n: start.value(n) * 10 ** rng.uniform(-0.3, 0.3, 40) for n in names if n != "contact.rod_length"}
@@ -56,8 +56,10 @@ def test_both_routes_agree_on_random_rigs(friction, contact, inertia):
 @pytest.mark.parametrize("contact", CONTACTS, ids=lambda law: law.name)
 @pytest.mark.parametrize("mass", [0.0, 1e10])
 def test_jacobian_has_the_roots_of_the_polynomial(contact, mass):
-    states = [ss.State(b=0.01, d_c=1e-6), ss.State(b=0.008, d_c=5e-6)]
-    friction = ss.RateState(a=A, states=states, mu_ref=0.6, v_ref=V0, normal_memory=ss.LinkerDieterich(alpha=0.2))
+    states = [ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=0.008, d_c=5e-6)]
+    friction = ss.laws.RateState(
+        a=A, states=states, mu_ref=0.6, v_ref=V0, normal_memory=ss.laws.LinkerDieterich(alpha=0.2)
+    )
     r = rig(friction=friction, contact=contact, mass=mass)
     found = np.sort_complex(np.linalg.eigvals(jacobian(r)))
     np.testing.assert_allclose(np.sort_complex(ss.eigenvalues(r)), found, rtol=1e-6, atol=1e-9 * V0 / D_C)
@@ -105,7 +107,7 @@ def test_reversed_inequality():
 
 @pytest.mark.parametrize(("mass", "b0"), [(1e9, -1e10), (0.0, -1e8)])
 def test_negative_effective_mass_is_ill_posed(mass, b0):
-    r = rig(contact=ss.Linear(steady_normal_stress=SIGMA, b0=b0), mass=mass, stiffness=1e11)
+    r = rig(contact=ss.laws.LinearNormalStress(steady_normal_stress=SIGMA, b0=b0), mass=mass, stiffness=1e11)
     assert ss.growth_rate(r) == math.inf
     assert not ss.analyze(r).stable
     assert np.all(np.isnan(ss.stable_stiffness(r)))
@@ -115,7 +117,7 @@ def test_negative_effective_mass_is_ill_posed(mass, b0):
 def test_quasistatic_with_too_much_lift_is_ill_posed():
     """a2 = f + f1 B1 <= 0 without mass: any small lag grows at once, even where all roots lie left."""
     f = A * SIGMA / V0
-    r = rig(contact=ss.Linear(steady_normal_stress=SIGMA, b1=-2 * f / 0.7), stiffness=1e11)
+    r = rig(contact=ss.laws.LinearNormalStress(steady_normal_stress=SIGMA, b1=-2 * f / 0.7), stiffness=1e11)
     assert ss.growth_rate(r) == math.inf
     assert not ss.analyze(r).stable
 
@@ -124,8 +126,8 @@ def test_quasistatic_with_too_much_lift_is_ill_posed():
     "name", ["contact.angle", "slider.mass", "slider.radiation_damping", "friction.normal_memory.alpha"]
 )
 def test_small_terms_vanish_at_first_order(name):
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.4))
-    full = rig(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=0.3))
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.4))
+    full = rig(friction=friction, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=0.3))
     size = {"contact.angle": 1.0, "slider.mass": 1e10, "slider.radiation_damping": 1e9}.get(name, 1.0)
     small = size * np.array([0.0, 1e-5, 2e-5])
     k = ss.critical_stiffness(full, {name: small})
@@ -149,8 +151,8 @@ def test_eigenvalues_as_mass_vanishes():
 def test_results_do_not_depend_on_the_units(kilogram, metre, second):
     """Rescaling mass, length and time in every parameter rescales every answer."""
     r = rig(
-        friction=rate_state(normal_memory=ss.LinkerDieterich(alpha=0.4)),
-        contact=ss.InclinedSpring(preload=SIGMA, angle=-0.4), mass=1e9, damping=1e8, radiation_damping=1e8,
+        friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.4)),
+        contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.4), mass=1e9, damping=1e8, radiation_damping=1e8,
     )  # fmt: skip
     base = 10.0 ** np.array([kilogram, metre, second])
 
@@ -188,5 +190,5 @@ def test_the_model_is_at_rest_in_its_own_steady_state(contact):
 
 def test_pid_without_integral_gain_is_pd():
     gains = {"kp": 1e9, "kd": 1e9}
-    pid, pd = (rig(stiffness=None, mass=1e9, drive=law(V0, **gains)) for law in (ss.PID, ss.PD))
+    pid, pd = (rig(stiffness=None, mass=1e9, drive=law(V0, **gains)) for law in (ss.machine.PID, ss.machine.PD))
     np.testing.assert_array_equal(ss.eigenvalues(pid), ss.eigenvalues(pd))

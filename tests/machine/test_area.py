@@ -71,14 +71,14 @@ def test_analysis(rig):
 
 
 def test_absence_of_steady_sliding(rig):
-    lifted = replace(rig, contact=ss.Lift(preload=1e6, lift=2e12, v_ref=1e-9))
+    lifted = replace(rig, contact=ss.laws.Lift(preload=1e6, lift=2e12, v_ref=1e-9))
     reason = ss.analyze(lifted).reason
     assert "lift-off" in reason
     assert not PER_AREA.search(reason)
 
 
 def test_a_run(rig, tmp_path):
-    run = ss.simulate(rig, ss.VelocityStep(at=1.0, to=2e-6), until=5.0)
+    run = ss.simulate(rig, ss.protocol.VelocityStep(at=1.0, to=2e-6), until=5.0)
     plain = replace(run, rig=replace(rig, area=None))
     assert "normal force" in run.summary()
     assert not PER_AREA.search(run.summary())
@@ -147,15 +147,15 @@ def test_fits_and_predictions(rig):
     assert stiff["total"] == pytest.approx(stiff["value"] * AREA)
     assert stiff["total_unit"] == "N/m"
     assert "total" not in plain.to_dict()["parameters"]["slider.stiffness"]
-    draws = ss.bootstrap(found, 32)
+    draws = ss.experiments.bootstrap(found, 32)
     prediction = ss.predict(rig, found)
     asked = prediction.to_dict()
     assert asked["forces"]["critical_stiffness"] == pytest.approx([AREA * x for x in asked["critical_stiffness"]])
-    precise = ss.precision(replace(lab.rig(), area=AREA), lab.STEP, until=150.0)
+    precise = ss.experiments.precision(replace(lab.rig(), area=AREA), lab.STEP, until=150.0)
     for result in (
         found["slider.stiffness"],
         draws,
-        ss.profile(found, "slider.stiffness", count=9),
+        ss.experiments.profile(found, "slider.stiffness", count=9),
         prediction,
         precise,
     ):

@@ -88,14 +88,15 @@ def test_shafts_carry_torques_and_links_say_what_they_carry():
 def test_what_is_zero_is_searched_around_a_size_of_its_own():
     """Mass and damping that are not there: of forces, the size that stresses with area one have."""
     slider = ss.Slider(
-        friction=ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6), contact=ss.Constant(preload=5e6),
-        stiffness=1e9, drive=ss.Steady(1e-6),
+        friction=ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6),
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        stiffness=1e9, drive=ss.machine.SteadyDrive(1e-6),
     )  # fmt: skip
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody()},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=1e9)},
-        contacts={"slide": ss.Surface(body="block", friction=slider.friction, contact=slider.contact)},
-        drive=ss.Pull(velocity=1e-6),
+        bodies={"block": ss.machine.SlidingBody()},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=1e9)},
+        contacts={"slide": ss.machine.Surface(body="block", friction=slider.friction, contact=slider.contact)},
+        drive=ss.machine.Pull(velocity=1e-6),
     )
     for mine, other in (("slider.damping", "links.spring.damping"), ("slider.mass", "bodies.block.mass")):
         one, two = ss.boundary(slider, mine), ss.boundary(machine, other)
@@ -105,23 +106,25 @@ def test_what_is_zero_is_searched_around_a_size_of_its_own():
 
 def test_constructors_take_text_in_the_units_of_their_user():
     """Forces of a contact without area; with one, forces and stresses alike; sliders with an area too."""
-    rock = ss.RateState(a=0.01, b=0.015, d_c="5 um", mu_ref=0.6, v_ref="1 um/s")
+    rock = ss.laws.RateState(a=0.01, b=0.015, d_c="5 um", mu_ref=0.6, v_ref="1 um/s")
 
     def surface(preload, **area):
-        return ss.Surface(body="block", friction=rock, contact=ss.Constant(preload=preload), **area)
+        return ss.machine.Surface(
+            body="block", friction=rock, contact=ss.laws.ConstantNormalStress(preload=preload), **area
+        )
 
     assert surface("3 kN") == surface(3e3)
     assert surface("3 kN", area="50 cm^2") == surface("600 kPa", area="50 cm^2") == surface(6e5, area=50e-4)
     assert type(surface("3 kN").contact.preload) is float
-    soft = ss.Surface(
-        body="pad", friction=rock, contact=ss.Compliant(normal_stiffness="8 N/um", normal_damping="2 N s/m")
+    soft = ss.machine.Surface(
+        body="pad", friction=rock, contact=ss.laws.Compliant(normal_stiffness="8 N/um", normal_damping="2 N s/m")
     )
     assert (soft.contact.normal_stiffness, soft.contact.normal_damping) == (8e6, 2.0)
 
     def slider(**further):
         return ss.Slider(
-            friction=rock, contact=ss.Constant(preload="600 N"), mass="8 kg", damping="5 N s/m",
-            drive=ss.PD("20 um/s", kp="0.6 N/um"), **further,
+            friction=rock, contact=ss.laws.ConstantNormalStress(preload="600 N"), mass="8 kg", damping="5 N s/m",
+            drive=ss.machine.PD("20 um/s", kp="0.6 N/um"), **further,
         )  # fmt: skip
 
     rig = slider(area="40 cm^2")
@@ -138,6 +141,6 @@ def test_constructors_take_text_in_the_units_of_their_user():
 
 
 def test_a_law_that_waits_for_its_area_says_its_numbers():
-    waiting = ss.Constant(preload="3 kN")
+    waiting = ss.laws.ConstantNormalStress(preload="3 kN")
     assert repr(waiting) == "Constant(preload=3000.0)"
     assert replace(waiting, preload="4 kN").preload == 4e3

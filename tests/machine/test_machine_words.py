@@ -74,7 +74,7 @@ def test_what_turns_is_in_angles():
     telescope = ss.read_rig("examples/machines/telescope.toml")
     units = {one.name: one.unit for one in operating_point(telescope).model.variables}
     assert units["integral"] == "rad s"
-    slides = replace(two_mass(), drive=ss.PositionPID(velocity=1.0, body="motor", kp=1.0, ki=0.1))
+    slides = replace(two_mass(), drive=ss.machine.PositionPID(velocity=1.0, body="motor", kp=1.0, ki=0.1))
     assert {one.name: one.unit for one in operating_point(slides).model.variables}["integral"] == "m s"
     assert ss.simulate(telescope, until=1e-3).units["disturbance"] == "N m"
 

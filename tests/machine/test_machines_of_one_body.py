@@ -6,54 +6,57 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from steadyslip.model import operating_point
 from steadyslip.model.linearisation import characteristic_coefficients
+from steadyslip.model.point import operating_point
 
 V = 1e-6
 
 FRICTIONS = {
-    "slip": ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=V),
-    "aging, Linker-Dieterich, regularised": ss.RateState(
-        a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=V, regularised=True, evolution=ss.Aging(),
-        normal_memory=ss.LinkerDieterich(alpha=0.3),
+    "slip": ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=V),
+    "aging, Linker-Dieterich, regularised": ss.laws.RateState(
+        a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=V, regularised=True, evolution=ss.laws.Aging(),
+        normal_memory=ss.laws.LinkerDieterich(alpha=0.3),
     ),
-    "Nagata": ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=V, evolution=ss.Nagata(c_nagata=2.0)),
-    "two states": ss.RateState(
-        a=0.01, mu_ref=0.6, v_ref=V, states=(ss.State(b=0.01, d_c=1e-6), ss.State(b=0.006, d_c=2e-5))
+    "Nagata": ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=V, evolution=ss.laws.Nagata(c_nagata=2.0)),
+    "two states": ss.laws.RateState(
+        a=0.01, mu_ref=0.6, v_ref=V, states=(ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=0.006, d_c=2e-5))
     ),
-    "LuGre": ss.LuGre(
+    "LuGre": ss.laws.LuGre(
         mu_coulomb=0.5, mu_static=0.6, v_stribeck=1e-5, bristle_stiffness=1e5, bristle_damping=1.0, viscous=10.0
     ),
 }  # fmt: skip
 
 CONTACTS = {
-    "constant": ss.Constant(preload=5e6),
-    "inclined": ss.InclinedSpring(preload=5e6, angle=-0.3),
-    "self-energising": ss.SelfEnergising(preload=5e6, gain=0.2),
-    "lift": ss.Lift(preload=5e6, lift=1e11, v_ref=2e-6),
-    "linear": ss.Linear(preload=5e6, b0=1e3, b1=1e9, b2=0.2, b3=-1e8),
+    "constant": ss.laws.ConstantNormalStress(preload=5e6),
+    "inclined": ss.laws.InclinedSpring(preload=5e6, angle=-0.3),
+    "self-energising": ss.laws.SelfEnergising(preload=5e6, gain=0.2),
+    "lift": ss.laws.Lift(preload=5e6, lift=1e11, v_ref=2e-6),
+    "linear": ss.laws.LinearNormalStress(preload=5e6, b0=1e3, b1=1e9, b2=0.2, b3=-1e8),
 }
 
 DRIVES = {
-    "pull": (ss.Steady(V), ss.Pull(velocity=V)),
-    "pd": (ss.PD(V, kp=2e8, kd=1e9), ss.PositionPD(velocity=V, body="block", kp=2e8, kd=1e9)),
-    "pid": (ss.PID(V, kp=2e8, kd=1e9, ki=1e6), ss.PositionPID(velocity=V, body="block", kp=2e8, kd=1e9, ki=1e6)),
+    "pull": (ss.machine.SteadyDrive(V), ss.machine.Pull(velocity=V)),
+    "pd": (ss.machine.PD(V, kp=2e8, kd=1e9), ss.machine.PositionPD(velocity=V, body="block", kp=2e8, kd=1e9)),
+    "pid": (
+        ss.machine.PID(V, kp=2e8, kd=1e9, ki=1e6),
+        ss.machine.PositionPID(velocity=V, body="block", kp=2e8, kd=1e9, ki=1e6),
+    ),
 }
 
 
 LATE = {
     "late pd": (
-        ss.PD(V, kp=2e8, kd=1e9, delay=0.3),
-        ss.PositionPD(velocity=V, body="block", kp=2e8, kd=1e9, delay=0.3),
+        ss.machine.PD(V, kp=2e8, kd=1e9, delay=0.3),
+        ss.machine.PositionPD(velocity=V, body="block", kp=2e8, kd=1e9, delay=0.3),
     ),
     "late pid": (
-        ss.PID(V, kp=2e8, kd=1e9, ki=1e6, delay=0.3),
-        ss.PositionPID(velocity=V, body="block", kp=2e8, kd=1e9, ki=1e6, delay=0.3),
+        ss.machine.PID(V, kp=2e8, kd=1e9, ki=1e6, delay=0.3),
+        ss.machine.PositionPID(velocity=V, body="block", kp=2e8, kd=1e9, ki=1e6, delay=0.3),
     ),
 }
 
-LATE_FRICTION = ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=V, viscous=1e4, lag=0.05)
-WET = ss.PoreFluid(preload=5e6, suction=2e5, drainage=0.1, slip_distance=7e-6, v_ref=V)
+LATE_FRICTION = ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=V, viscous=1e4, lag=0.05)
+WET = ss.laws.PoreFluid(preload=5e6, suction=2e5, drainage=0.1, slip_distance=7e-6, v_ref=V)
 
 
 def pair(friction, contact, drive, idle):
@@ -61,12 +64,12 @@ def pair(friction, contact, drive, idle):
     slider = ss.Slider(
         friction=friction, contact=contact, stiffness=1e9, mass=1e4, damping=1e8, radiation_damping=2e8, drive=drive[0]
     )
-    bodies = {"block": ss.SlidingBody(mass=1e4)} | ({"idle": ss.SlidingBody()} if idle else {})
+    bodies = {"block": ss.machine.SlidingBody(mass=1e4)} | ({"idle": ss.machine.SlidingBody()} if idle else {})
     links = {
-        "spring": ss.Spring(between=("drive", "block"), stiffness=1e9, damping=1e8),
-        "guide": ss.Spring(between=("ground", "block"), damping=2e8),
-    } | ({"hook": ss.Spring(between=("block", "idle"), stiffness=3e7)} if idle else {})
-    contacts = {"slide": ss.Surface(body="block", friction=friction, contact=contact)}
+        "spring": ss.machine.Spring(between=("drive", "block"), stiffness=1e9, damping=1e8),
+        "guide": ss.machine.Spring(between=("ground", "block"), damping=2e8),
+    } | ({"hook": ss.machine.Spring(between=("block", "idle"), stiffness=3e7)} if idle else {})
+    contacts = {"slide": ss.machine.Surface(body="block", friction=friction, contact=contact)}
     return slider, ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=drive[1])
 
 
@@ -194,7 +197,9 @@ def test_pore_fluid_under_a_slider_follows_in_motion():
     slider, machine = pair(FRICTIONS["slip"], WET, DRIVES["pull"], False)
     times = np.linspace(0.0, 60.0, 31)
     for a, b in ((slider, machine), (replace(slider, mass=0.0), machine.with_values({"bodies.block.mass": 0.0}))):
-        one, two = (ss.simulate(rig, ss.VelocityStep(at=5.0, to=1.5 * V), times=times, until=60.0) for rig in (a, b))
+        one, two = (
+            ss.simulate(rig, ss.protocol.VelocityStep(at=5.0, to=1.5 * V), times=times, until=60.0) for rig in (a, b)
+        )
         assert one["v"] == pytest.approx(two["block.v"], rel=1e-12)
         assert one["pore_pressure"] == pytest.approx(two["slide.pore_pressure"], rel=1e-9, abs=1e-6)
         assert np.ptp(one["pore_pressure"]) > 1e4
@@ -219,11 +224,12 @@ def test_what_a_delay_does_not_offer_is_said(kind):
 
 def test_stable_stiffnesses_of_late_friction_are_the_windows_of_theory():
     """Theory 10: m s² + (c + S e^(−sδ)) s + k, boundaries m β² − S β sin βδ where cos βδ = −c/S; m = δ = 1."""
-    law = ss.CoulombStribeck(mu_coulomb=0.1, mu_static=0.5, v_stribeck=1.0, lag=1.0)
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.1, mu_static=0.5, v_stribeck=1.0, lag=1.0)
     slope = -2.0 * 0.4 * np.exp(-1.0)  # of the curve at v = 1
     slider = ss.Slider(
-        friction=law, contact=ss.Constant(preload=1.0), stiffness=5.0, mass=1.0, radiation_damping=0.05,
-        drive=ss.Steady(1.0),
+        friction=law, contact=ss.laws.ConstantNormalStress(preload=1.0), stiffness=5.0, mass=1.0,
+        radiation_damping=0.05,
+        drive=ss.machine.SteadyDrive(1.0),
     )  # fmt: skip
     found = ss.stable_stiffness(slider)
     turns = np.arccos(-0.05 / slope)

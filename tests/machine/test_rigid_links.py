@@ -83,17 +83,17 @@ def chain(drive=None, **contacts):
     law = rate_state(0.5, -0.3, 1.0)
     return ss.Machine(
         bodies={
-            "motor": ss.RotatingBody(inertia=2.0), "wheel": ss.RotatingBody(inertia=0.5, torque=0.1),
-            "table": ss.SlidingBody(mass=5.0), "plate": ss.SlidingBody(mass=1.0),
+            "motor": ss.machine.RotatingBody(inertia=2.0), "wheel": ss.machine.RotatingBody(inertia=0.5, torque=0.1),
+            "table": ss.machine.SlidingBody(mass=5.0), "plate": ss.machine.SlidingBody(mass=1.0),
         },
         links={
-            "gear": ss.Shaft(between=("motor", "wheel"), gear=0.5, stiffness=70.0, damping=0.2),
-            "screw": ss.Screw(between=("wheel", "table"), lead=2.0, stiffness=30.0, damping=0.1),
-            "clamp": ss.Spring(between=("table", "plate"), stiffness=20.0, damping=0.3),
-            "stop": ss.Spring(between=("ground", "plate"), damping=0.2),
+            "gear": ss.machine.Shaft(between=("motor", "wheel"), gear=0.5, stiffness=70.0, damping=0.2),
+            "screw": ss.machine.Screw(between=("wheel", "table"), lead=2.0, stiffness=30.0, damping=0.1),
+            "clamp": ss.machine.Spring(between=("table", "plate"), stiffness=20.0, damping=0.3),
+            "stop": ss.machine.Spring(between=("ground", "plate"), damping=0.2),
         },
         contacts={"guide": surface("plate", law), **contacts},
-        drive=drive or ss.RotaryPD(velocity=1.0, body="motor", measured="table", kp=40.0, kd=1.0),
+        drive=drive or ss.machine.RotaryPD(velocity=1.0, body="motor", measured="table", kp=40.0, kd=1.0),
     )  # fmt: skip
 
 
@@ -107,11 +107,17 @@ def chain(drive=None, **contacts):
 )
 def test_joined_bodies_move_as_those_of_a_link_ever_stiffer(name, acts):
     """Ends that turn, that slide and one of each, the drive on either side; k is 1e10 times the others'."""
-    drive = None if acts == "motor" else ss.PositionPD(velocity=1.0, body="table", measured="motor", kp=40.0, kd=1.0)
-    machine = chain(drive, brake=surface("table", ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.2, v_stribeck=1.0)))
+    drive = (
+        None
+        if acts == "motor"
+        else ss.machine.PositionPD(velocity=1.0, body="table", measured="motor", kp=40.0, kd=1.0)
+    )
+    machine = chain(
+        drive, brake=surface("table", ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.2, v_stribeck=1.0))
+    )
     if name == "screw" and acts == "table":
         machine = replace(machine, links=dict(machine.links) | {"gear": replace(machine.links["gear"], damping=0.0)})
-    one = ss.joined(machine, f"links.{name}")
+    one = ss.machine.joined(machine, f"links.{name}")
     assert len(one.bodies) == 3
     count = int(np.sum(~np.isnan(ss.eigenvalues(one))))
     stiff = machine.with_values({f"links.{name}.stiffness": 1e12})
@@ -121,9 +127,9 @@ def test_joined_bodies_move_as_those_of_a_link_ever_stiffer(name, acts):
 def test_what_cannot_be_joined_says_why(tmp_path):
     machine = chain()
     with pytest.raises(ss.UnknownNameError, match="screws"):
-        ss.joined(machine, "screws")
+        ss.machine.joined(machine, "screws")
     with pytest.raises(ss.NotAvailable, match=r"links\.stop cannot be rigid: it ends at the ground"):
-        ss.joined(machine, "stop")
+        ss.machine.joined(machine, "stop")
     path = tmp_path / "axis.toml"
     path.write_text(AXIS.format(stiffness=1e5).replace("stiffness = 900.0", 'stiffness = "rigid"'), encoding="utf-8")
     with pytest.raises(ss.RigFileError, match=r"links\.coupling cannot be rigid: it ends at the drive"):

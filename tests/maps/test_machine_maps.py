@@ -18,7 +18,8 @@ OVER = {"drive.kp": GAINS, "links.screw.stiffness": SCREWS}
 
 def of_gain(*names):
     kinds = {
-        "edge": ss.Edge, "stable_values": ss.StableValues, "safety_factor": ss.SafetyFactor, "margin": ss.LogMargin,
+        "edge": ss.maps.Edge, "stable_values": ss.maps.StableValues, "safety_factor": ss.maps.SafetyFactor,
+        "margin": ss.maps.LogMargin,
     }  # fmt: skip
     return [kinds[name](along="drive.kp") for name in names]
 
@@ -52,7 +53,7 @@ def test_a_machine_of_one_body_is_mapped_as_its_slider(seed, tmp_path):
     block, machine = same_block(seed)
     own, names = "links.spring.stiffness", ("safety_factor", "margin")
     k = block.stiffness * np.array([0.1, 1.0, 7.0])
-    kinds = [ss.SafetyFactor(along=own), ss.LogMargin(along=own), ss.Edge(along=own)]
+    kinds = [ss.maps.SafetyFactor(along=own), ss.maps.LogMargin(along=own), ss.maps.Edge(along=own)]
     found = made(ss.Map(machine, {own: k}, [*kinds, "status", "growth_rate"]), tmp_path).dataset
     wanted = made(
         ss.Map(block, {"stiffness": k}, [*names, "critical_stiffness", "status", "growth_rate"]), tmp_path, "block.zarr"
@@ -101,9 +102,9 @@ edge = {{ along = "{name}" }}
     [
         ("critical_stiffness", "the one stiffness of a slider"), ("stable_stiffness", "the one stiffness of a slider"),
         ("edge", r"map.edge.along: missing; .* such as 'links.screw.stiffness'"),
-        (ss.Edge(along="drive.velocity"), "do not depend on drive.velocity linearly"),
-        (ss.LogMargin(along="drive.kpp"), "drive.kp"),
-        (ss.SafetyFactor(along="drive.delay"), "drive.delay has no positive value"),
+        (ss.maps.Edge(along="drive.velocity"), "do not depend on drive.velocity linearly"),
+        (ss.maps.LogMargin(along="drive.kpp"), "drive.kp"),
+        (ss.maps.SafetyFactor(along="drive.delay"), "drive.delay has no positive value"),
     ],
 )  # fmt: skip
 def test_questions_that_a_machine_does_not_answer_are_refused(compute, words):
@@ -113,7 +114,7 @@ def test_questions_that_a_machine_does_not_answer_are_refused(compute, words):
 
 def test_simulated_results_are_those_of_each_contact(tmp_path):
     machine = two_blocks(2.0, -0.4, 0.5)
-    step = ss.DisturbanceStep(at=0.1, by=0.2, on="one")
+    step = ss.protocol.DisturbanceStep(at=0.1, by=0.2, on="one")
     protocol = ss.Protocol(pieces=[step], until=0.5)
     over = {"links.first.stiffness": [1.5, 2.0], "protocol.pieces.1.by": [0.2, 0.4]}
     plan = ss.Map(machine, over, "events", protocol=protocol)
@@ -131,13 +132,13 @@ def test_simulated_results_are_those_of_each_contact(tmp_path):
 def test_shares_are_those_of_what_a_formula_says():
     """A mass on a dashpot and a stiff enough spring halves by −c/2m: damping decides all of it, stiffness nothing."""
     machine = ss.Machine(
-        bodies={"mass": ss.SlidingBody(mass=2.0)},
-        links={"pull": ss.Spring(between=("drive", "mass"), stiffness=100.0, damping=0.5)},
-        contacts={"base": ss.Surface(
-            body="mass", friction=ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1.0),
-            contact=ss.Constant(preload=1.0),
+        bodies={"mass": ss.machine.SlidingBody(mass=2.0)},
+        links={"pull": ss.machine.Spring(between=("drive", "mass"), stiffness=100.0, damping=0.5)},
+        contacts={"base": ss.machine.Surface(
+            body="mass", friction=ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1.0),
+            contact=ss.laws.ConstantNormalStress(preload=1.0),
         )},
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )  # fmt: skip
     over = {"links.pull.damping": (0.4, 1.6, "log"), "links.pull.stiffness": (50.0, 200.0)}
     found = ss.sensitivity(machine, over, points=256)

@@ -121,13 +121,13 @@ def test_what_is_wrong_on_a_worker_is_said(tmp_path):
     def breaks(rig):
         raise ZeroDivisionError("no such luck")
 
-    plan = ss.Map(attack.rig(), {"stiffness": ss.Grid(1e9, 2e9, 4)}, [breaks], chunk=1)
+    plan = ss.Map(attack.rig(), {"stiffness": ss.maps.Grid(1e9, 2e9, 4)}, [breaks], chunk=1)
     with pytest.raises(ss.NotAvailable, match=r"(?s)breaks.*ZeroDivisionError: no such luck.*stiffness = .*0 of 4"):
         ss.run_map(plan, tmp_path / "map.zarr", cluster="local", workers=1)
 
 
 def test_no_scheduler_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr("steadyslip.maps.work.cluster.CONNECT", 0.5)
-    plan = ss.Map(attack.rig(), {"stiffness": ss.Grid(1e9, 2e9, 4)}, ["status"])
+    plan = ss.Map(attack.rig(), {"stiffness": ss.maps.Grid(1e9, 2e9, 4)}, ["status"])
     with pytest.raises(ss.NotAvailable, match=r"no Dask scheduler at 'tcp://127\.0\.0\.1:9'"):
         ss.run_map(plan, tmp_path / "map.zarr", cluster="tcp://127.0.0.1:9")

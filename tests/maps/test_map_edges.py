@@ -17,7 +17,7 @@ from machines import at_random
 def test_a_refined_edge_is_that_of_the_fine_grid(tmp_path_factory, columns, rows, rounds):
     """Cells of the fine grid whose corners differ are all found, with the same values; few points are computed."""
     folder = tmp_path_factory.mktemp("refined")
-    angles, stiffness = (lambda n: ss.Grid("-50 deg", "70 deg", n)), (lambda n: ss.Grid(1e9, 1e11, n, "log"))
+    angles, stiffness = (lambda n: ss.maps.Grid("-50 deg", "70 deg", n)), (lambda n: ss.maps.Grid(1e9, 1e11, n, "log"))
     base = ss.Map(rig(), {"angle": angles(columns), "stiffness": stiffness(rows)}, ["status", "growth_rate"])
     found = ss.refine(made(base, folder), rounds)
     fine = ss.Map(
@@ -43,8 +43,11 @@ def test_an_edge_is_followed_through_a_side_whose_ends_agree(tmp_path):
         return y - 0.9 - 0.35 * np.exp(-(((x - 0.5) / 0.13) ** 2))
 
     def grid(n):
-        over = {"stiffness": ss.Grid(1e9, 1e10, n, "log"), "friction.d_c": ss.Grid(1e-6, 1e-4, 2 * n - 1, "log")}
-        return ss.Map(rig(), over, [ss.measure(above, arrays=True)])
+        over = {
+            "stiffness": ss.maps.Grid(1e9, 1e10, n, "log"),
+            "friction.d_c": ss.maps.Grid(1e-6, 1e-4, 2 * n - 1, "log"),
+        }
+        return ss.Map(rig(), over, [ss.maps.measure(above, arrays=True)])
 
     found = ss.refine(made(grid(2), tmp_path), 4, of="above", level=0.0, compute=grid(2).compute)
     fine = made(grid(17), tmp_path, "fine.zarr").dataset["above"].values > 0
@@ -55,7 +58,7 @@ def test_an_edge_is_followed_through_a_side_whose_ends_agree(tmp_path):
 
 def test_a_refined_edge_is_the_critical_stiffness(tmp_path):
     base = ss.Map(
-        rig(), {"angle": ss.Grid("-40 deg", "60 deg", 6), "stiffness": STIFFNESSES, "friction.b": [0.016, 0.018]},
+        rig(), {"angle": ss.maps.Grid("-40 deg", "60 deg", 6), "stiffness": STIFFNESSES, "friction.b": [0.016, 0.018]},
         ["growth_rate"],
     )  # fmt: skip
     found = ss.refine(made(base, tmp_path), 5)
@@ -75,7 +78,7 @@ def test_a_refined_edge_is_the_critical_stiffness(tmp_path):
 
 
 def test_what_cannot_be_refined_is_said(tmp_path):
-    sampled = ss.Map(rig(), samples=ss.Samples(RANGES, 16), compute=["status"])
+    sampled = ss.Map(rig(), samples=ss.maps.Samples(RANGES, 16), compute=["status"])
     with pytest.raises(ss.NotAvailable, match="samples have no neighbours"):
         ss.refine(made(sampled, tmp_path, "a.zarr"))
     listed = ss.Map(rig(), {"angle": [0.1, 0.2]}, ["status", "critical_stiffness"])
@@ -86,7 +89,9 @@ def test_what_cannot_be_refined_is_said(tmp_path):
         ss.refine(listed_found, of="critical_stiffness")
     with pytest.raises(ss.ParameterError, match="rounds"):
         ss.refine(listed_found, 0)
-    flat = ss.Map(rig(), {"stiffness": ss.Grid(1e12, 2e12, 3)}, ["status", ss.measure(lambda one: 1.0, name="one")])
+    flat = ss.Map(
+        rig(), {"stiffness": ss.maps.Grid(1e12, 2e12, 3)}, ["status", ss.maps.measure(lambda one: 1.0, name="one")]
+    )
     with pytest.raises(ss.NotAvailable, match="computes the function 'one'"):
         ss.refine(made(flat, tmp_path, "c.zarr"))
     with pytest.raises(ss.NotAvailable, match="no edge to refine"):
@@ -98,7 +103,7 @@ def test_what_cannot_be_refined_is_said(tmp_path):
 
 def test_sobol_indices_of_a_known_product():
     """k_cr = (b − a) σ/d_c with everything uniform: means and variances by hand."""
-    base = rig(contact=ss.Constant(preload=5e6))
+    base = rig(contact=ss.laws.ConstantNormalStress(preload=5e6))
     a, b, d = (0.010, 0.012), (0.016, 0.019), (1e-6, 2e-6)
     found = ss.sensitivity(base, {"friction.a": a, "friction.b": b, "friction.d_c": d}, "critical_stiffness",
                            points=8192)  # fmt: skip
@@ -120,7 +125,7 @@ def test_sobol_indices_of_a_known_product():
 
 def test_the_margin_is_additive_where_its_parts_multiply():
     """ln(k/k_cr) = ln k + ln d_c − ln(b − a) − ln σ: shares alone are all there is, and add up to one."""
-    base = rig(contact=ss.Constant(preload=5e6))
+    base = rig(contact=ss.laws.ConstantNormalStress(preload=5e6))
     over = {"stiffness": (1e9, 1e11, "log"), "friction.d_c": (1e-6, 1e-5, "log")}
     found = ss.sensitivity(base, over, ["margin"], points=4096)
     expected = np.array([np.log(100) ** 2, np.log(10) ** 2])
@@ -155,9 +160,9 @@ def test_what_has_no_sensitivity_is_said():
             ss.sensitivity(rig(), **arguments)
     flat = {"friction.mu_ref": (0.5, 0.6), "drive.velocity": (1e-6, 2e-6)}
     with pytest.raises(ss.NotAvailable, match="does not depend on"):
-        ss.sensitivity(rig(contact=ss.Constant(preload=5e6)), flat, "critical_stiffness", points=64)
+        ss.sensitivity(rig(contact=ss.laws.ConstantNormalStress(preload=5e6)), flat, "critical_stiffness", points=64)
     found = ss.sensitivity(
-        rig(contact=ss.Constant(preload=5e6)), flat, ["critical_stiffness", "growth_rate"], points=64
+        rig(contact=ss.laws.ConstantNormalStress(preload=5e6)), flat, ["critical_stiffness", "growth_rate"], points=64
     )
     machine = at_random(21)[0]  # whose growth rate depends on neither, but for rounding
     names = ("links.l1.stiffness", "contacts.c0.friction.v_ref")

@@ -176,6 +176,8 @@ def test_a_store_opens_as_it_grows(tmp_path):
         seen.append((np.count_nonzero(data["complete"]), np.count_nonzero(np.isfinite(data["looks"]))))
         return rig.stiffness
 
-    found = ss.run_map(ss.Map(attack.rig(), {"stiffness": ss.Grid(1e9, 2e9, 12)}, [looks], chunk=4), store, workers=1)
+    found = ss.run_map(
+        ss.Map(attack.rig(), {"stiffness": ss.maps.Grid(1e9, 2e9, 12)}, [looks], chunk=4), store, workers=1
+    )
     assert seen == [(0, 0)] * 4 + [(1, 4)] * 4 + [(2, 8)] * 4
     np.testing.assert_array_equal(found.dataset["looks"], np.linspace(1e9, 2e9, 12))

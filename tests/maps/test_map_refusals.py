@@ -24,7 +24,7 @@ from steadyslip.maps.plan.map import roles
 def test_another_map_is_refused_and_named(tmp_path):
     made(chart(), tmp_path)
     other = ss.Map(
-        rig(stiffness=8e9), {"angle": ss.Grid("-80 deg", "70 deg", 41), "stiffness": STIFFNESSES}, LINEAR[:-1]
+        rig(stiffness=8e9), {"angle": ss.maps.Grid("-80 deg", "70 deg", 41), "stiffness": STIFFNESSES}, LINEAR[:-1]
     )
     with pytest.raises(ss.NotAvailable) as error:
         made(other, tmp_path)
@@ -71,7 +71,9 @@ def test_another_map_under_the_name_of_an_old_one_is_whole(tmp_path):
     """A process that has had the old one open must not take it for the new one."""
     for points in (11, 12):
         shutil.rmtree(tmp_path / "map.zarr", ignore_errors=True)
-        data = made(ss.Map(rig(), samples=ss.Samples(RANGES, points), compute=["status"], chunk=6), tmp_path).dataset
+        data = made(
+            ss.Map(rig(), samples=ss.maps.Samples(RANGES, points), compute=["status"], chunk=6), tmp_path
+        ).dataset
         assert data.sizes["sample"] == points
         assert np.all(data["status"] >= 0)
         assert np.all(data["friction.a"] > 0)
@@ -191,9 +193,14 @@ def test_everything_wrong_with_a_map_is_said_at_once():
     with pytest.raises(ss.ParameterError) as error:
         ss.Map(
             rig(),
-            {"angel": ANGLES, "stiffness": ss.Grid("1 GPa/m", "2 GPa", 3), "friction.b": [0.01, 0.01], "mass": 3.0},
-            ["status", "stattus", ss.Events()],
-            samples=ss.Samples({"friction.a": (0.01, -0.02), "d_c": (0.0, 1e-6, "log")}, 0, "sobbol", -1),
+            {
+                "angel": ANGLES,
+                "stiffness": ss.maps.Grid("1 GPa/m", "2 GPa", 3),
+                "friction.b": [0.01, 0.01],
+                "mass": 3.0,
+            },
+            ["status", "stattus", ss.maps.Events()],
+            samples=ss.maps.Samples({"friction.a": (0.01, -0.02), "d_c": (0.0, 1e-6, "log")}, 0, "sobbol", -1),
             chunk=0,
         )
     text = str(error.value)
@@ -209,21 +216,21 @@ def test_everything_wrong_with_a_map_is_said_at_once():
     with pytest.raises(ss.ParameterError, match="varies twice"):
         ss.Map(rig(), {"friction.a": [0.01]}, samples={"friction.a": [0.01, 0.02]})
     with pytest.raises(ss.ParameterError, match="nothing that is computed simulates"):
-        ss.Map(rig(), {"protocol.pieces.1.to": [1e-6]}, protocol=ss.VelocityStep(at=1.0, to=2e-6))
+        ss.Map(rig(), {"protocol.pieces.1.to": [1e-6]}, protocol=ss.protocol.VelocityStep(at=1.0, to=2e-6))
     with pytest.raises(ss.ParameterError, match="Latin hypercube"):
         sampling(2 * LARGEST_HYPERCUBE, method="latin-hypercube")
     with pytest.raises(ss.ParameterError, match="is the name of something else"):
-        ss.Map(rig(), {"angle": ANGLES}, [ss.measure(lambda one: 1.0, name="sample")])
+        ss.Map(rig(), {"angle": ANGLES}, [ss.maps.measure(lambda one: 1.0, name="sample")])
     with pytest.raises(ss.ParameterError, match="is the name of something else"):
-        ss.Map(rig(), {"angle": ANGLES}, [ss.measure(lambda one: 1.0, name="complete")])
-    assert ss.Map(rig(), {"angle": ANGLES}, ss.measure(lambda one: 1.0, name="one")).outputs()[0].name == "one"
+        ss.Map(rig(), {"angle": ANGLES}, [ss.maps.measure(lambda one: 1.0, name="complete")])
+    assert ss.Map(rig(), {"angle": ANGLES}, ss.maps.measure(lambda one: 1.0, name="one")).outputs()[0].name == "one"
     for compute in (5, [None], []):
         with pytest.raises(ss.ParameterError, match="compute"):
             ss.Map(rig(), {"angle": ANGLES}, compute)
     with pytest.raises(ss.ParameterError, match="samples: is empty"):
         ss.Map(rig(), samples={})
     with pytest.raises(ss.ParameterError, match="two ends"):
-        ss.Map(rig(), samples=ss.Samples({"angle": 5}, 8))
+        ss.Map(rig(), samples=ss.maps.Samples({"angle": 5}, 8))
     with pytest.raises(ss.ParameterError, match="differ in length"):
         make_sampling({"friction.a": [0.01], "friction.b": [0.01, 0.02]}, roles(chart()) | {
             name: address.role for name, address in rig().parameters().items()})  # fmt: skip
@@ -254,7 +261,7 @@ def test_workers_that_cannot_live_are_given_up(tmp_path, monkeypatch):
 
 # -- the file ----------------------------------------------------------------------------------------------
 
-FILE = ss.rig_to_text(rig(), replace(ss.Protocol.of(ss.VelocityStep(at=5.0, to=2e-6)), until=50.0))
+FILE = ss.rig_to_text(rig(), replace(ss.Protocol.of(ss.protocol.VelocityStep(at=5.0, to=2e-6)), until=50.0))
 TABLE = """
 [map]
 compute = ["status", "events"]
@@ -277,11 +284,11 @@ def test_a_file_says_the_same_as_python():
     same = ss.Map(
         rig(),
         {
-            "contact.angle": ss.Grid(-np.pi / 6, np.pi / 6, 3), "stiffness": [5e9, 2e10],
-            "protocol.pieces.1.to": ss.Grid(1.1e-6, 2e-6, 2, "log"),
+            "contact.angle": ss.maps.Grid(-np.pi / 6, np.pi / 6, 3), "stiffness": [5e9, 2e10],
+            "protocol.pieces.1.to": ss.maps.Grid(1.1e-6, 2e-6, 2, "log"),
         },
-        ["status", ss.Events(rtol=1e-6)], samples=ss.Samples({"friction.a": (0.01, 0.02)}, 4, seed=7),
-        protocol=replace(ss.Protocol.of(ss.VelocityStep(at=5.0, to=2e-6)), until=50.0),
+        ["status", ss.maps.Events(rtol=1e-6)], samples=ss.maps.Samples({"friction.a": (0.01, 0.02)}, 4, seed=7),
+        protocol=replace(ss.Protocol.of(ss.protocol.VelocityStep(at=5.0, to=2e-6)), until=50.0),
     )  # fmt: skip
     assert plan.definition() == same.definition()
     assert plan.dims == ("contact.angle", "slider.stiffness", "protocol.pieces.1.to", "sample")
@@ -382,7 +389,7 @@ def test_a_file_with_one_fault(text, message):
 @pytest.mark.parametrize("how", ["missing", "of another array", "a folder", "of another chunk"])
 def test_chunks_that_are_not_those_that_were_written_are_no_results(tmp_path, how):
     """Each file is one that Zarr reads, or takes for a chunk of nothing; the mark of the chunk knows better."""
-    over = {"stiffness": ss.Grid(1e9, 9e9, 6), "friction.a": ss.Grid(0.010, 0.014, 4)}
+    over = {"stiffness": ss.maps.Grid(1e9, 9e9, 6), "friction.a": ss.maps.Grid(0.010, 0.014, 4)}
     plan = ss.Map(rig(), over, ["growth_rate", "critical_stiffness"], chunk=6)
     whole = ss.run_map(plan, tmp_path / "m.zarr", workers=1, progress=False).read("growth_rate")
     chunks = [path for path in (tmp_path / "m.zarr" / "growth_rate" / "c").rglob("*") if path.is_file()]

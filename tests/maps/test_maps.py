@@ -45,8 +45,8 @@ def test_chunks_and_workers_change_no_bit(tmp_path):
 
 @pytest.mark.parametrize("states", [1, 2])
 def test_several_intervals_and_parameters_that_bring_in_terms(tmp_path, states):
-    members = [ss.State(b=0.016, d_c=1e-6), ss.State(b=-0.004, d_c=2e-5)][:states]
-    friction = ss.RateState(a=0.0145, mu_ref=0.7, v_ref=1e-6, states=members)
+    members = [ss.laws.State(b=0.016, d_c=1e-6), ss.laws.State(b=-0.004, d_c=2e-5)][:states]
+    friction = ss.laws.RateState(a=0.0145, mu_ref=0.7, v_ref=1e-6, states=members)
     base = rig(friction=friction)
     plan = ss.Map(base, {"slider.mass": [0.0, 1e8, 1e10], "angle": ANGLES}, ["stable_stiffness", "status"], chunk=20)
     data = made(plan, tmp_path).dataset
@@ -61,9 +61,9 @@ def test_several_intervals_and_parameters_that_bring_in_terms(tmp_path, states):
 
 def test_simulated_results_equal_those_without_a_map(tmp_path):
     base = unit_rig("aging", 0.5, 0.4, 1e-3)
-    step = ss.VelocityStep(at=5.0, to=2.0)
+    step = ss.protocol.VelocityStep(at=5.0, to=2.0)
     plan = ss.Map(
-        base, {"stiffness": [0.003, 0.004, 0.006], "protocol.pieces.1.to": ss.Grid(1.1, 3.0, 4)},
+        base, {"stiffness": [0.003, 0.004, 0.006], "protocol.pieces.1.to": ss.maps.Grid(1.1, 3.0, 4)},
         ["events", "critical_stiffness"], protocol=replace(ss.Protocol.of(step), until=120.0), chunk=3,
     )  # fmt: skip
     data = made(plan, tmp_path).dataset
@@ -80,14 +80,14 @@ def test_simulated_results_equal_those_without_a_map(tmp_path):
 
 
 def test_thresholds_and_functions(tmp_path):
-    @ss.measure(unit="s")
+    @ss.maps.measure(unit="s")
     def halving(one):
         rate = ss.analyze(one).growth_rate
         return np.log(2) / -rate if rate < 0 else np.nan
 
     stiffness = [12e9, 40e9]
     base = rig()
-    plan = ss.Map(base, {"stiffness": stiffness}, [ss.KickThreshold(precision=1e-3), halving])
+    plan = ss.Map(base, {"stiffness": stiffness}, [ss.maps.KickThreshold(precision=1e-3), halving])
     found = made(plan, tmp_path)
     data = found.dataset
     expected = ss.threshold_map(base, {"stiffness": np.array(stiffness)}, precision=1e-3, progress=False)
@@ -98,7 +98,7 @@ def test_thresholds_and_functions(tmp_path):
 
 
 def test_kinds_of_onset_equal_those_of_single_rigs(tmp_path):
-    plan = ss.Map(rig(), {"angle": ss.Grid("-50 deg", "60 deg", 5), "friction.b": [0.013, 0.018]}, ["onset"])
+    plan = ss.Map(rig(), {"angle": ss.maps.Grid("-50 deg", "60 deg", 5), "friction.b": [0.013, 0.018]}, ["onset"])
     found = made(plan, tmp_path)
     data = found.dataset
     for i, angle in enumerate(data["contact.angle"].values):
@@ -110,7 +110,7 @@ def test_kinds_of_onset_equal_those_of_single_rigs(tmp_path):
 
 
 def test_onset_of_a_controlled_rig_is_along_its_gain():
-    held = rig(stiffness=None, mass=1e6, drive=ss.PD(1e-6, kp=1e10, kd=1e5))
+    held = rig(stiffness=None, mass=1e6, drive=ss.machine.PD(1e-6, kp=1e10, kd=1e5))
     gains = np.array([5e9, 4e10])
     found = onset_map(held, {"drive.kp": gains})
     for i, kp in enumerate(gains):
@@ -120,7 +120,7 @@ def test_onset_of_a_controlled_rig_is_along_its_gain():
 
 
 def test_the_safety_factor_counts_a_gain_with_the_spring():
-    spring = ss.safety_factor(rig(stiffness=1e9, drive=ss.PD(1e-6, kp=8e9)))
+    spring = ss.safety_factor(rig(stiffness=1e9, drive=ss.machine.PD(1e-6, kp=8e9)))
     assert spring == pytest.approx(ss.safety_factor(rig()), rel=1e-12)
     assert spring == pytest.approx(9e9 / ss.critical_stiffness(rig()), rel=1e-12)
 
@@ -153,7 +153,7 @@ def test_samples_fill_their_ranges_evenly(method):
 
 
 def test_samples_in_a_map(tmp_path):
-    plan = ss.Map(rig(), {"angle": [-0.5, 0.5]}, LINEAR[1:2], samples=ss.Samples(RANGES, 64), chunk=30)
+    plan = ss.Map(rig(), {"angle": [-0.5, 0.5]}, LINEAR[1:2], samples=ss.maps.Samples(RANGES, 64), chunk=30)
     assert plan.chunks[1] < 64
     data = made(plan, tmp_path).dataset
     expected = plan.sampling.part(0, 64)
@@ -180,7 +180,7 @@ def test_exports_hold_the_same(tmp_path):
 
     plan = ss.Map(
         rig(), {"angle": ANGLES, "friction.b": [0.016, 0.018]}, ["status", "growth_rate", "stable_stiffness"],
-        samples=ss.Samples({"friction.a": (0.01, 0.02)}, 8), chunk=50,
+        samples=ss.maps.Samples({"friction.a": (0.01, 0.02)}, 8), chunk=50,
     )  # fmt: skip
     found = made(plan, tmp_path)
     data = found.dataset

@@ -9,8 +9,9 @@ import xarray as xr
 
 import steadyslip as ss
 from steadyslip.core.questions import Keeper, question
-from steadyslip.model import build_model, operating_point
+from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
+from steadyslip.model.point import operating_point
 from steadyslip.model.posed import well_posed
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales, scale_rows
@@ -19,9 +20,11 @@ from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks.settled import rest_of
 
-ROCK = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6)
-RIG = ss.Slider(friction=ROCK, contact=ss.Constant(preload=5e6), stiffness=2e9, drive=ss.Steady(1e-6))
-INCLINED = replace(RIG, contact=ss.InclinedSpring(preload=5e6, angle=0.3))
+ROCK = ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6)
+RIG = ss.Slider(
+    friction=ROCK, contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=2e9, drive=ss.machine.SteadyDrive(1e-6)
+)
+INCLINED = replace(RIG, contact=ss.laws.InclinedSpring(preload=5e6, angle=0.3))
 
 
 class Oracle(Keeper):
@@ -52,7 +55,7 @@ def test_models_are_shared_and_keep_what_they_were_asked():
 
 
 def test_variables_say_what_they_are():
-    rig = replace(RIG, mass=1e6, drive=ss.PID(1e-6, kp=1e8, ki=1e6))
+    rig = replace(RIG, mass=1e6, drive=ss.machine.PID(1e-6, kp=1e8, ki=1e6))
     model = build_model(rig)
     assert [(v.name, v.kind) for v in model.variables] == [
         ("x", "slip"), ("v", "velocity"), ("Theta", "memory"), ("integral", "integral")
@@ -100,17 +103,17 @@ def test_a_part_of_a_point_is_the_point_of_a_part():
 def two_blocks(masses=False, **second):
     """Two blocks in a row: springs from each to the load point, and one between them."""
     friction = RIG.friction
-    surface = ss.Surface(body="one", friction=friction, contact=ss.Constant(preload=5e6))
+    surface = ss.machine.Surface(body="one", friction=friction, contact=ss.laws.ConstantNormalStress(preload=5e6))
     mass = 1e4 if masses else 0.0
     return ss.Machine(
-        bodies={"one": ss.SlidingBody(mass=mass), "two": ss.SlidingBody(mass=mass)},
+        bodies={"one": ss.machine.SlidingBody(mass=mass), "two": ss.machine.SlidingBody(mass=mass)},
         links={
-            "first": ss.Spring(between=("drive", "one"), stiffness=2e9),
-            "second": ss.Spring(between=("drive", "two"), stiffness=2e9),
-            "between": ss.Spring(between=("one", "two"), stiffness=BETWEEN),
+            "first": ss.machine.Spring(between=("drive", "one"), stiffness=2e9),
+            "second": ss.machine.Spring(between=("drive", "two"), stiffness=2e9),
+            "between": ss.machine.Spring(between=("one", "two"), stiffness=BETWEEN),
         },
         contacts={"one": surface, "two": replace(surface, body="two", **second)},
-        drive=ss.Pull(velocity=RIG.drive.velocity),
+        drive=ss.machine.Pull(velocity=RIG.drive.velocity),
     )
 
 
@@ -157,13 +160,13 @@ def test_answers_are_the_same_for_everybody():
 
 
 def lugre():
-    return ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
+    return ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
 
 
 def test_scales_of_few_rigs_are_those_of_many():
     """Few are reckoned one by one."""
-    friction = ss.RateState(
-        a=0.01, b=0.014, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.3)
+    friction = ss.laws.RateState(
+        a=0.01, b=0.014, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
     )
     for rig in (RIG, replace(RIG, friction=friction), replace(RIG, mass=10.0), replace(RIG, friction=lugre())):
         point = operating_point(rig, {"stiffness": np.geomspace(1e-3, 1e12, 20)})
@@ -180,7 +183,7 @@ def test_kicks_leave_the_scales_of_motion_alone():
     a_rig = replace(RIG, friction=lugre(), stiffness=9e9, mass=1e6)
 
     def run():
-        return ss.simulate(a_rig, ss.VelocityStep(at=0.0, to=2e-6), until=0.05)["v"].tobytes()
+        return ss.simulate(a_rig, ss.protocol.VelocityStep(at=0.0, to=2e-6), until=0.05)["v"].tobytes()
 
     before = run()
     jobs = prepare(a_rig, (), 1.0, {}, {}, Options())

@@ -289,28 +289,32 @@ def test_what_is_no_number_in_range_is_told_so(question):
 STRIBECK = {
     "falls": {"mu_coulomb": 0.2, "mu_static": 0.3}, "rises": {"mu_coulomb": 0.3, "mu_static": 0.2},
 }  # fmt: skip
-LEVEL = ss.InclinedSpring(preload=100.0, angle=0.0)
+LEVEL = ss.laws.InclinedSpring(preload=100.0, angle=0.0)
 BRISTLES = {
-    "bristles": lambda **curve: ss.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5),
-    "damped bristles": lambda **curve: ss.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=0.07),
-    "no memory": lambda **curve: ss.CoulombStribeck(**curve, v_stribeck=1e-3),
-    "viscous": lambda **curve: ss.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5, viscous=1e-9),
+    "bristles": lambda **curve: ss.laws.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5),
+    "damped bristles": lambda **curve: ss.laws.LuGre(
+        **curve, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=0.07
+    ),
+    "no memory": lambda **curve: ss.laws.CoulombStribeck(**curve, v_stribeck=1e-3),
+    "viscous": lambda **curve: ss.laws.LuGre(**curve, v_stribeck=1e-3, bristle_stiffness=1e5, viscous=1e-9),
 }
 
 
 def massless(law):
     """A body without mass that rubs, between the drive and one with mass."""
     return ss.Machine(
-        bodies={"carriage": ss.SlidingBody(), "table": ss.SlidingBody(mass=0.6)},
+        bodies={"carriage": ss.machine.SlidingBody(), "table": ss.machine.SlidingBody(mass=0.6)},
         links={
-            "screw": ss.Spring(between=("drive", "carriage"), stiffness=1e5),
-            "belt": ss.Spring(between=("carriage", "table"), stiffness=1.3e4),
-            "air": ss.Spring(between=("table", "ground"), damping=2.0),
+            "screw": ss.machine.Spring(between=("drive", "carriage"), stiffness=1e5),
+            "belt": ss.machine.Spring(between=("carriage", "table"), stiffness=1.3e4),
+            "air": ss.machine.Spring(between=("table", "ground"), damping=2.0),
         },
         contacts={
-            "guide": ss.Surface(body="carriage", friction=law, contact=ss.InclinedSpring(preload=100.0, angle=0.0))
+            "guide": ss.machine.Surface(
+                body="carriage", friction=law, contact=ss.laws.InclinedSpring(preload=100.0, angle=0.0)
+            )
         },
-        drive=ss.Pull(velocity=1e-3),
+        drive=ss.machine.Pull(velocity=1e-3),
     )
 
 

@@ -33,18 +33,23 @@ class Chain:
     def machine(self):
         names = [f"b{i}" for i in range(self.n)]
         ends = pairwise(["drive", *names])
-        links = {f"l{i}": ss.Spring(between=two, stiffness=self.k[i], damping=self.c[i]) for i, two in enumerate(ends)}
+        links = {
+            f"l{i}": ss.machine.Spring(between=two, stiffness=self.k[i], damping=self.c[i])
+            for i, two in enumerate(ends)
+        }
         return ss.Machine(
-            bodies={name: ss.SlidingBody(mass=mass) for name, mass in zip(names, self.masses, strict=True)},
-            links=links, contacts={"rock": surface(names[self.rub], self.law)}, drive=ss.Pull(velocity=1.0),
+            bodies={name: ss.machine.SlidingBody(mass=mass) for name, mass in zip(names, self.masses, strict=True)},
+            links=links, contacts={"rock": surface(names[self.rub], self.law)}, drive=ss.machine.Pull(velocity=1.0),
         )  # fmt: skip
 
     def plan(self):
         _, step, free, more, again, _ = self.edges
         return [
-            ss.VelocityStep(at=step, to=self.speeds[1]), ss.Creep(at=free, duration=again - free, to=self.told),
-            ss.CreepStep(at=more, by=self.by), ss.DisturbanceStep(at=more, by=self.push, on=f"b{self.pushed}"),
-            ss.VelocityStep(at=again, to=self.speeds[4]),
+            ss.protocol.VelocityStep(at=step, to=self.speeds[1]),
+            ss.protocol.Creep(at=free, duration=again - free, to=self.told),
+            ss.protocol.CreepStep(at=more, by=self.by), ss.protocol.DisturbanceStep(at=more, by=self.push,
+            on=f"b{self.pushed}"),
+            ss.protocol.VelocityStep(at=again, to=self.speeds[4]),
         ]  # fmt: skip
 
     def pull(self, y, speed):

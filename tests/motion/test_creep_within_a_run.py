@@ -15,15 +15,18 @@ from moving_machines import aging, friction
 LAW = rate_state(0.3, 0.1, 1.0)
 TIMES = np.linspace(0.0, 40.0, 161)
 PLAN = (
-    ss.VelocityStep(at=1.0, to=1.5), ss.Creep(at=5.0, duration=10.0), ss.CreepStep(at=8.0, by=0.03),
-    ss.VelocityStep(at=25.0, to=1.2),
+    ss.protocol.VelocityStep(at=1.0, to=1.5), ss.protocol.Creep(at=5.0, duration=10.0),
+    ss.protocol.CreepStep(at=8.0, by=0.03),
+    ss.protocol.VelocityStep(at=25.0, to=1.2),
 )  # fmt: skip
 FINE = {"until": 40.0, "times": TIMES, "rtol": 1e-9}
 
 
 def slider(**changes):
     given = {"stiffness": 0.7, "mass": 0.5, "damping": 0.2} | changes
-    return ss.Slider(friction=LAW, contact=ss.Constant(preload=1.0), drive=ss.Steady(1.0), **given)
+    return ss.Slider(
+        friction=LAW, contact=ss.laws.ConstantNormalStress(preload=1.0), drive=ss.machine.SteadyDrive(1.0), **given
+    )
 
 
 def drive_speed(t):
@@ -121,7 +124,7 @@ def test_a_servo_that_is_let_go_and_takes_over_without_a_jerk(integral):
     law = rate_state(0.5, 0.3, 1.0)
     machine = two_mass(kp=kp, kd=kd, friction=law)
     if integral:
-        machine = replace(machine, drive=ss.PositionPID(velocity=1.0, body="motor", kp=kp, kd=kd, ki=integral))
+        machine = replace(machine, drive=ss.machine.PositionPID(velocity=1.0, body="motor", kp=kp, kd=kd, ki=integral))
     edges = [0.0, 1.0, 5.0, 15.0, 25.0, 40.0]
 
     def pull(y, speed):  # motor, table, v, w, theta, integral, commanded place, held
@@ -147,7 +150,7 @@ def test_a_servo_that_is_let_go_and_takes_over_without_a_jerk(integral):
 
         return rates
 
-    plan = [PLAN[0], PLAN[1], ss.CreepStep(at=5.0, by=0.1), PLAN[3]]
+    plan = [PLAN[0], PLAN[1], ss.protocol.CreepStep(at=5.0, by=0.1), PLAN[3]]
     found = ss.simulate(machine, plan, **FINE)
     expected = solved(right, [0, 0, 1, 1, 0, 0, 0, 0], edges, change)
     assert found["motor.v"] == pytest.approx(expected[2], abs=1e-6)
@@ -158,7 +161,12 @@ def test_a_servo_that_is_let_go_and_takes_over_without_a_jerk(integral):
 
 
 def test_force_goes_on_at_both_switches():
-    run = ss.simulate(slider(), [ss.Hold(at=2.0, duration=6.0), ss.Creep(at=8.0, duration=5.0)], until=20.0, rtol=1e-9)
+    run = ss.simulate(
+        slider(),
+        [ss.protocol.Hold(at=2.0, duration=6.0), ss.protocol.Creep(at=8.0, duration=5.0)],
+        until=20.0,
+        rtol=1e-9,
+    )
     for at in (8.0, 13.0):
         before, after = np.flatnonzero(run["t"] == at)[[0, -1]]
         for name in ("spring_stress", "v", "slip", "Theta"):
@@ -172,7 +180,11 @@ def test_force_goes_on_at_both_switches():
 def test_rounding_does_not_part_the_end_of_creep_from_the_next_piece(at):
     """The load point is taken up with the velocity that follows: without a jump of the force through the dashpot."""
     for end in np.nextafter(1.1, [0.0, 1.1, 2.0]):
-        plan = [ss.VelocityStep(at=0.0, to=1.3), ss.Creep(at=at, duration=end - at), ss.VelocityStep(at=1.1, to=0.4)]
+        plan = [
+            ss.protocol.VelocityStep(at=0.0, to=1.3),
+            ss.protocol.Creep(at=at, duration=end - at),
+            ss.protocol.VelocityStep(at=1.1, to=0.4),
+        ]
         run = ss.simulate(slider(), plan, until=2.0, times=[1.1 - 1e-9, 1.1 + 1e-9])
         assert run["load_velocity"][1] == 0.4
         assert run["spring_stress"][1] == pytest.approx(run["spring_stress"][0], abs=1e-7)
@@ -180,20 +192,29 @@ def test_rounding_does_not_part_the_end_of_creep_from_the_next_piece(at):
 
 def test_what_is_told_is_pulled():
     """`to` says the whole pull, at once; what comes after it adds up."""
-    inclined = replace(slider(), contact=ss.InclinedSpring(preload=1.0, angle=0.3))
-    plan = [ss.Creep(at=3.0, to=0.7), ss.CreepRamp(at=4.0, by=0.05, duration=2.0), ss.VelocityStep(at=10.0, to=0.5),
-            ss.Creep(at=12.0, duration=2.0, to=0.4), ss.Creep(at=14.0, duration=1.0, to=0.45)]  # fmt: skip
-    for rig in (slider(), slider(damping=0.0), inclined, replace(slider(), drive=ss.PID(1.0, kp=1.0, kd=0.1, ki=0.2))):
+    inclined = replace(slider(), contact=ss.laws.InclinedSpring(preload=1.0, angle=0.3))
+    plan = [ss.protocol.Creep(at=3.0, to=0.7), ss.protocol.CreepRamp(at=4.0, by=0.05, duration=2.0),
+        ss.protocol.VelocityStep(at=10.0, to=0.5),
+            ss.protocol.Creep(at=12.0, duration=2.0, to=0.4),
+            ss.protocol.Creep(at=14.0, duration=1.0, to=0.45)]  # fmt: skip
+    for rig in (
+        slider(),
+        slider(damping=0.0),
+        inclined,
+        replace(slider(), drive=ss.machine.PID(1.0, kp=1.0, kd=0.1, ki=0.2)),
+    ):
         run = ss.simulate(rig, plan, until=20.0, times=[3.0, 4.0, 5.0, 9.0, 12.0, 13.9, 14.0, 14.9])
         assert run["spring_stress"] == pytest.approx([0.7, 0.7, 0.725, 0.75, 0.4, 0.4, 0.45, 0.45], abs=1e-9)
 
 
 def test_told_forces_of_machines_are_those_of_the_drive():
     machine = replace(
-        two_mass(), drive=ss.Pull(velocity=1.0),
-        links={**two_mass().links, "rope": ss.Spring(between=("motor", "drive"), stiffness=9.0, damping=1.0)},
+        two_mass(), drive=ss.machine.Pull(velocity=1.0),
+        links={**two_mass().links, "rope": ss.machine.Spring(between=("motor", "drive"), stiffness=9.0, damping=1.0)},
     )  # fmt: skip
-    run = ss.simulate(machine, [ss.Creep(at=1.0, duration=2.0, to=0.65)], until=6.0, times=np.linspace(0, 6, 25))
+    run = ss.simulate(
+        machine, [ss.protocol.Creep(at=1.0, duration=2.0, to=0.65)], until=6.0, times=np.linspace(0, 6, 25)
+    )
     held = run["creep"] == 1
     assert -run["links.rope.force"][held] == pytest.approx(0.65, abs=1e-9)
     spring = 9.0 * (run["load_displacement"] - run["motor.displacement"]) + run["load_velocity"] - run["motor.v"]
@@ -203,8 +224,12 @@ def test_told_forces_of_machines_are_those_of_the_drive():
 
 def test_creep_from_begin_to_end_is_creep_throughout():
     """Two equations of motion: one that knows a moving drive, one that does not."""
-    parts = [ss.Creep(at=0.0), ss.CreepRamp(at=1.0, by=0.05, duration=3.0)]
-    for rig in (slider(), slider(mass=0.0, damping=0.0), replace(slider(), drive=ss.PID(1.0, kp=3.0, kd=0.4, ki=0.1))):
+    parts = [ss.protocol.Creep(at=0.0), ss.protocol.CreepRamp(at=1.0, by=0.05, duration=3.0)]
+    for rig in (
+        slider(),
+        slider(mass=0.0, damping=0.0),
+        replace(slider(), drive=ss.machine.PID(1.0, kp=3.0, kd=0.4, ki=0.1)),
+    ):
         one, two = ss.simulate(rig, parts, **FINE), ss.simulate(rig, parts[1:], **FINE)
         assert one["v"] == pytest.approx(two["v"], rel=1e-7)
         assert one["spring_stress"] == pytest.approx(two["spring_stress"], rel=1e-9)
@@ -212,10 +237,10 @@ def test_creep_from_begin_to_end_is_creep_throughout():
 
 def test_a_machine_of_one_body_is_let_go_as_its_slider():
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=0.5)},
-        links={"rod": ss.Spring(between=("drive", "block"), stiffness=0.7, damping=0.2)},
+        bodies={"block": ss.machine.SlidingBody(mass=0.5)},
+        links={"rod": ss.machine.Spring(between=("drive", "block"), stiffness=0.7, damping=0.2)},
         contacts={"rock": surface("block", LAW)},
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
     one, two = ss.simulate(slider(), PLAN, **FINE), ss.simulate(machine, PLAN, **FINE)
     assert two["block.v"] == pytest.approx(one["v"], rel=1e-7)
@@ -226,7 +251,7 @@ def test_a_machine_of_one_body_is_let_go_as_its_slider():
 def test_energy_is_kept_across_both_switches():
     """What the drive does, moving or let go, is in the block, the spring and friction."""
     times = np.linspace(0, 20, 40001)
-    plan = [ss.Creep(at=5.0, duration=5.0), ss.CreepRamp(at=6.0, by=0.1, duration=3.0)]
+    plan = [ss.protocol.Creep(at=5.0, duration=5.0), ss.protocol.CreepRamp(at=6.0, by=0.1, duration=3.0)]
     run = ss.simulate(slider(damping=0.0), plan, until=20.0, times=times, rtol=1e-9, initial={"x": -0.2})
     pull, v = run["spring_stress"], run["v"]
     power = pull * run["load_velocity"] - run["shear_stress"] * v
@@ -246,14 +271,14 @@ def test_a_run_that_starts_anew_from_the_last_values_is_the_run_that_went_on():
     for m in (0.5, 0.0):
         rig = slider(mass=m, damping=0.0)
         whole = ss.simulate(rig, PLAN[:3], until=40.0, times=TIMES, rtol=1e-10)
-        later, shifted = TIMES >= 16.0, [ss.VelocityStep(at=0.0, to=1.5)]
+        later, shifted = TIMES >= 16.0, [ss.protocol.VelocityStep(at=0.0, to=1.5)]
         at = np.flatnonzero(later)[0]
         last = {name: whole[name][at] for name in (("x", "v", "Theta") if m else ("x", "Theta"))}
         again = ss.simulate(rig, shifted, until=24.0, times=TIMES[later] - 16.0, rtol=1e-10, initial=last)
         assert again["v"] == pytest.approx(whole["v"][later], rel=1e-7)
         at = np.flatnonzero(TIMES >= 10.0)[0]
         last = {name: whole[name][at] for name in last}
-        plan = [ss.Creep(at=0.0, duration=5.0), ss.VelocityStep(at=5.0, to=1.5)]
+        plan = [ss.protocol.Creep(at=0.0, duration=5.0), ss.protocol.VelocityStep(at=5.0, to=1.5)]
         again = ss.simulate(rig, plan, until=30.0, times=TIMES[at:] - 10.0, rtol=1e-10, initial=last)
         assert again["v"] == pytest.approx(whole["v"][at:], rel=1e-7)
 
@@ -263,14 +288,14 @@ def test_a_motor_without_mass_is_let_go_as_one_of_hardly_any(kd):
     """To first order in its mass: its place and speed follow from forces, which go on at both switches."""
     plan = [
         *PLAN[:2],
-        ss.CreepRamp(at=6.0, by=0.05, duration=1.0),
-        ss.DisturbanceStep(at=7.0, by=0.02, on="motor"),
+        ss.protocol.CreepRamp(at=6.0, by=0.05, duration=1.0),
+        ss.protocol.DisturbanceStep(at=7.0, by=0.02, on="motor"),
         PLAN[3],
     ]
     moved = []
     for mass in (0.0, 1e-4, 1e-5):
         machine = two_mass(kp=2.0, kd=kd, friction=rate_state(0.5, 0.3, 1.0))
-        machine = replace(machine, bodies={**machine.bodies, "motor": ss.SlidingBody(mass=mass)})
+        machine = replace(machine, bodies={**machine.bodies, "motor": ss.machine.SlidingBody(mass=mass)})
         moved.append(ss.simulate(machine, plan, **FINE)["table.v"])
     apart = [np.max(np.abs(one - moved[0])) for one in moved[1:]]
     assert apart[0] < 1e-3
@@ -294,7 +319,7 @@ def test_ensembles_let_go_when_each_is_told_to():
 
 
 def test_ensembles_pull_as_each_is_told():
-    plan = [ss.Creep(at=1.0, duration=4.0, to=0.6), ss.CreepStep(at=2.0, by=0.0)]
+    plan = [ss.protocol.Creep(at=1.0, duration=4.0, to=0.6), ss.protocol.CreepStep(at=2.0, by=0.0)]
     vary = {"protocol.pieces.1.to": [0.6, 0.62, 0.64], "protocol.pieces.2.by": [0.0, 0.01, -0.01]}
     for some in ({name: values} for name, values in vary.items()):
         many = ss.simulate_many(slider(), some, plan, until=10.0, times=[3.0])
@@ -305,14 +330,15 @@ def test_ensembles_pull_as_each_is_told():
 
 def test_bodies_are_pushed_and_contacts_pressed_while_a_drive_is_let_go():
     law = rate_state(0.5, 0.3, 1.0)
-    plan = [*PLAN[:2], ss.DisturbanceStep(at=7.0, by=0.05, on="table"), ss.DisturbanceStep(at=7.0, by=0.05, on="motor"),
-            ss.NormalStressStep(at=9.0, by=0.1)]  # fmt: skip
+    plan = [*PLAN[:2], ss.protocol.DisturbanceStep(at=7.0, by=0.05, on="table"),
+        ss.protocol.DisturbanceStep(at=7.0, by=0.05, on="motor"),
+            ss.protocol.NormalStressStep(at=9.0, by=0.1)]  # fmt: skip
     run = ss.simulate(two_mass(friction=law), plan, **FINE)
     assert run["table.disturbance"][-1] == run["motor.disturbance"][-1] == 0.05
     assert run["guide.normal_force"][-1] == pytest.approx(1.1)
     stiff = two_mass(friction=law).with_values({"screw.stiffness": 1e5, "screw.damping": 300.0})
     both = ss.simulate(stiff, plan[:4], **FINE)
-    one = ss.simulate(stiff, [*PLAN[:2], ss.CreepStep(at=7.0, by=0.1)], **FINE)
+    one = ss.simulate(stiff, [*PLAN[:2], ss.protocol.CreepStep(at=7.0, by=0.1)], **FINE)
     during = (TIMES > 8) & (TIMES < 15)
     assert both["table.v"][during] == pytest.approx(one["table.v"][during], abs=1e-5)
 
@@ -320,10 +346,22 @@ def test_bodies_are_pushed_and_contacts_pressed_while_a_drive_is_let_go():
 @pytest.mark.parametrize(
     ("pieces", "said"),
     [
-        ([ss.Creep(at=5.0, duration=5.0), ss.CreepStep(at=11.0, by=0.1)], "creep-step begins where nothing creeps"),
-        ([ss.Creep(at=5.0, duration=5.0), ss.VelocityStep(at=8.0, to=2.0)], "before piece 1 .creep. ends"),
-        ([ss.Creep(at=5.0), ss.VelocityHarmonic(amplitude=0.1, period=2.0)], "velocity-harmonic moves the load point"),
-        ([ss.Creep(at=5.0), ss.DisplacementStep(at=6.0, by=1.0)], "displacement-step moves the load point"),
+        (
+            [ss.protocol.Creep(at=5.0, duration=5.0), ss.protocol.CreepStep(at=11.0, by=0.1)],
+            "creep-step begins where nothing creeps",
+        ),
+        (
+            [ss.protocol.Creep(at=5.0, duration=5.0), ss.protocol.VelocityStep(at=8.0, to=2.0)],
+            "before piece 1 .creep. ends",
+        ),
+        (
+            [ss.protocol.Creep(at=5.0), ss.protocol.VelocityHarmonic(amplitude=0.1, period=2.0)],
+            "velocity-harmonic moves the load point",
+        ),
+        (
+            [ss.protocol.Creep(at=5.0), ss.protocol.DisplacementStep(at=6.0, by=1.0)],
+            "displacement-step moves the load point",
+        ),
     ],
 )
 def test_what_a_drive_that_is_let_go_does_not_do(pieces, said):
@@ -339,7 +377,9 @@ def test_problems_in_ensembles_and_of_rigs_are_told():
 
 
 def test_files_words_and_results_have_it(tmp_path):
-    plan = ss.Protocol(pieces=(ss.Hold(at=1.0, duration=4.0), ss.Creep(at=5.0, duration=3.0, to=0.62)), until=12.0)
+    plan = ss.Protocol(
+        pieces=(ss.protocol.Hold(at=1.0, duration=4.0), ss.protocol.Creep(at=5.0, duration=3.0, to=0.62)), until=12.0
+    )
     assert ss.protocol_from_text(ss.rig_to_text(slider(), plan)) == plan
     run = ss.simulate(slider(), plan)
     assert "let go" in str(run)
@@ -353,13 +393,13 @@ def test_files_words_and_results_have_it(tmp_path):
     assert again.units == run.units
     assert np.array_equal(again["creep"], run["creep"])
     shaft = ss.Machine(
-        bodies={"shaft": ss.RotatingBody(inertia=0.5)},
-        links={"key": ss.Shaft(between=("drive", "shaft"), stiffness=2.0)},
+        bodies={"shaft": ss.machine.RotatingBody(inertia=0.5)},
+        links={"key": ss.machine.Shaft(between=("drive", "shaft"), stiffness=2.0)},
         contacts={"seal": surface("shaft", LAW, radius=1.0)},
-        drive=ss.RotaryPull(velocity=1.0),
+        drive=ss.machine.RotaryPull(velocity=1.0),
     )
     piece = ss.piece_from_text("creep at=1s duration=2s to='0.7 N m'", machine=shaft)
     turned = ss.simulate(shaft, piece, until=5.0, times=[2.0])
     assert turned["links.key.force"][0] == pytest.approx(0.7)
     with pytest.raises(ss.ParameterError, match="N m"):
-        ss.simulate(shaft, ss.Creep(at=1.0, to="0.7 N"), until=5.0)
+        ss.simulate(shaft, ss.protocol.Creep(at=1.0, to="0.7 N"), until=5.0)

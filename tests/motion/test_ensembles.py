@@ -11,7 +11,7 @@ from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
 from steadyslip.motion import engine
 
-STEP = ss.VelocityStep(at=5.0, to=1.5)
+STEP = ss.protocol.VelocityStep(at=5.0, to=1.5)
 
 
 def kappas(n, low=0.3, high=0.6, seed=0):
@@ -45,16 +45,21 @@ def test_lanes_equal_single_runs():
 
 
 STICKING = ss.Slider(
-    friction=ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5),
-    contact=ss.Constant(preload=1e5), stiffness=1e8, mass=100.0, drive=ss.Steady(1e-3),
+    friction=ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5),
+    contact=ss.laws.ConstantNormalStress(preload=1e5), stiffness=1e8, mass=100.0, drive=ss.machine.SteadyDrive(1e-3),
 )  # fmt: skip
 WATCHED = {
     # rig, protocol, start: of slip events, of small oscillations, under inputs that change, with mass, without ln v
     "stick-slip": (unit_rig("aging", 0.5, 0.4, 1e-3), STEP, {"v": 1.2}, 60.0),
     "spiral": (unit_rig("slip", 0.5, 0.6), None, {"v": 1.2}, 60.0),
-    "waves": (unit_rig("aging", 0.5, 0.4, 1e-3), ss.VelocityHarmonic(amplitude=0.3, period=7.0), {"v": 1.2}, 60.0),
-    "mass": (unit_rig("slip", 0.5, 0.4, 1e-3, 1e-3), [ss.Hold(at=5.0, duration=20.0)], {"x": 1.0}, 60.0),
-    "Coulomb": (STICKING, ss.VelocityStep(at=0.01, to=1.1e-3), {}, 0.3),
+    "waves": (
+        unit_rig("aging", 0.5, 0.4, 1e-3),
+        ss.protocol.VelocityHarmonic(amplitude=0.3, period=7.0),
+        {"v": 1.2},
+        60.0,
+    ),
+    "mass": (unit_rig("slip", 0.5, 0.4, 1e-3, 1e-3), [ss.protocol.Hold(at=5.0, duration=20.0)], {"x": 1.0}, 60.0),
+    "Coulomb": (STICKING, ss.protocol.VelocityStep(at=0.01, to=1.1e-3), {}, 0.3),
 }
 
 
@@ -100,12 +105,12 @@ def test_samples_equal_single_runs():
 
 
 THREE_VELOCITIES = ss.Slider(
-    friction=ss.LuGre(
+    friction=ss.laws.LuGre(
         mu_coulomb=0.3, mu_static=0.8, v_stribeck=0.05, viscous=1.0, bristle_stiffness=5e5, bristle_damping=140.0
     ),
-    contact=ss.Constant(preload=5e6),
+    contact=ss.laws.ConstantNormalStress(preload=5e6),
     stiffness=1.4e10,
-    drive=ss.Steady(5e-4),
+    drive=ss.machine.SteadyDrive(5e-4),
 )
 
 
@@ -127,10 +132,10 @@ def test_a_block_without_mass_is_seen_at_the_velocity_it_has(start):
 
 def test_a_motion_that_stands_at_a_fold_is_stuck():
     """Steps at the rounding of time are accepted for ever there; alone and among others they lead nowhere."""
-    law = ss.LuGre(
+    law = ss.laws.LuGre(
         mu_coulomb=0.3, mu_static=0.65, v_stribeck=4e-3, viscous=0.03, bristle_stiffness=9e3, bristle_damping=23.0
     )
-    a_rig = replace(THREE_VELOCITIES, friction=law, stiffness=1e12, drive=ss.Steady(1.2e-4))
+    a_rig = replace(THREE_VELOCITIES, friction=law, stiffness=1e12, drive=ss.machine.SteadyDrive(1.2e-4))
     run = ss.simulate(a_rig, until=0.1, initial={"v": 0.012}, times=[0.0, 0.1])
     ensemble = ss.simulate_many(a_rig, vary={"stiffness": [1e12] * 3}, until=0.1, initial={"v": 0.012})
     assert run.status == "stuck"
@@ -165,7 +170,7 @@ def test_failures_stay_alone():
     load = np.where(np.arange(64) % 4 == 3, -2e8, 0.0)  # and every fourth loses its load
     a_rig = rig(contact=CONTACTS[1], radiation_damping=0.0)
     vary = {"contact.angle": angle, "stiffness": k, "protocol.pieces.2.by": load}
-    protocol = [ss.VelocityStep(at=1.0, to=3e-6), ss.NormalStressRamp(at=2.0, by=0.0, duration=50.0)]
+    protocol = [ss.protocol.VelocityStep(at=1.0, to=3e-6), ss.protocol.NormalStressRamp(at=2.0, by=0.0, duration=50.0)]
     ensemble = ss.simulate_many(a_rig, vary, protocol, until=60.0)
     assert list(np.unique(ensemble.status[0::4])) == ["done"]
     assert list(np.unique(ensemble.status[1::4])) == ["no steady sliding"]
@@ -196,11 +201,11 @@ def test_shapes_broadcast_and_names_are_kept():
 
 def test_protocol_parameters_can_vary():
     at, to = np.array([1.0, 3.0, 5.0])[:, None], np.array([1.5, 2.0])
-    step = ss.VelocityStep(at=1.0, to=2.0)
+    step = ss.protocol.VelocityStep(at=1.0, to=2.0)
     vary = {"protocol.pieces.1.at": at, "to": to}
     ensemble = ss.simulate_many(unit_rig("aging", 0.5, 0.4, 1e-3), vary, step, until=20.0)
     assert ensemble.shape == (3, 2)
-    single = ss.simulate(unit_rig("aging", 0.5, 0.4, 1e-3), ss.VelocityStep(at=3.0, to=1.5), until=20.0)
+    single = ss.simulate(unit_rig("aging", 0.5, 0.4, 1e-3), ss.protocol.VelocityStep(at=3.0, to=1.5), until=20.0)
     assert ensemble.final["v"][1, 0] == pytest.approx(single["v"][-1], rel=1e-9)
 
 
@@ -208,9 +213,11 @@ def test_regimes_mix():
     """Mass zero is another model, not a small number: both in one call."""
     mass = np.array([0.0, 1e9, 0.0, 2e9])
     a_rig = rig(stiffness=2e10, friction=ONE_MEMORY[1])
-    ensemble = ss.simulate_many(a_rig, {"mass": mass}, ss.VelocityStep(at=1.0, to=2e-6), until=5.0)
+    ensemble = ss.simulate_many(a_rig, {"mass": mass}, ss.protocol.VelocityStep(at=1.0, to=2e-6), until=5.0)
     for i, m in enumerate(mass):
-        single = ss.simulate(a_rig.with_values({"mass": float(m)}), ss.VelocityStep(at=1.0, to=2e-6), until=5.0)
+        single = ss.simulate(
+            a_rig.with_values({"mass": float(m)}), ss.protocol.VelocityStep(at=1.0, to=2e-6), until=5.0
+        )
         assert ensemble.final["v"][i] == pytest.approx(single["v"][-1], rel=1e-9)
 
 
@@ -274,7 +281,7 @@ def test_every_requested_sample_up_to_the_end_exists():
     at = random.uniform(0, 1, lanes) * until
     at[:8] = until[:8]  # a step at the very end is cut
     times = np.unique(np.concatenate([[0.0], at, until]))
-    step = ss.VelocityStep(at=1.0, to=1.5)
+    step = ss.protocol.VelocityStep(at=1.0, to=1.5)
     ensemble = ss.simulate_many(
         unit_rig("aging", 0.5, 0.4, 1e-3),
         {"protocol.pieces.1.at": at, "protocol.until": until, "stiffness": kappas(lanes)},
@@ -296,7 +303,7 @@ def test_numbers_that_are_none_are_not_done():
     """The load falls to a fiftieth: θ = (σ0/σ)^(α/b) d_c/v0 leaves the range of floating point for small b."""
     b = np.array([0.01, 1e-5])
     a_rig = rig(friction=ONE_MEMORY[1], contact=CONTACTS[0], stiffness=3e10, radiation_damping=2e10)
-    protocol = ss.NormalStressStep(at=1.0, by=-4.9e6)
+    protocol = ss.protocol.NormalStressStep(at=1.0, by=-4.9e6)
     ensemble = ss.simulate_many(a_rig, {"friction.b": b}, protocol, until=1.5, times=[0.5, 1.5])
     assert list(ensemble.status) == ["done", "out of range"]
     alone = ss.simulate(a_rig.with_values({"friction.b": 1e-5}), protocol, until=1.5)

@@ -18,7 +18,7 @@ def axis():
 
 def test_a_two_mass_axis_with_a_step_of_the_drive_and_a_push(axis):
     own, load = law(axis)
-    pieces = [ss.VelocityStep(at=0.0, to=1.2), ss.DisturbanceStep(at=0.0, by=0.05, on="table")]
+    pieces = [ss.protocol.VelocityStep(at=0.0, to=1.2), ss.protocol.DisturbanceStep(at=0.0, by=0.05, on="table")]
     run = ss.simulate(axis, pieces, times=TIMES, until=20.0, **FINE)
     resting = friction(own, load, 1.0, 0.0)
 
@@ -45,7 +45,7 @@ def test_a_two_mass_axis_with_a_step_of_the_drive_and_a_push(axis):
 def test_two_unlike_blocks_on_a_load_point_that_jumps():
     machine = two_blocks(0.5, -0.1, 0.1)
     laws = [machine.contacts[name].friction for name in ("one", "two")]
-    run = ss.simulate(machine, ss.DisplacementStep(at=0.0, by=0.1), times=TIMES, until=20.0, **FINE)
+    run = ss.simulate(machine, ss.protocol.DisplacementStep(at=0.0, by=0.1), times=TIMES, until=20.0, **FINE)
     resting = [friction(own, 1.0, 1.0, 0.0) for own in laws]
 
     def right(t, y):
@@ -64,7 +64,7 @@ def test_two_unlike_blocks_on_a_load_point_that_jumps():
 def test_pads_in_the_plane_that_hold_each_other_along_and_aslant():
     """What their springs carry has no formula in the Model."""
     machine = stacked_pads(2)
-    run = ss.simulate(machine, ss.VelocityStep(at=0.0, to=1.05), times=TIMES[TIMES <= 6], until=6.0, **FINE)
+    run = ss.simulate(machine, ss.protocol.VelocityStep(at=0.0, to=1.05), times=TIMES[TIMES <= 6], until=6.0, **FINE)
     own, cos, sin = machine.contacts["at-pad0"].friction, np.cos(0.5), np.sin(0.5)
 
     def forces(t, y, speed):
@@ -100,7 +100,7 @@ def test_pads_in_the_plane_that_hold_each_other_along_and_aslant():
 def test_flutter_of_a_pad_on_coulomb_friction_that_is_regularised():
     machine = brake(coulomb(1.1 * 0.4166666666666667))
     times = np.linspace(0.0, 30.0, 301)
-    run = ss.simulate(machine, ss.NormalStressStep(at=0.0, by=0.01), times=times, until=30.0, **FINE)
+    run = ss.simulate(machine, ss.protocol.NormalStressStep(at=0.0, by=0.01), times=times, until=30.0, **FINE)
     assert run.status == "done"
     mu = 1.1 * 0.4166666666666667
     stiff = np.array([[1.0, 0.3], [0.3, 1.2]])
@@ -123,15 +123,15 @@ def test_flutter_of_a_pad_on_coulomb_friction_that_is_regularised():
 def test_the_friction_of_a_gear_grows_with_the_torque_it_carries():
     tilt = -0.3
     own = rate_state(0.5, -0.1, 1.0, mu=0.3)
-    teeth = ss.InclinedSpring(preload=1.0, angle=tilt)
+    teeth = ss.laws.InclinedSpring(preload=1.0, angle=tilt)
     machine = ss.Machine(
-        bodies={"motor": ss.SlidingBody(mass=1.0), "load": ss.SlidingBody(mass=2.0, force=-0.1)},
-        links={"gear": ss.Spring(between=("motor", "load"), stiffness=20.0, damping=0.3)},
+        bodies={"motor": ss.machine.SlidingBody(mass=1.0), "load": ss.machine.SlidingBody(mass=2.0, force=-0.1)},
+        links={"gear": ss.machine.Spring(between=("motor", "load"), stiffness=20.0, damping=0.3)},
         contacts={
-            "mesh": ss.Surface(body="motor", friction=own, contact=teeth, loaded_by="gear"),
+            "mesh": ss.machine.Surface(body="motor", friction=own, contact=teeth, loaded_by="gear"),
             "guide": surface("load", rate_state(0.4, 0.1, 2.0, mu=0.2)),
         },
-        drive=ss.PositionPD(velocity=1.0, body="motor", kp=3.0, kd=0.4),
+        drive=ss.machine.PositionPD(velocity=1.0, body="motor", kp=3.0, kd=0.4),
     )
     guide = machine.contacts["guide"].friction
     run = ss.simulate(machine, initial={"load.v": 1.3}, times=TIMES, until=20.0, **FINE)
@@ -160,14 +160,14 @@ def test_the_friction_of_a_gear_grows_with_the_torque_it_carries():
 
 def test_pore_fluid_follows_in_motion():
     own = rate_state(0.3, -0.05, 1.0)
-    wet = ss.PoreFluid(preload=1.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
+    wet = ss.laws.PoreFluid(preload=1.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1.0)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=0.5)},
-        contacts={"gouge": ss.Surface(body="block", friction=own, contact=wet)},
-        drive=ss.Pull(velocity=1.0),
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=0.5)},
+        contacts={"gouge": ss.machine.Surface(body="block", friction=own, contact=wet)},
+        drive=ss.machine.Pull(velocity=1.0),
     )
-    run = ss.simulate(machine, ss.VelocityStep(at=0, to=1.5), times=TIMES, until=20.0, **FINE)
+    run = ss.simulate(machine, ss.protocol.VelocityStep(at=0, to=1.5), times=TIMES, until=20.0, **FINE)
 
     def right(t, y):
         x, v, theta, dilation, pressure = y
@@ -180,7 +180,7 @@ def test_pore_fluid_follows_in_motion():
     agree(run, "block.v", found[1])
     agree(run, "gouge.dilation", found[3])
     agree(run, "gouge.pore_pressure", found[4])
-    still = dataclasses.replace(machine, bodies={"block": ss.SlidingBody(mass=0.0)})
+    still = dataclasses.replace(machine, bodies={"block": ss.machine.SlidingBody(mass=0.0)})
     assert slopes_of_motion(still)[2].form == "eliminated"
     jacobian = slopes_of_motion(still)[0]
     assert np.sort_complex(np.linalg.eigvals(jacobian)) == pytest.approx(np.sort_complex(ss.eigenvalues(still)))
@@ -188,15 +188,17 @@ def test_pore_fluid_follows_in_motion():
 
 def test_friction_that_acts_on_its_own_normal_force_is_solved_for():
     """A self-energising contact with memory of normal stress: τ stands in ln σ(τ), on a block that another drags."""
-    own = rate_state(0.02, -0.01, 1.0, mu=0.4, normal_memory=ss.LinkerDieterich(alpha=0.2, sigma_ref=1.0))
+    own = rate_state(0.02, -0.01, 1.0, mu=0.4, normal_memory=ss.laws.LinkerDieterich(alpha=0.2, sigma_ref=1.0))
     machine = ss.Machine(
-        bodies={"one": ss.SlidingBody(mass=1.0), "two": ss.SlidingBody(mass=2.0)},
+        bodies={"one": ss.machine.SlidingBody(mass=1.0), "two": ss.machine.SlidingBody(mass=2.0)},
         links={
-            "pull": ss.Spring(between=("drive", "two"), stiffness=1.0, damping=0.1),
-            "bar": ss.Spring(between=("two", "one"), stiffness=3.0, damping=0.1),
+            "pull": ss.machine.Spring(between=("drive", "two"), stiffness=1.0, damping=0.1),
+            "bar": ss.machine.Spring(between=("two", "one"), stiffness=3.0, damping=0.1),
         },
-        contacts={"wedge": ss.Surface(body="one", friction=own, contact=ss.SelfEnergising(preload=1.0, gain=0.3))},
-        drive=ss.Pull(velocity=1.0),
+        contacts={
+            "wedge": ss.machine.Surface(body="one", friction=own, contact=ss.laws.SelfEnergising(preload=1.0, gain=0.3))
+        },
+        drive=ss.machine.Pull(velocity=1.0),
     )
     run = ss.simulate(machine, initial={"two.v": 1.2}, times=TIMES, until=20.0, **FINE)
     assert run.status == "done"

@@ -13,10 +13,10 @@ from moving_machines import FINE, TIMES, slopes_of_motion
 def test_the_work_of_the_drive_is_dissipated_or_stored():
     """Two blocks on springs: what the load point does equals friction, dashpots, springs and kinetic energy."""
     machine = two_blocks(0.6, -0.1, 0.3)
-    damped = {**machine.links, "hose": ss.Spring(between=("one", "two"), damping=0.2)}
+    damped = {**machine.links, "hose": ss.machine.Spring(between=("one", "two"), damping=0.2)}
     machine = dataclasses.replace(machine, links=damped)
     times = np.linspace(0.0, 15.0, 6001)
-    run = ss.simulate(machine, ss.VelocityStep(at=0.0, to=1.5), times=times, until=15.0, **FINE)
+    run = ss.simulate(machine, ss.protocol.VelocityStep(at=0.0, to=1.5), times=times, until=15.0, **FINE)
     one, two, load = run["one.displacement"], run["two.displacement"], run["load_displacement"]
     resting = [run[f"{name}.friction_force"][0] for name in ("one", "two")]
 
@@ -85,17 +85,17 @@ def test_light_bodies_move_as_those_of_little_mass():
 
     def blocks(mass):
         return ss.Machine(
-            bodies={name: ss.SlidingBody(mass=mass) for name in ("one", "two")},
+            bodies={name: ss.machine.SlidingBody(mass=mass) for name in ("one", "two")},
             links={
-                "pull": ss.Spring(between=("drive", "one"), stiffness=0.5),
-                "hold": ss.Spring(between=("drive", "two"), stiffness=0.4),
-                "joint": ss.Spring(between=("one", "two"), stiffness=0.3, damping=0.4),
+                "pull": ss.machine.Spring(between=("drive", "one"), stiffness=0.5),
+                "hold": ss.machine.Spring(between=("drive", "two"), stiffness=0.4),
+                "joint": ss.machine.Spring(between=("one", "two"), stiffness=0.3, damping=0.4),
             },
             contacts={"first": surface("one", own[0]), "second": surface("two", own[1])},
-            drive=ss.Pull(velocity=1.0),
+            drive=ss.machine.Pull(velocity=1.0),
         )
 
-    pulse = [ss.DisturbancePulse(at=1.0, by=0.2, duration=3.0, on="two")]
+    pulse = [ss.protocol.DisturbancePulse(at=1.0, by=0.2, duration=3.0, on="two")]
     assert slopes_of_motion(blocks(0.0))[2].form == "eliminated"
     light = ss.simulate(blocks(0.0), pulse, times=TIMES, until=20.0, **FINE)
     assert light.status == "done"
@@ -114,9 +114,9 @@ def test_names_do_not_matter():
     turned = ss.Machine(
         bodies={"zwei": machine.bodies["two"], "eins": machine.bodies["one"]},
         links={
-            "c": ss.Spring(between=("eins", "zwei"), stiffness=0.2),
-            "b": ss.Spring(between=("drive", "zwei"), stiffness=0.45),
-            "a": ss.Spring(between=("drive", "eins"), stiffness=0.45),
+            "c": ss.machine.Spring(between=("eins", "zwei"), stiffness=0.2),
+            "b": ss.machine.Spring(between=("drive", "zwei"), stiffness=0.45),
+            "a": ss.machine.Spring(between=("drive", "eins"), stiffness=0.45),
         },
         contacts={
             "y": dataclasses.replace(machine.contacts["two"], body="zwei"),
@@ -124,7 +124,7 @@ def test_names_do_not_matter():
         },
         drive=machine.drive,
     )
-    step = ss.VelocityStep(at=1.0, to=1.3)
+    step = ss.protocol.VelocityStep(at=1.0, to=1.3)
     first, second = (ss.simulate(m, step, times=TIMES, until=20.0, **FINE) for m in (machine, turned))
     for own, other in (("one", "eins"), ("two", "zwei")):
         assert second[f"{other}.v"] == pytest.approx(first[f"{own}.v"], abs=1e-8)
@@ -136,12 +136,12 @@ def test_names_do_not_matter():
 
 
 def test_an_idle_body_changes_nothing_and_a_stiff_link_little():
-    machine, step = two_mass(kp=1.0), ss.VelocityStep(at=1.0, to=1.2)
+    machine, step = two_mass(kp=1.0), ss.protocol.VelocityStep(at=1.0, to=1.2)
     alone = ss.simulate(machine, step, times=TIMES, until=20.0, **FINE)
     idle = dataclasses.replace(
         machine,
-        bodies={**machine.bodies, "lamp": ss.SlidingBody(mass=0.0)},
-        links={**machine.links, "hook": ss.Spring(between=("table", "lamp"), stiffness=3.0)},
+        bodies={**machine.bodies, "lamp": ss.machine.SlidingBody(mass=0.0)},
+        links={**machine.links, "hook": ss.machine.Spring(between=("table", "lamp"), stiffness=3.0)},
     )
     hung = ss.simulate(idle, step, times=TIMES, until=20.0, **FINE)
     assert hung["table.v"] == pytest.approx(alone["table.v"], abs=1e-9)
@@ -150,8 +150,12 @@ def test_an_idle_body_changes_nothing_and_a_stiff_link_little():
     for size in (1e4, 1e5):  # half of the table's mass beyond a link that hardly gives
         split = dataclasses.replace(
             machine,
-            bodies={**machine.bodies, "table": ss.SlidingBody(mass=2.0), "load": ss.SlidingBody(mass=3.0)},
-            links={**machine.links, "bolts": ss.Spring(between=ends, stiffness=size, damping=0.05 * size)},
+            bodies={
+                **machine.bodies,
+                "table": ss.machine.SlidingBody(mass=2.0),
+                "load": ss.machine.SlidingBody(mass=3.0),
+            },
+            links={**machine.links, "bolts": ss.machine.Spring(between=ends, stiffness=size, damping=0.05 * size)},
         )
         run = ss.simulate(split, step, times=TIMES, until=20.0, **FINE)
         apart.append(np.max(np.abs(run["table.v"] - alone["table.v"])))
@@ -163,9 +167,9 @@ def test_an_idle_body_changes_nothing_and_a_stiff_link_little():
 def test_a_machine_of_one_body_moves_as_a_slider(seed):
     block, machine = same_block(seed)
     pieces = [
-        ss.VelocityStep(at=0.5, to=1.3),
-        ss.DisturbanceStep(at=1.0, by=0.02),
-        ss.NormalStressStep(at=2.0, by=0.05),
+        ss.protocol.VelocityStep(at=0.5, to=1.3),
+        ss.protocol.DisturbanceStep(at=1.0, by=0.02),
+        ss.protocol.NormalStressStep(at=2.0, by=0.05),
     ]
     own, other = (ss.simulate(rig, pieces, times=TIMES, until=20.0) for rig in (block, machine))
     assert own.status == other.status
@@ -181,15 +185,15 @@ def test_a_machine_of_one_body_moves_as_a_slider(seed):
 def test_a_jump_of_the_load_point_leaves_all_where_they_are():
     """Also what turns behind a screw: it falls behind by its own share."""
     machine = ss.Machine(
-        bodies={"table": ss.SlidingBody(mass=1.0), "nut": ss.RotatingBody(inertia=0.2)},
+        bodies={"table": ss.machine.SlidingBody(mass=1.0), "nut": ss.machine.RotatingBody(inertia=0.2)},
         links={
-            "pull": ss.Spring(between=("drive", "table"), stiffness=2.0),
-            "screw": ss.Screw(between=("nut", "table"), lead=0.5, stiffness=5.0, damping=0.3),
+            "pull": ss.machine.Spring(between=("drive", "table"), stiffness=2.0),
+            "screw": ss.machine.Screw(between=("nut", "table"), lead=0.5, stiffness=5.0, damping=0.3),
         },
         contacts={"guide": surface("table", rate_state(0.5, 0.1, 1.0))},
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
-    run = ss.simulate(machine, ss.DisplacementStep(at=1.0, by=0.3), until=3.0)
+    run = ss.simulate(machine, ss.protocol.DisplacementStep(at=1.0, by=0.3), until=3.0)
     (before,) = np.flatnonzero(np.diff(run["t"]) == 0)
     for name in ("table.displacement", "nut.displacement", "nut.v", "guide.slip", "guide.slip_rate"):
         assert run[name][before + 1] == pytest.approx(run[name][before], abs=1e-12), name

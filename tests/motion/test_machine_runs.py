@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_the_contact_that_lifts_off_is_named():
-    lift = ss.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled")
+    lift = ss.protocol.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled")
     run = ss.simulate(two_tables(), lift, until=20.0)
     assert run.status == "contact lost"
     assert run.contact == "oiled"
@@ -33,7 +33,7 @@ def test_the_contact_that_lifts_off_is_named():
 
 
 def test_the_contact_that_sticks_is_named_and_one_may_reverse():
-    back = ss.DisturbancePulse(at=1.0, by=-6.0, duration=0.5, on="back")
+    back = ss.protocol.DisturbancePulse(at=1.0, by=-6.0, duration=0.5, on="back")
     run = ss.simulate(two_tables(), back, until=20.0)
     assert run.status == "done"
     kinds = [(e.contact, e.kind) for e in run.events if e.kind in ("arrest", "restart")]
@@ -57,7 +57,7 @@ def test_the_contact_that_sticks_is_named_and_one_may_reverse():
 
 
 def test_many_machines_move_as_each_alone():
-    pulse = ss.DisturbancePulse(at=1.0, by=-6.0, duration=0.5, on="back")
+    pulse = ss.protocol.DisturbancePulse(at=1.0, by=-6.0, duration=0.5, on="back")
     stiff = [3.0, 8.0, 30.0]
     many = ss.simulate_many(two_tables(), {"links.bar.stiffness": stiff}, pulse, until=20.0, times=TIMES)
     for i, k in enumerate(stiff):
@@ -79,7 +79,7 @@ def test_many_machines_move_as_each_alone():
 
 
 def test_runs_of_machines_in_files(tmp_path):
-    run = ss.simulate(two_tables(), ss.DisturbancePulse(at=1.0, by=-4.0, duration=0.5, on="back"), until=5.0)
+    run = ss.simulate(two_tables(), ss.protocol.DisturbancePulse(at=1.0, by=-4.0, duration=0.5, on="back"), until=5.0)
     run.save(tmp_path / "run.nc")
     again = ss.load_history(tmp_path / "run.nc")
     assert (again.rig, again.protocol, again.events, again.velocities) == (
@@ -98,9 +98,12 @@ def test_runs_of_machines_in_files(tmp_path):
 @pytest.mark.parametrize(
     ("pieces", "said"),
     [
-        ([ss.DisturbanceStep(at=1, by=1.0)], "pieces.1.on: missing; name the body that disturbance-step acts on"),
-        ([ss.NormalStressStep(at=1, by=1.0, on="belt")], "unknown contact 'belt'"),
-        ([ss.DisplacementStep(at=1, by=1.0)], "a displacement step through a dashpot"),
+        (
+            [ss.protocol.DisturbanceStep(at=1, by=1.0)],
+            "pieces.1.on: missing; name the body that disturbance-step acts on",
+        ),
+        ([ss.protocol.NormalStressStep(at=1, by=1.0, on="belt")], "unknown contact 'belt'"),
+        ([ss.protocol.DisplacementStep(at=1, by=1.0)], "a displacement step through a dashpot"),
     ],
 )
 def test_what_cannot_be_done_to_a_machine(pieces, said):
@@ -114,7 +117,7 @@ def test_starting_values_of_machines():
     with pytest.raises(ss.ParameterError, match="make dry slip at -1 m/s"):
         ss.simulate(two_tables(), until=1.0, initial={"front.v": -1.0})
     with pytest.raises(ss.ParameterError, match="a slider is one block"):
-        ss.simulate(same_block(0)[0], ss.DisturbanceStep(at=1, by=1.0, on="front"), until=5.0)
+        ss.simulate(same_block(0)[0], ss.protocol.DisturbanceStep(at=1, by=1.0, on="front"), until=5.0)
 
 
 def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
@@ -140,7 +143,9 @@ def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
 
 
 def test_the_picture_of_a_run_names_contacts_in_their_units():
-    run = ss.simulate(two_tables(), ss.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled"), until=20.0)
+    run = ss.simulate(
+        two_tables(), ss.protocol.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled"), until=20.0
+    )
     panels = run.plot()
     names = [text.get_text() for text in panels[0].get_legend().get_texts()]
     assert names[:2] == ["dry", "oiled"]
@@ -152,7 +157,7 @@ def test_the_picture_of_a_run_names_contacts_in_their_units():
 
 def test_the_phase_plane_is_that_of_the_contact_that_moves_most_or_of_the_one_that_is_named():
     machine = two_tables()
-    run = ss.simulate(machine, ss.VelocityStep(at=1.0, to=1.2 * machine.drive.velocity), until=20.0)
+    run = ss.simulate(machine, ss.protocol.VelocityStep(at=1.0, to=1.2 * machine.drive.velocity), until=20.0)
     change = {name: np.ptp(np.log(run[f"{name}.slip_rate"])) for name in machine.contacts}
     most = max(change, key=change.get)
     other = min(change, key=change.get)
@@ -222,7 +227,7 @@ damping = "1 N s/mm"
 velocity = "2 um/s"
 """
     (tmp_path / "rig.toml").write_text(text + contact.format("one", 0.05) + contact.format("two", 0.008))
-    run = ss.simulate(ss.read_rig(tmp_path / "rig.toml"), ss.VelocityStep(at=1.0, to=3e-6), until=100.0)
+    run = ss.simulate(ss.read_rig(tmp_path / "rig.toml"), ss.protocol.VelocityStep(at=1.0, to=3e-6), until=100.0)
     assert run.status != "done"
     assert all(np.all(np.isfinite(run[name])) for name in run.units)
     assert "nan" not in str(run)
@@ -232,8 +237,8 @@ def test_friction_far_beyond_its_stribeck_velocity_sets_no_scale():
     """There it depends on velocity by exp(−100): steps that tell such differences apart would never end."""
     pad = ss.read_rig("examples/machines/brake-pad.toml")
     disc = pad.contacts["disc"]
-    friction = ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=0.1)
+    friction = ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=0.1)
     quick = dataclasses.replace(pad, contacts={"disc": dataclasses.replace(disc, friction=friction)})
-    done = ss.simulate(quick, ss.VelocityStep(at=1e-3, to=1.1), until=5e-3)
+    done = ss.simulate(quick, ss.protocol.VelocityStep(at=1e-3, to=1.1), until=5e-3)
     assert (done.status, done.steps < 5000) == ("done", True)
     assert done["pad.v"][-1] == pytest.approx(1.1, rel=0.2)

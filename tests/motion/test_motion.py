@@ -48,7 +48,9 @@ def test_energy_is_accounted_for(law):
     """What the load point puts in is stored in spring and motion, or spent in friction and damping."""
     mass, damping = 0.5, 0.3
     a_rig = unit_rig(law, 0.5, 0.8, damping, mass)
-    run = ss.simulate(a_rig, ss.VelocityStep(at=2.0, to=2.0), until=30.0, times=np.linspace(0, 30, 30001), rtol=1e-10)
+    run = ss.simulate(
+        a_rig, ss.protocol.VelocityStep(at=2.0, to=2.0), until=30.0, times=np.linspace(0, 30, 30001), rtol=1e-10
+    )
     v, t = run["v"], run["t"]
 
     def work(stress, velocity):
@@ -99,13 +101,13 @@ def test_small_kicks_grow_as_the_eigenvalues_say(law, contact, mass):
 
     The kick is a millionth of a slip distance and grows to e^4 times that, so that squares of it are not seen.
     """
-    if isinstance(contact, ss.Lift):
-        contact = ss.Lift(preload=5e6, lift=2e10, v_ref=1e-6)  # far enough from ill-posed for a kick to stay small
+    if isinstance(contact, ss.laws.Lift):
+        contact = ss.laws.Lift(preload=5e6, lift=2e10, v_ref=1e-6)  # far enough from ill-posed for a kick to stay small
     random = np.random.default_rng(31 * len(law) + len(contact.name))
     a_rig = rig(friction=LAWS[law], contact=contact, mass=mass, stiffness=float(random.uniform(3e9, 3e10)))
     if law == "prakash-clifton" and contact.name == "linear" and not mass:
         pytest.skip("ill-posed")
-    if law == "lugre" and isinstance(contact, ss.Lift):
+    if law == "lugre" and isinstance(contact, ss.laws.Lift):
         pytest.skip("bristles give way to any lift at this velocity")
     rates = np.atleast_1d(ss.eigenvalues(a_rig)).astype(complex)
     slow = np.abs(rates)[np.abs(rates) < 50 * np.abs(rates).min()]
@@ -164,7 +166,7 @@ def time_of_blow_up(law, lam, kappa, step):
 def test_time_of_blow_up(law, share, step):
     """Below k_cr a step in rate ends in infinite velocity; the time is a number, good to 1e-6."""
     lam = 0.5
-    run = ss.simulate(unit_rig(law, lam, share * lam), ss.VelocityStep(at=0.0, to=step), until=1000.0)
+    run = ss.simulate(unit_rig(law, lam, share * lam), ss.protocol.VelocityStep(at=0.0, to=step), until=1000.0)
     assert run.status == "blow-up"
     assert run.events[-1].kind == "blow-up"
     assert run.end == pytest.approx(time_of_blow_up(law, lam, share * lam, step), rel=1e-6)
@@ -183,9 +185,9 @@ def test_thresholds_in_closed_form():
     a_rig = unit_rig("slip", lam, lam)
     velocity = b / (b - a)
     scale = velocity  # the edge is that of the new rate, the same for the quasistatic law
-    assert survives(a_rig, ss.VelocityStep(at=0.0, to=velocity * (1 - 1e-5)), 3000 / scale)
-    assert not survives(a_rig, ss.VelocityStep(at=0.0, to=velocity * (1 + 1e-5)), 3000 / scale)
+    assert survives(a_rig, ss.protocol.VelocityStep(at=0.0, to=velocity * (1 - 1e-5)), 3000 / scale)
+    assert not survives(a_rig, ss.protocol.VelocityStep(at=0.0, to=velocity * (1 + 1e-5)), 3000 / scale)
     for branch in (0, -1):
         step = (1 + lambertw(-lam / (np.e * (1 + lam)), branch).real) / lam
-        assert survives(a_rig, ss.DisplacementStep(at=0.0, by=step * (1 - 1e-5)))
-        assert not survives(a_rig, ss.DisplacementStep(at=0.0, by=step * (1 + 1e-5)))
+        assert survives(a_rig, ss.protocol.DisplacementStep(at=0.0, by=step * (1 - 1e-5)))
+        assert not survives(a_rig, ss.protocol.DisplacementStep(at=0.0, by=step * (1 + 1e-5)))

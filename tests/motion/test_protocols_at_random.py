@@ -11,14 +11,14 @@ from moving_machines import two_tables
 from protocols_by_scipy import TIMES, UNTIL, RandomProtocol, louder, solved
 
 WAVES = [
-    ss.VelocityHarmonic(amplitude=0.2, period=3.0),
-    ss.VelocityHarmonic(amplitude=0.1, period=1.7, at=2.0, phase=1.0),
-    ss.DisturbanceHarmonic(amplitude=0.1, period=2.0, at=1.0, until=6.0, on="front"),
-    ss.DisturbanceHarmonic(amplitude=-0.05, period=5.0, on="front"),
-    ss.DisturbanceHarmonic(amplitude=0.07, period=1.3, on="back"),
-    ss.NormalStressHarmonic(amplitude=0.2, period=4.0, on="dry"),
-    ss.NormalStressHarmonic(amplitude=0.1, period=2.5, on="dry", phase=2.0),
-    ss.NormalStressHarmonic(amplitude=0.1, period=1.9, on="oiled"),
+    ss.protocol.VelocityHarmonic(amplitude=0.2, period=3.0),
+    ss.protocol.VelocityHarmonic(amplitude=0.1, period=1.7, at=2.0, phase=1.0),
+    ss.protocol.DisturbanceHarmonic(amplitude=0.1, period=2.0, at=1.0, until=6.0, on="front"),
+    ss.protocol.DisturbanceHarmonic(amplitude=-0.05, period=5.0, on="front"),
+    ss.protocol.DisturbanceHarmonic(amplitude=0.07, period=1.3, on="back"),
+    ss.protocol.NormalStressHarmonic(amplitude=0.2, period=4.0, on="dry"),
+    ss.protocol.NormalStressHarmonic(amplitude=0.1, period=2.5, on="dry", phase=2.0),
+    ss.protocol.NormalStressHarmonic(amplitude=0.1, period=1.9, on="oiled"),
 ]
 
 
@@ -68,7 +68,7 @@ def test_random_protocols_in_lanes_in_maps_and_on_a_page(seed, tmp_path):
         check(case, pieces, {name: values[lane] for name, values in many.samples.items()}, f"lane {lane}")
     place, values = next(iter(vary.items()))
     found = ss.run_map(
-        ss.Map(case.rig(), {place: values}, [ss.Events(until=UNTIL)], protocol=case.pieces), tmp_path / "map.zarr"
+        ss.Map(case.rig(), {place: values}, [ss.maps.Events(until=UNTIL)], protocol=case.pieces), tmp_path / "map.zarr"
     )
     alone = ss.simulate(case.rig(), case.pieces, until=UNTIL)
     assert float(np.asarray(found.dataset["peak_velocity"]).ravel()[0]) == pytest.approx(alone.velocities[1], rel=1e-5)

@@ -18,10 +18,10 @@ EASY = replace(
     },
 )
 ALL = [
-    ss.DisturbanceHarmonic(amplitude=0.1, period=3.0, on="front"),
-    ss.DisturbanceStep(at=2.0, by=-0.05, on="back"),
-    ss.NormalStressRamp(at=1.0, by=0.3, duration=4.0, on="dry"),
-    ss.NormalStressHarmonic(amplitude=0.1, period=2.0, on="oiled"),
+    ss.protocol.DisturbanceHarmonic(amplitude=0.1, period=3.0, on="front"),
+    ss.protocol.DisturbanceStep(at=2.0, by=-0.05, on="back"),
+    ss.protocol.NormalStressRamp(at=1.0, by=0.3, duration=4.0, on="dry"),
+    ss.protocol.NormalStressHarmonic(amplitude=0.1, period=2.0, on="oiled"),
 ]
 
 
@@ -79,11 +79,11 @@ def test_pushes_on_both_ends_of_a_rigid_bar_are_one_push_of_their_sum():
     """To first order in what the bar gives."""
     apart = []
     for stiffness in (1e3, 1e4):
-        bar = ss.Spring(between=("front", "back"), stiffness=stiffness, damping=0.5 * stiffness**0.5)
+        bar = ss.machine.Spring(between=("front", "back"), stiffness=stiffness, damping=0.5 * stiffness**0.5)
         rigid = replace(EASY, links={**EASY.links, "bar": bar})
-        both = run(rigid, [ss.DisturbanceRamp(at=1, by=0.2, duration=2, on="front"),
-                           ss.DisturbanceRamp(at=1, by=0.1, duration=2, on="back")])  # fmt: skip
-        one = run(rigid, ss.DisturbanceRamp(at=1, by=0.3, duration=2, on="back"))
+        both = run(rigid, [ss.protocol.DisturbanceRamp(at=1, by=0.2, duration=2, on="front"),
+                           ss.protocol.DisturbanceRamp(at=1, by=0.1, duration=2, on="back")])  # fmt: skip
+        one = run(rigid, ss.protocol.DisturbanceRamp(at=1, by=0.3, duration=2, on="back"))
         apart.append(np.max(np.abs(both["back.v"] - one["back.v"])[TIMES > 4]))
     assert apart[0] < 1e-3
     assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.2)
@@ -111,7 +111,7 @@ def test_order_and_names_do_not_matter():
 
 def test_energy_is_kept():
     """Work of drive and pushes: into motion, springs, dashpots and friction."""
-    smooth = [ALL[0], ss.DisturbanceRamp(at=0.0, by=-0.05, duration=12.0, on="back"), *ALL[2:]]
+    smooth = [ALL[0], ss.protocol.DisturbanceRamp(at=0.0, by=-0.05, duration=12.0, on="back"), *ALL[2:]]
     found = ss.simulate(EASY, smooth, until=12.0, times=np.linspace(0, 12, 12001), rtol=1e-9)
     v, w, forces = found["front.v"], found["back.v"], {n: found[f"links.{n}.force"] for n in EASY.links}
     power = (forces["belt"] + found["front.disturbance"]) * v + found["back.disturbance"] * w
@@ -130,29 +130,29 @@ def test_ensembles_vary_every_piece():
 
 
 def test_one_contact_is_pressed_while_fluid_is_injected_into_another():
-    fluid = ss.PoreFluid(preload=2.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
+    fluid = ss.laws.PoreFluid(preload=2.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
     wet = replace(EASY, contacts={**EASY.contacts, "dry": replace(EASY.contacts["dry"], contact=fluid)})
-    pieces = [ss.NormalStressStep(at=1.0, by=0.2, on="oiled"), ss.InjectionStep(at=2.0, by=0.3)]
+    pieces = [ss.protocol.NormalStressStep(at=1.0, by=0.2, on="oiled"), ss.protocol.InjectionStep(at=2.0, by=0.3)]
     found = run(wet, pieces)
     assert found["oiled.normal_force"][-1] == pytest.approx(1.2)
     assert found["injection"][-1] == pytest.approx(0.3)
     dry = run(wet, pieces[:1])
     assert found["dry.pore_pressure"][-1] - dry["dry.pore_pressure"][-1] == pytest.approx(0.3, rel=0.02)
     assert found["normal_disturbance"][-1] == pytest.approx(0.2)
-    pressed = run(wet, [*pieces, ss.NormalStressStep(at=3.0, by=0.1, on="dry")])
+    pressed = run(wet, [*pieces, ss.protocol.NormalStressStep(at=3.0, by=0.1, on="dry")])
     later = TIMES > 3
     assert pressed["dry.normal_force"][later] == pytest.approx(2.1 - pressed["dry.pore_pressure"][later], abs=1e-9)
 
 
 def test_a_slider_is_pushed_pressed_and_injected_at_once():
     rig = ss.Slider(
-        friction=rate_state(0.3, 0.1, 1.0), stiffness=0.7, mass=1.0, drive=ss.Steady(1.0),
-        contact=ss.PoreFluid(preload=1.0, suction=0.0, drainage=2.0, slip_distance=0.7, v_ref=1.0),
+        friction=rate_state(0.3, 0.1, 1.0), stiffness=0.7, mass=1.0, drive=ss.machine.SteadyDrive(1.0),
+        contact=ss.laws.PoreFluid(preload=1.0, suction=0.0, drainage=2.0, slip_distance=0.7, v_ref=1.0),
     )  # fmt: skip
     pieces = [
-        ss.DisturbanceStep(at=1.0, by=0.05),
-        ss.NormalStressStep(at=2.0, by=0.1),
-        ss.InjectionStep(at=3.0, by=0.2),
+        ss.protocol.DisturbanceStep(at=1.0, by=0.05),
+        ss.protocol.NormalStressStep(at=2.0, by=0.1),
+        ss.protocol.InjectionStep(at=3.0, by=0.2),
     ]
     found = ss.simulate(rig, pieces, until=20.0)
     ends = {name: found[name][-1] for name in ("disturbance", "normal_disturbance", "injection")}
@@ -172,10 +172,10 @@ def test_results_keep_every_channel(tmp_path):
 
 def test_all_wrong_targets_are_told_at_once():
     pieces = [
-        ss.DisturbanceStep(at=1, by=1.0),
-        ss.DisturbanceStep(at=1, by=1.0, on="bakc"),
-        ss.NormalStressStep(at=1, by=1.0, on="front"),
-        ss.InjectionStep(at=1, by=1.0, on="dry"),
+        ss.protocol.DisturbanceStep(at=1, by=1.0),
+        ss.protocol.DisturbanceStep(at=1, by=1.0, on="bakc"),
+        ss.protocol.NormalStressStep(at=1, by=1.0, on="front"),
+        ss.protocol.InjectionStep(at=1, by=1.0, on="dry"),
     ]
     with pytest.raises(ss.ParameterError) as told:
         run(EASY, pieces)

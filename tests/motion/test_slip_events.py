@@ -33,18 +33,26 @@ def excursions(run):
     return found
 
 
-SLOW_LUGRE = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
+SLOW_LUGRE = ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
 
 
 @pytest.mark.parametrize(
     ("a_rig", "protocol", "count"),
     [
-        (unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=1.03), 0),  # ringing, an overshoot of 2 %
-        (unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=3.0), 20),  # ringing from an overshoot of 13 times
-        (unit_rig("aging", 0.5, 1.5), ss.VelocityStep(at=5, to=0.1), 0),  # slowing down to a tenth
-        (unit_rig("aging", 0.5, 20.0), ss.Hold(at=5, duration=30.0), 0),
-        (unit_rig("aging", 0.5, 20.0), ss.SlideHoldSlide(at=5, hold=1, factor=10, slide=10, repeats=3), 0),
-        (unit_rig("aging", 0.5, 0.3, 1e-3), ss.VelocityStep(at=5, to=1.1) + ss.Hold(at=100, duration=50), None),
+        (unit_rig("aging", 0.5, 0.51), ss.protocol.VelocityStep(at=5, to=1.03), 0),  # ringing, an overshoot of 2 %
+        (
+            unit_rig("aging", 0.5, 0.51),
+            ss.protocol.VelocityStep(at=5, to=3.0),
+            20,
+        ),  # ringing from an overshoot of 13 times
+        (unit_rig("aging", 0.5, 1.5), ss.protocol.VelocityStep(at=5, to=0.1), 0),  # slowing down to a tenth
+        (unit_rig("aging", 0.5, 20.0), ss.protocol.Hold(at=5, duration=30.0), 0),
+        (unit_rig("aging", 0.5, 20.0), ss.protocol.SlideHoldSlide(at=5, hold=1, factor=10, slide=10, repeats=3), 0),
+        (
+            unit_rig("aging", 0.5, 0.3, 1e-3),
+            ss.protocol.VelocityStep(at=5, to=1.1) + ss.protocol.Hold(at=100, duration=50),
+            None,
+        ),
     ],
     ids=["overshoot", "ringing", "slower", "hold", "slide-hold-slide", "stick-slip"],
 )
@@ -73,7 +81,7 @@ def test_slip_events_are_what_their_definition_says(a_rig, protocol, count):
 def test_a_held_block_that_vibrates_makes_no_slip_events():
     """With mass a held block swings about rest, through both signs of velocity."""
     a_rig = rig(friction=SLOW_LUGRE, mass=1e8, stiffness=4e11)
-    protocol = ss.SlideHoldSlide(at=2.0, hold=1.0, factor=3.0, slide=3.0, repeats=3)
+    protocol = ss.protocol.SlideHoldSlide(at=2.0, hold=1.0, factor=3.0, slide=3.0, repeats=3)
     run = ss.simulate(a_rig, protocol, until=25.0, times=np.linspace(0, 25, 20001))
     held = run["load_velocity"] == 0
     assert np.sum(np.diff(np.sign(run["v"][held])) != 0) > 10
@@ -82,7 +90,7 @@ def test_a_held_block_that_vibrates_makes_no_slip_events():
 
 def test_a_kick_during_a_hold_begins_where_it_is_given():
     """The block had not come to rest: the slip event begins at the kick, not with the hold."""
-    protocol = ss.Hold(at=5.0, duration=40.0) + ss.NormalStressStep(at=6.0, by=-0.08)
+    protocol = ss.protocol.Hold(at=5.0, duration=40.0) + ss.protocol.NormalStressStep(at=6.0, by=-0.08)
     run = ss.simulate(unit_rig("aging", 0.5, 1.5, 1e-3), protocol, until=60.0)
     (slip, *_) = run.slip_events
     assert slip.begin == pytest.approx(6.0)
@@ -102,10 +110,10 @@ def test_error_of_default_settings():
 
 def test_coulomb_friction_sticks_and_breaks_loose_at_the_static_limit():
     """Stuck blocks creep at less than a millionth; friction reaches μ_S σ before each slip, no more."""
-    friction = ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5)
-    contact = ss.Constant(preload=1e5)
-    a_rig = ss.Slider(friction=friction, contact=contact, stiffness=1e8, mass=100.0, drive=ss.Steady(1e-3))
-    run = ss.simulate(a_rig, ss.VelocityStep(at=0.01, to=1.1e-3), until=1.0)
+    friction = ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5)
+    contact = ss.laws.ConstantNormalStress(preload=1e5)
+    a_rig = ss.Slider(friction=friction, contact=contact, stiffness=1e8, mass=100.0, drive=ss.machine.SteadyDrive(1e-3))
+    run = ss.simulate(a_rig, ss.protocol.VelocityStep(at=0.01, to=1.1e-3), until=1.0)
     assert run.status == "done"
     assert len(run.slip_events) > 4
     late = run["t"] > 0.3
@@ -115,14 +123,14 @@ def test_coulomb_friction_sticks_and_breaks_loose_at_the_static_limit():
     assert np.all(run["v"][stuck] > -1e-8)
 
 
-class Softening(ss.FrictionLaw):
+class Softening(ss.laws.FrictionLaw):
     """A law of one's own: strength falls with a saturating memory, and a kink."""
 
-    mu: float = ss.parameter("1", positive, "level")
-    a: float = ss.parameter("1", positive, "direct effect")
-    c: float = ss.parameter("1", real, "evolution effect")
-    length: float = ss.parameter("m", positive, "slip distance")
-    v_ref: float = ss.parameter("m/s", positive, "reference")
+    mu: float = ss.laws.parameter("1", positive, "level")
+    a: float = ss.laws.parameter("1", positive, "direct effect")
+    c: float = ss.laws.parameter("1", real, "evolution effect")
+    length: float = ss.laws.parameter("m", positive, "slip distance")
+    v_ref: float = ss.laws.parameter("m/s", positive, "reference")
 
     def memory(self):
         return ("s",)
@@ -168,9 +176,10 @@ def test_summary_tells_the_same_whatever_the_steps():
 
 def test_a_method_that_would_compile_for_minutes_is_refused():
     """Where each of many stages would solve the balance of forces; what `auto` and few stages do is not touched."""
-    rock = ss.RateState(a=0.014, b=0.016, d_c="1 um", mu_ref=0.7, v_ref="1 um/s", regularised=True)
+    rock = ss.laws.RateState(a=0.014, b=0.016, d_c="1 um", mu_ref=0.7, v_ref="1 um/s", regularised=True)
     slow = ss.Slider(
-        friction=rock, contact=ss.Constant(preload="5 MPa"), stiffness="12 GPa/m", drive=ss.Steady("1 um/s"),
+        friction=rock, contact=ss.laws.ConstantNormalStress(preload="5 MPa"), stiffness="12 GPa/m",
+        drive=ss.machine.SteadyDrive("1 um/s"),
         radiation_damping=1e6,
     )  # fmt: skip
     assert prepare(slow, None, 1.0, {}, {}, Options()).reduction.unknowns
@@ -183,7 +192,7 @@ def test_a_method_that_would_compile_for_minutes_is_refused():
 
 def test_the_range_of_velocity_is_that_of_the_run_not_of_its_samples():
     """A drop at a step lies between samples; the lowest and highest of the solver's own steps are met."""
-    plan = [ss.VelocityStep(at=10.0, to=1e-8), ss.VelocityStep(at=20.0, to=3e-6)]
+    plan = [ss.protocol.VelocityStep(at=10.0, to=1e-8), ss.protocol.VelocityStep(at=20.0, to=3e-6)]
     a_rig = rig(stiffness=2e10)
     whole = ss.simulate(a_rig, plan, until=30.0)
     few = ss.simulate(a_rig, plan, until=30.0, times=[0.0, 30.0])
@@ -205,7 +214,7 @@ def test_steady_sliding_has_no_events_however_long_the_steps(rtol, until):
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
 def test_ringing_has_every_peak_and_trough_down_to_the_error_allowed(rtol):
     """None is left out or told twice, and none is told of what the integration may have made itself."""
-    run = ss.simulate(unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=1.03), until=8000.0, rtol=rtol)
+    run = ss.simulate(unit_rig("aging", 0.5, 0.51), ss.protocol.VelocityStep(at=5, to=1.03), until=8000.0, rtol=rtol)
     turns = [event for event in run.events if event.kind.startswith("velocity")]
     kinds = [event.kind for event in turns]
     assert kinds == (["velocity peak", "velocity trough"] * len(turns))[: len(turns)]

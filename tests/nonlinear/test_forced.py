@@ -22,8 +22,13 @@ OSCILLATING = {  # amplitude, period: mean shear over mean normal stress, gain, 
 
 
 def press(**law):
-    rock = ss.RateState(**(ROCK | {"normal_memory": ss.LinkerDieterich(alpha=0.2)} | law))
-    return ss.Slider(friction=rock, contact=ss.Constant(preload=25e6), stiffness=1e10, drive=ss.Steady(1e-5))
+    rock = ss.laws.RateState(**(ROCK | {"normal_memory": ss.laws.LinkerDieterich(alpha=0.2)} | law))
+    return ss.Slider(
+        friction=rock,
+        contact=ss.laws.ConstantNormalStress(preload=25e6),
+        stiffness=1e10,
+        drive=ss.machine.SteadyDrive(1e-5),
+    )
 
 
 def test_an_oscillating_normal_stress():
@@ -84,11 +89,11 @@ def test_small_amplitudes_answer_as_the_transfer_function(swings, answers, ampli
 
 
 @pytest.mark.parametrize(
-    ("evolution", "drop"), [(ss.Aging(), -0.0034235), (ss.Slip(), -0.0075895)], ids=["aging", "slip"]
+    ("evolution", "drop"), [(ss.laws.Aging(), -0.0034235), (ss.laws.Slip(), -0.0075895)], ids=["aging", "slip"]
 )
 def test_fast_modulation_lowers_friction(evolution, drop):
     """Theory 4: a = .01, b = .015, μ = .6, ε = .02, much faster than d_c/v; here at 1/50 of that."""
-    law = {"b": 0.015, "evolution": evolution, "normal_memory": ss.NoMemory()}
+    law = {"b": 0.015, "evolution": evolution, "normal_memory": ss.laws.NoMemory()}
     rig = press(**law).with_values({"stiffness": 3e10})
     found = ss.response(rig, [0.02], output="shear-stress", amplitudes=[0.02 * 25e6])
     assert found.shift[0, 0] / 25e6 == pytest.approx(drop, rel=2e-3)
@@ -96,7 +101,7 @@ def test_fast_modulation_lowers_friction(evolution, drop):
 
 def test_what_cannot_swing_any_more():
     """Above its critical stiffness a weakening rig without mass is lost at some amplitude, and says from which."""
-    rig = press(b=0.015, normal_memory=ss.NoMemory()).with_values({"stiffness": 1.3 * 12.5e9})
+    rig = press(b=0.015, normal_memory=ss.laws.NoMemory()).with_values({"stiffness": 1.3 * 12.5e9})
     found = ss.response(rig, [5.0], amplitudes=[1e5, 1.2e7], limits=True)
     assert found.status[0, 0] == "periodic"
     assert found.status[1, 0] != "periodic"
@@ -112,19 +117,21 @@ def test_what_cannot_swing_any_more():
 def two_bodies(area=None):
     """Two bodies on a spring of their own, a contact under each; the first is pulled."""
     n = 1 / (area or 1.0)
-    first = ss.RateState(**ROCK, normal_memory=ss.LinkerDieterich(alpha=0.2))
-    second = ss.RateState(a=0.012, b=0.007, d_c=3e-5, mu_ref=0.5, v_ref=1e-5, evolution=ss.Aging())
+    first = ss.laws.RateState(**ROCK, normal_memory=ss.laws.LinkerDieterich(alpha=0.2))
+    second = ss.laws.RateState(a=0.012, b=0.007, d_c=3e-5, mu_ref=0.5, v_ref=1e-5, evolution=ss.laws.Aging())
     return ss.Machine(
-        bodies={"table": ss.SlidingBody(mass=4e9), "head": ss.SlidingBody(mass=1e9)},
+        bodies={"table": ss.machine.SlidingBody(mass=4e9), "head": ss.machine.SlidingBody(mass=1e9)},
         links={
-            "spring": ss.Spring(between=("drive", "table"), stiffness=1e10, damping=2e9),
-            "column": ss.Spring(between=("table", "head"), stiffness=3e10, damping=1e9),
+            "spring": ss.machine.Spring(between=("drive", "table"), stiffness=1e10, damping=2e9),
+            "column": ss.machine.Spring(between=("table", "head"), stiffness=3e10, damping=1e9),
         },
         contacts={
-            "guide": ss.Surface(body="table", friction=first, contact=ss.Constant(preload=25e6 * n), area=area),
-            "seal": ss.Surface(body="head", friction=second, contact=ss.Constant(preload=10e6 * n), area=area),
+            "guide": ss.machine.Surface(body="table", friction=first,
+            contact=ss.laws.ConstantNormalStress(preload=25e6 * n), area=area),
+            "seal": ss.machine.Surface(body="head", friction=second,
+            contact=ss.laws.ConstantNormalStress(preload=10e6 * n), area=area),
         },
-        drive=ss.Pull(velocity=1e-5),
+        drive=ss.machine.Pull(velocity=1e-5),
     )  # fmt: skip
 
 
@@ -196,7 +203,7 @@ def test_large_amplitudes_of_two_contacts_as_scipy_has_them():
 
 def test_resonance_with_the_rig():
     """Theory 4: at the critical stiffness T_c = 2π (d_c/v0) √(a/κ); between periods far apart it is found as well."""
-    rig = press(b=0.015, normal_memory=ss.NoMemory()).with_values({"stiffness": 1.0001 * 12.5e9})
+    rig = press(b=0.015, normal_memory=ss.laws.NoMemory()).with_values({"stiffness": 1.0001 * 12.5e9})
     kappa = 1.0001 * 12.5e9 * 1e-5 / 25e6
     found = ss.response(rig, [1.0, 100.0], output="v")
     period, gain, phase = found.resonances[0]
@@ -210,8 +217,8 @@ def test_resonance_with_the_rig():
     peaks = dense[1:-1][(gains[1:-1] > gains[:-2]) & (gains[1:-1] > gains[2:])]
     np.testing.assert_allclose(np.sort(answer.resonances[:, 0]), peaks, rtol=1e-3)
     ringing = replace(
-        two_bodies(), bodies={**two_bodies().bodies, "arm": ss.SlidingBody(mass=10.0)},
-        links={**two_bodies().links, "arm": ss.Spring(between=("head", "arm"), stiffness=1e7, damping=1e-3)},
+        two_bodies(), bodies={**two_bodies().bodies, "arm": ss.machine.SlidingBody(mass=10.0)},
+        links={**two_bodies().links, "arm": ss.machine.Spring(between=("head", "arm"), stiffness=1e7, damping=1e-3)},
     )  # fmt: skip
     period, gain, _ = ss.response(ringing, [1e-4, 1.0], input="push", on="arm", output="arm.v").resonances[0]
     assert (period, gain) == (pytest.approx(2 * np.pi * 1e-3, rel=1e-7), pytest.approx(1000, rel=0.01))
@@ -221,7 +228,7 @@ def test_resonance_with_the_rig():
 def test_limits_as_scipy_has_them():
     """Of a weakening rig near its critical stiffness: just below the amplitude at which it is lost it swings on."""
     a, b, d_c, mu, v, sigma, k, period = 0.010, 0.015, 1e-5, 0.6, 1e-5, 25e6, 1.3 * 12.5e9, 5.0
-    rig = press(b=b, normal_memory=ss.NoMemory()).with_values({"stiffness": k})
+    rig = press(b=b, normal_memory=ss.laws.NoMemory()).with_values({"stiffness": k})
     found = ss.response(rig, [period], output="v", limits=True)
 
     def swung(size):
@@ -266,10 +273,14 @@ def test_outputs_that_hardly_swing_and_transients_that_outlast_the_run():
 def test_a_machine_of_one_body_answers_as_its_slider():
     friction = press().friction
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=2e5)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=1e10)},
-        contacts={"face": ss.Surface(body="block", friction=friction, contact=ss.Constant(preload=25e6))},
-        drive=ss.Pull(velocity=1e-5),
+        bodies={"block": ss.machine.SlidingBody(mass=2e5)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=1e10)},
+        contacts={
+            "face": ss.machine.Surface(
+                body="block", friction=friction, contact=ss.laws.ConstantNormalStress(preload=25e6)
+            )
+        },
+        drive=ss.machine.Pull(velocity=1e-5),
     )
     slider = press().with_values({"mass": 2e5})
     periods, amplitudes = [5.0, 20.0], [1e6]

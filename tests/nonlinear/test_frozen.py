@@ -8,31 +8,31 @@ import pytest
 import steadyslip as ss
 from command import run
 
-ROCK = ss.RateState(a=0.010, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-5)
+ROCK = ss.laws.RateState(a=0.010, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-5)
 """k_cr = σ (b − a)/d_c: 5 GPa/m at 10 MPa."""
-FIRM = ss.RateState(a=0.015, b=0.010, d_c=1e-5, mu_ref=0.6, v_ref=1e-5)
+FIRM = ss.laws.RateState(a=0.015, b=0.010, d_c=1e-5, mu_ref=0.6, v_ref=1e-5)
 WET = {"drainage": 1.0, "slip_distance": 1e-5, "v_ref": 1e-5}
 
 
 def press(contact=None, friction=ROCK, **own):
-    given = {"stiffness": 5e9, "mass": 1e3, "drive": ss.Steady(1e-5)} | own
-    return ss.Slider(friction=friction, contact=contact or ss.Constant(preload=5e6), **given)
+    given = {"stiffness": 5e9, "mass": 1e3, "drive": ss.machine.SteadyDrive(1e-5)} | own
+    return ss.Slider(friction=friction, contact=contact or ss.laws.ConstantNormalStress(preload=5e6), **given)
 
 
 def machine(first, second=None, area=None, friction=ROCK):
     """A block on one or two faces, as stiff as the press for each m² of the first."""
-    contacts = {"face": ss.Surface(body="block", friction=friction, contact=first, area=area)}
+    contacts = {"face": ss.machine.Surface(body="block", friction=friction, contact=first, area=area)}
     if second is not None:
-        contacts["other"] = ss.Surface(body="block", friction=FIRM, contact=second)
+        contacts["other"] = ss.machine.Surface(body="block", friction=FIRM, contact=second)
     return ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1e3 * (area or 1.0))},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=5e9 * (area or 1.0))},
-        contacts=contacts, drive=ss.Pull(velocity=1e-5),
+        bodies={"block": ss.machine.SlidingBody(mass=1e3 * (area or 1.0))},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=5e9 * (area or 1.0))},
+        contacts=contacts, drive=ss.machine.Pull(velocity=1e-5),
     )  # fmt: skip
 
 
 def test_a_press_that_is_loaded_ever_harder():
-    ramp = ss.NormalStressRamp(at=10, by=10e6, duration=200)
+    ramp = ss.protocol.NormalStressRamp(at=10, by=10e6, duration=200)
     found = ss.frozen_verdicts(press(), ramp, until=400)
     ((time, verdict),) = found.crossings
     assert (time, verdict) == (pytest.approx(110, abs=1e-3), "unstable")
@@ -41,13 +41,13 @@ def test_a_press_that_is_loaded_ever_harder():
     assert found.e_folds > 1
     assert "contact.preload 10 MPa" in str(found)
     assert len(found.plot()) == 2
-    slower = ss.frozen_verdicts(press(), ss.NormalStressRamp(at=10, by=10e6, duration=400), until=800)
+    slower = ss.frozen_verdicts(press(), ss.protocol.NormalStressRamp(at=10, by=10e6, duration=400), until=800)
     assert slower.crossings[0][0] == pytest.approx(210, abs=0.01)
 
 
 def test_verdicts_go_on_where_the_motion_ends():
     """Without mass slip runs away; the load is taken off again afterwards, at once."""
-    load = [ss.NormalStressRamp(at=0, by=10e6, duration=200), ss.NormalStressStep(at=300, by=-10e6)]
+    load = [ss.protocol.NormalStressRamp(at=0, by=10e6, duration=200), ss.protocol.NormalStressStep(at=300, by=-10e6)]
     found = ss.frozen_verdicts(press(mass=0.0), load, until=400)
     assert found.run.status == "blow-up"
     assert found.departure <= found.run.end < 250
@@ -58,15 +58,15 @@ def test_verdicts_go_on_where_the_motion_ends():
 
 def test_a_heavy_block_departs_where_it_takes_off():
     heavy = press(mass=1e12, stiffness=1e9)
-    found = ss.frozen_verdicts(heavy, ss.NormalStressRamp(at=0, by=-10e6, duration=1), until=1)
+    found = ss.frozen_verdicts(heavy, ss.protocol.NormalStressRamp(at=0, by=-10e6, duration=1), until=1)
     assert found.run.status == "contact lost"
     assert found.departure == found.run.end == pytest.approx(0.5, rel=1e-3)
 
 
 def test_injection_unloads():
     """The effective stress falls from 15 to 7 MPa: stable from 10 MPa on."""
-    wet = ss.PoreFluid(preload=15e6, suction=0.0, **WET)
-    found = ss.frozen_verdicts(press(wet), ss.InjectionRamp(at=0, by=8e6, duration=80), until=100)
+    wet = ss.laws.PoreFluid(preload=15e6, suction=0.0, **WET)
+    found = ss.frozen_verdicts(press(wet), ss.protocol.InjectionRamp(at=0, by=8e6, duration=80), until=100)
     ((time, verdict),) = found.crossings
     assert (time, verdict) == (pytest.approx(50, abs=0.01), "stable")
 
@@ -74,10 +74,10 @@ def test_injection_unloads():
 @pytest.mark.parametrize(
     "contact",
     [
-        ss.Constant(preload=5e6), ss.InclinedSpring(preload=5e6, angle=0.5),
-        ss.Triaxial(confining_pressure=5e6, angle=0.5), ss.LeadScrew(axial_load=5e6, lead_angle=0.5),
-        ss.DilatingLayer(preload=5e6, ram_stiffness=2e10, dilatancy=1e-6, v_ref=1e-5),
-        ss.Lift(preload=5e6, lift=1e9, v_ref=1e-5), ss.PoreFluid(preload=5e6, suction=2e4, **WET),
+        ss.laws.ConstantNormalStress(preload=5e6), ss.laws.InclinedSpring(preload=5e6, angle=0.5),
+        ss.laws.Triaxial(confining_pressure=5e6, angle=0.5), ss.laws.LeadScrew(axial_load=5e6, lead_angle=0.5),
+        ss.laws.DilatingLayer(preload=5e6, ram_stiffness=2e10, dilatancy=1e-6, v_ref=1e-5),
+        ss.laws.Lift(preload=5e6, lift=1e9, v_ref=1e-5), ss.laws.PoreFluid(preload=5e6, suction=2e4, **WET),
     ],
     ids=lambda one: one.name,
 )  # fmt: skip
@@ -85,7 +85,7 @@ def test_injection_unloads():
 def test_steady_sliding_of_the_values_is_where_motion_ends_up(contact, area):
     """Of a strengthening rig after steps of load and velocity; of a machine with an area the step is a force."""
     rig = machine(contact, area=area, friction=FIRM) if area else press(contact, friction=FIRM)
-    steps = [ss.NormalStressStep(at=1, by=1e6 * (area or 1.0)), ss.VelocityStep(at=2, to=1.3e-5)]
+    steps = [ss.protocol.NormalStressStep(at=1, by=1e6 * (area or 1.0)), ss.protocol.VelocityStep(at=2, to=1.3e-5)]
     found = ss.frozen_verdicts(rig, steps, until=60, rtol=1e-9)
     ended = rig.with_values({name: own[-1] for name, own in found.values.items()})
     steady, name = ss.steady_state(ended), "face.normal_force" if area else "normal_stress"
@@ -95,38 +95,40 @@ def test_steady_sliding_of_the_values_is_where_motion_ends_up(contact, area):
 
 def test_a_machine_of_two_contacts():
     """The second contact strengthens: k_cr = Σ N_i (b_i − a_i)/d_c, stable until the first bears 15 MN."""
-    rig = machine(ss.Constant(preload=5e6), ss.PoreFluid(preload=10e6, suction=0.0, **WET))
-    ramp = ss.NormalStressRamp(at=0, by=20e6, duration=100, on="face")
+    rig = machine(ss.laws.ConstantNormalStress(preload=5e6), ss.laws.PoreFluid(preload=10e6, suction=0.0, **WET))
+    ramp = ss.protocol.NormalStressRamp(at=0, by=20e6, duration=100, on="face")
     found = ss.frozen_verdicts(rig, ramp, until=100)
     one = rig.with_values({"contacts.face.contact.preload": 5e6 + 0.2e6 * found.crossings[0][0]})
     assert [verdict for _, verdict in found.crossings] == ["unstable"]
     assert ss.growth_rate(one) == pytest.approx(0, abs=1e-7)
-    drained = ss.frozen_verdicts(rig, [ramp, ss.InjectionRamp(at=0, by=5e6, duration=100, on="other")], until=100)
+    drained = ss.frozen_verdicts(
+        rig, [ramp, ss.protocol.InjectionRamp(at=0, by=5e6, duration=100, on="other")], until=100
+    )
     assert drained.crossings[0][0] < found.crossings[0][0]
     assert {*drained.slip_rates} == {"face", "other"}
 
 
 def test_nothing_changes_where_nothing_matters():
-    found = ss.frozen_verdicts(press(), ss.VelocityRamp(at=1, to=2e-5, duration=20), until=60)
+    found = ss.frozen_verdicts(press(), ss.protocol.VelocityRamp(at=1, to=2e-5, duration=20), until=60)
     assert found.crossings == ()
     assert np.isnan(found.departure)
     assert "the same at every moment" in str(found)
-    stopped = ss.frozen_verdicts(press(), ss.VelocityRamp(at=1, to=0.0, duration=20), until=60)
+    stopped = ss.frozen_verdicts(press(), ss.protocol.VelocityRamp(at=1, to=0.0, duration=20), until=60)
     assert stopped.crossings[-1][1] == "no steady sliding"
 
 
 def test_refusals():
     with pytest.raises(ss.NotAvailable, match="a push or creep has no verdict of its own"):
-        ss.frozen_verdicts(press(), ss.DisturbanceStep(at=1, by=1.0), until=2)
-    spring = ss.InclinedSpring(steady_normal_stress=5e6, angle=0.1)
+        ss.frozen_verdicts(press(), ss.protocol.DisturbanceStep(at=1, by=1.0), until=2)
+    spring = ss.laws.InclinedSpring(steady_normal_stress=5e6, angle=0.1)
     with pytest.raises(ss.NotAvailable, match="contact counts its normal stress from the steady sliding at the start"):
-        ss.frozen_verdicts(press(spring), ss.VelocityStep(at=1, to=2e-5), until=2)
-    guide = ss.SlopedGuide(preload=5e6, guide_stiffness=1e9, slope=-0.1)
+        ss.frozen_verdicts(press(spring), ss.protocol.VelocityStep(at=1, to=2e-5), until=2)
+    guide = ss.laws.SlopedGuide(preload=5e6, guide_stiffness=1e9, slope=-0.1)
     with pytest.raises(ss.NotAvailable, match="none that depends on displacement"):
-        ss.frozen_verdicts(press(guide), ss.VelocityStep(at=1, to=2e-5), until=2)
-    given = ss.Constant(steady_normal_stress=5e6)
+        ss.frozen_verdicts(press(guide), ss.protocol.VelocityStep(at=1, to=2e-5), until=2)
+    given = ss.laws.ConstantNormalStress(steady_normal_stress=5e6)
     with pytest.raises(ss.NotAvailable, match="contact has no load of its own, such as a preload"):
-        ss.frozen_verdicts(press(given), ss.NormalStressStep(at=1, by=1.0), until=2)
+        ss.frozen_verdicts(press(given), ss.protocol.NormalStressStep(at=1, by=1.0), until=2)
 
 
 def test_the_command(tmp_path, unpainted):

@@ -20,7 +20,7 @@ LIFTED = 1.2  # times its steady normal force, taken away
 def relieved(rig, contact):
     """Which contact each route names when more than what presses one is taken away from it."""
     force = ss.steady_state(rig).contacts[contact].normal_force
-    step = ss.NormalStressStep(at=0.0, by=-LIFTED * force, on=contact)
+    step = ss.protocol.NormalStressStep(at=0.0, by=-LIFTED * force, on=contact)
     yield ss.simulate(rig, step, until=1.0, most_steps=2000).contact
     kicked = Kicked(rig, "normal-force", -1, "before", {}, 0, None, contact)
     runs = kicked.runs(np.zeros(1, dtype=int), np.array([0.5]))
@@ -57,13 +57,15 @@ def test_a_brake_pad_lifts_off_its_disc_in_a_motion_and_in_the_last_cycle():
 
 
 def test_cycles_end_where_those_of_the_slider_do_with_the_name_of_the_contact():
-    law, press = rate_state(0.02, -0.08, 1.0), ss.InclinedSpring(preload=1.0, angle=-0.8)
-    block = ss.Slider(friction=law, contact=press, stiffness=1.0, mass=10.0, damping=0.05, drive=ss.Steady(1.0))
+    law, press = rate_state(0.02, -0.08, 1.0), ss.laws.InclinedSpring(preload=1.0, angle=-0.8)
+    block = ss.Slider(
+        friction=law, contact=press, stiffness=1.0, mass=10.0, damping=0.05, drive=ss.machine.SteadyDrive(1.0)
+    )
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=10.0)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=1.0, damping=0.05)},
-        contacts={"base": ss.Surface(body="block", friction=law, contact=press)},
-        drive=ss.Pull(velocity=1.0),
+        bodies={"block": ss.machine.SlidingBody(mass=10.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=1.0, damping=0.05)},
+        contacts={"base": ss.machine.Surface(body="block", friction=law, contact=press)},
+        drive=ss.machine.Pull(velocity=1.0),
     )
     own = ss.cycles(block, doublings=0)
     found = ss.cycles(machine, "links.spring.stiffness", doublings=0)
@@ -77,13 +79,13 @@ def test_cycles_end_where_those_of_the_slider_do_with_the_name_of_the_contact():
 
 def lifting():
     """Two contacts, of which the rail lifts off when the spring pulls hard."""
-    law = ss.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0)
-    away = ss.InclinedSpring(steady_normal_stress=0.2, angle=0.5)
+    law = ss.laws.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0)
+    away = ss.laws.InclinedSpring(steady_normal_stress=0.2, angle=0.5)
     return ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1.0)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=4.0, damping=1.0)},
-        contacts={"base": surface("block", law), "rail": ss.Surface(body="block", friction=law, contact=away)},
-        drive=ss.Pull(velocity=1.0),
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=4.0, damping=1.0)},
+        contacts={"base": surface("block", law), "rail": ss.machine.Surface(body="block", friction=law, contact=away)},
+        drive=ss.machine.Pull(velocity=1.0),
     )
 
 
@@ -112,13 +114,14 @@ def test_a_map_holds_the_contact_that_is_lost():
     numbers = blow.arrays(machine, ss.Protocol(), vary)
     assert outputs["threshold_contact"].flags[int(numbers["threshold_contact"][0])] == "rail"
     pull = Events(until=20.0)
-    lifted = ss.Protocol.of(ss.NormalStressStep(at=1.0, by=-0.5, on="rail"))
+    lifted = ss.Protocol.of(ss.protocol.NormalStressStep(at=1.0, by=-0.5, on="rail"))
     outputs = {one.name: one for one in pull.outputs(machine, ["links.spring.stiffness"])}
     numbers = pull.arrays(machine, lifted, vary)
     assert outputs["outcome_contact"].flags[int(numbers["outcome_contact"][0])] == "rail"
     assert "threshold_contact" not in {one.name for one in KickThreshold().outputs(ss.Slider(
-        friction=ss.RateState(a=0.1, b=0.2, d_c=1.0, mu_ref=0.6, v_ref=1.0), contact=ss.Constant(preload=1.0),
-        stiffness=1.0, drive=ss.Steady(1.0)), [])}  # fmt: skip
+        friction=ss.laws.RateState(a=0.1, b=0.2, d_c=1.0, mu_ref=0.6, v_ref=1.0),
+        contact=ss.laws.ConstantNormalStress(preload=1.0),
+        stiffness=1.0, drive=ss.machine.SteadyDrive(1.0)), [])}  # fmt: skip
 
 
 @pytest.mark.parametrize("to", [1.5, 1e4])
@@ -126,19 +129,19 @@ def test_contacts_that_a_dashpot_joins_run_away_together(to):
     """Both reach infinite velocity at one moment, before the rounding of time lets either be beyond all numbers."""
 
     def contact(body, b):
-        friction = ss.RateState(a=0.01, b=b, d_c=1.0, mu_ref=0.6, v_ref=1.0, regularised=True)
-        return ss.Surface(body=body, friction=friction, contact=ss.Constant(preload=1.0))
+        friction = ss.laws.RateState(a=0.01, b=b, d_c=1.0, mu_ref=0.6, v_ref=1.0, regularised=True)
+        return ss.machine.Surface(body=body, friction=friction, contact=ss.laws.ConstantNormalStress(preload=1.0))
 
     machine = ss.Machine(
-        bodies={"one": ss.SlidingBody(), "two": ss.SlidingBody()},
+        bodies={"one": ss.machine.SlidingBody(), "two": ss.machine.SlidingBody()},
         links={
-            "pull": ss.Spring(between=("drive", "one"), stiffness=0.003),
-            "bar": ss.Spring(between=("one", "two"), stiffness=0.01, damping=0.02),
+            "pull": ss.machine.Spring(between=("drive", "one"), stiffness=0.003),
+            "bar": ss.machine.Spring(between=("one", "two"), stiffness=0.01, damping=0.02),
         },
         contacts={"first": contact("one", 0.014), "second": contact("two", 0.013)},
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
-    run = ss.simulate(machine, ss.VelocityStep(at=1.0, to=to), until=3000.0)
+    run = ss.simulate(machine, ss.protocol.VelocityStep(at=1.0, to=to), until=3000.0)
     assert run.status == "blow-up"
     fastest = max(run[f"{name}.slip_rate"][-1] for name in ("first", "second"))
     assert run[f"{run.contact}.slip_rate"][-1] == pytest.approx(fastest, rel=1e-12)  # they are alike to rounding

@@ -14,12 +14,12 @@ from steadyslip.model.steady import steady_equation
 LOW, HIGH = 5e6, 15e6
 
 
-class Latch(ss.PreloadedContact, name="latch-of-tests"):
+class Latch(ss.laws.PreloadedContact, name="latch-of-tests"):
     """A contact that friction shuts: σ = σ0 + h(1 + tanh((τ − c)/w)), all but constant when open and when shut."""
 
-    rise: float = ss.parameter("Pa", positive, "half of the gain, h")
-    centre: float = ss.parameter("Pa", positive, "friction at which it shuts, c")
-    width: float = ss.parameter("Pa", positive, "width, w")
+    rise: float = ss.laws.parameter("Pa", positive, "half of the gain, h")
+    centre: float = ss.laws.parameter("Pa", positive, "friction at which it shuts, c")
+    width: float = ss.laws.parameter("Pa", positive, "width, w")
 
     def coupling(self, motion):
         """The gain."""
@@ -27,12 +27,12 @@ class Latch(ss.PreloadedContact, name="latch-of-tests"):
 
 
 def rig(contact, **changes):
-    friction = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.Aging())
+    friction = ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.Aging())
     return ss.Slider(**({"friction": friction, "contact": contact, "stiffness": 6e9, "radiation_damping": 1e8,
-                         "drive": ss.Steady(1e-6)} | changes))  # fmt: skip
+                         "drive": ss.machine.SteadyDrive(1e-6)} | changes))  # fmt: skip
 
 
-SHUT = rig(ss.Constant(preload=HIGH))
+SHUT = rig(ss.laws.ConstantNormalStress(preload=HIGH))
 LATCH = rig(Latch(preload=LOW, rise=(HIGH - LOW) / 2, centre=6e6, width=3e5))
 
 
@@ -68,12 +68,12 @@ def test_branch_remembers_its_steady_sliding():
     (cycle,), (other,) = found.at(6e9), same.at(6e9)
     assert cycle.period == pytest.approx(other.period, rel=1e-6)
     below = ss.cycles(LATCH, between=(1e9, 3e9), doublings=0).onset.value
-    assert below == pytest.approx(ss.hopf(rig(ss.Constant(preload=LOW))).value, rel=1e-6)
+    assert below == pytest.approx(ss.hopf(rig(ss.laws.ConstantNormalStress(preload=LOW))).value, rel=1e-6)
 
 
 @pytest.mark.parametrize("kick", [pytest.param("velocity", marks=pytest.mark.campaign), "displacement"])
 def test_thresholds_of_each(kick):
-    law = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.Slip())
+    law = ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.Slip())
     shut, latch = (rig(one.contact, friction=law, stiffness=9e9, radiation_damping=0.0) for one in (SHUT, LATCH))
     same = ss.threshold(shut, kick, precision=1e-4)
     found = ss.threshold(latch, kick, branch=2, precision=1e-4)

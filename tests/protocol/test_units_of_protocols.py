@@ -22,45 +22,52 @@ def given(rig, *pieces):
 
 
 def test_a_load_point_that_turns_is_told_angles():
-    (step, jump) = given(AXIS, ss.VelocityStep(at=1, to="0.06 rpm"), ss.DisplacementStep(at=2, by="3 deg"))
+    (step, jump) = given(
+        AXIS, ss.protocol.VelocityStep(at=1, to="0.06 rpm"), ss.protocol.DisplacementStep(at=2, by="3 deg")
+    )
     assert step["to"] == pytest.approx(0.06 * 2 * np.pi / 60)
     assert jump["by"] == pytest.approx(np.deg2rad(3))
     assert type(step["to"]) is float
     with pytest.raises(
         ss.ParameterError, match=r"protocol\.pieces\.1\.to: got 0\.002 m/s; allowed here: a number in rad/s"
     ):
-        ss.simulate(AXIS, ss.VelocityStep(at=1, to="2 mm/s"), until=2.0)
+        ss.simulate(AXIS, ss.protocol.VelocityStep(at=1, to="2 mm/s"), until=2.0)
     with pytest.raises(ss.ParameterError, match="allowed here: a number in m/s"):
-        ss.simulate(BLOCK, ss.VelocityStep(at=1, to="2 rpm"), until=2.0)
+        ss.simulate(BLOCK, ss.protocol.VelocityStep(at=1, to="2 rpm"), until=2.0)
 
 
 def test_what_pushes_is_a_stress_a_force_or_a_torque():
     (push, turn) = given(
         AXIS,
-        ss.DisturbanceStep(at=1, by="3 N", on="table"),
-        ss.DisturbancePulse(at=1, by="2 N cm", duration=1, on="motor"),
+        ss.protocol.DisturbanceStep(at=1, by="3 N", on="table"),
+        ss.protocol.DisturbancePulse(at=1, by="2 N cm", duration=1, on="motor"),
     )
     assert (push["by"], turn["by"]) == (3.0, pytest.approx(0.02))
     for body, wrong, right in (("table", "3 N m", "N"), ("motor", "3 N", "N m"), ("table", "3 Pa", "N")):
         with pytest.raises(ss.ParameterError, match=f"allowed here: a number in {right}$"):
-            ss.simulate(AXIS, ss.DisturbanceStep(at=1, by=wrong, on=body), until=2.0)
-    (force,) = given(BLOCK, ss.NormalStressStep(at=1, by="40 N"))
+            ss.simulate(AXIS, ss.protocol.DisturbanceStep(at=1, by=wrong, on=body), until=2.0)
+    (force,) = given(BLOCK, ss.protocol.NormalStressStep(at=1, by="40 N"))
     assert force["by"] == pytest.approx(40 / BLOCK.area)
     with pytest.raises(ss.ParameterError, match="of a slider with an area a force will do"):
-        ss.simulate(replace(BLOCK, area=None), ss.NormalStressStep(at=1, by="40 N"), until=2.0)
+        ss.simulate(replace(BLOCK, area=None), ss.protocol.NormalStressStep(at=1, by="40 N"), until=2.0)
     with pytest.raises(ss.ParameterError, match="wrong dimension"):
-        ss.NormalStressStep(at=1, by="40 s")
+        ss.protocol.NormalStressStep(at=1, by="40 s")
 
 
 def test_all_problems_are_told_at_once():
-    plan = [ss.VelocityStep(at=1, to="2 mm/s"), ss.DisturbanceStep(at=1, by="3 N", on="motor")]
+    plan = [ss.protocol.VelocityStep(at=1, to="2 mm/s"), ss.protocol.DisturbanceStep(at=1, by="3 N", on="motor")]
     with pytest.raises(ss.ParameterError) as caught:
         ss.simulate(AXIS, plan, until=2.0)
     assert [problem.name for problem in caught.value.problems] == ["protocol.pieces.1.to", "protocol.pieces.2.by"]
 
 
 def test_files_have_the_same_units_and_give_them_back():
-    plan = ss.Protocol(pieces=(ss.VelocityStep(at=1, to="0.06 rpm"), ss.DisturbanceStep(at=2, by="3 N m", on="motor")))
+    plan = ss.Protocol(
+        pieces=(
+            ss.protocol.VelocityStep(at=1, to="0.06 rpm"),
+            ss.protocol.DisturbanceStep(at=2, by="3 N m", on="motor"),
+        )
+    )
     text = ss.rig_to_text(AXIS, plan)
     assert ss.protocol_from_text(text) == plan
     told = ss.piece_from_text("disturbance-step at=2s by='3 N m' on=motor", machine=AXIS)
@@ -71,12 +78,12 @@ def test_files_have_the_same_units_and_give_them_back():
 
 def test_a_shaft_is_pushed_by_a_torque():
     machine = ss.Machine(
-        bodies={"shaft": ss.RotatingBody(inertia=0.5)},
-        links={"key": ss.Shaft(between=("drive", "shaft"), stiffness=2.0)},
+        bodies={"shaft": ss.machine.RotatingBody(inertia=0.5)},
+        links={"key": ss.machine.Shaft(between=("drive", "shaft"), stiffness=2.0)},
         contacts={"seal": surface("shaft", rate_state(0.3, 0.1, 1.0), radius=1.0)},
-        drive=ss.RotaryPull(velocity=1.0),
+        drive=ss.machine.RotaryPull(velocity=1.0),
     )
-    for piece in (ss.DisturbanceStep(at=0.0, by="0.1 N m"), ss.CreepStep(at=0.0, by="0.1 N m")):
+    for piece in (ss.protocol.DisturbanceStep(at=0.0, by="0.1 N m"), ss.protocol.CreepStep(at=0.0, by="0.1 N m")):
         run = ss.simulate(machine, piece, until=1.0)
         assert run.units["disturbance"] == "N m"
         assert run["disturbance"][-1] == pytest.approx(0.1)
@@ -92,11 +99,13 @@ def test_a_key_of_another_kind_names_that_kind():
 
 def test_a_run_that_nothing_disturbs_says_so():
     assert "steady sliding goes on" in str(ss.simulate(BLOCK, until=1.0))
-    assert "steady sliding goes on" not in str(ss.simulate(BLOCK, ss.VelocityStep(at=0.5, to="30 um/s"), until=1.0))
+    assert "steady sliding goes on" not in str(
+        ss.simulate(BLOCK, ss.protocol.VelocityStep(at=0.5, to="30 um/s"), until=1.0)
+    )
 
 
 def test_an_ensemble_names_the_contact_that_lifts_off():
-    ramp = ss.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled")
+    ramp = ss.protocol.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled")
     lifts = ss.simulate_many(two_tables(), {"protocol.pieces.1.by": [-3.0, -0.5]}, ramp, until=20.0)
     assert lifts.contact.tolist() == ["oiled", ""]
     assert "1 contact lost (oiled 1)" in str(lifts)
@@ -105,7 +114,7 @@ def test_an_ensemble_names_the_contact_that_lifts_off():
 
 def test_fits_refuse_creep():
     with pytest.raises(ss.NotAvailable, match="not offered for creep"):
-        ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=100), protocol=ss.CreepStep(at=1, by=1e4))
+        ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=100), protocol=ss.protocol.CreepStep(at=1, by=1e4))
 
 
 @pytest.mark.parametrize(("text", "words"), [

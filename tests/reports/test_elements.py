@@ -40,7 +40,7 @@ def test_a_sentence_over_two_lines_is_one_paragraph():
 
 
 def test_formulas_need_no_script_and_no_entity():
-    own = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
+    own = rig(friction=rate_state(evolution=ss.laws.Aging()), radiation_damping=1e5, stiffness=6e9)
     text = math(ss.formula(own))
     Balanced(text)
     assert not re.search("&[a-zA-Z]", text)

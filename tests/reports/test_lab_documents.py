@@ -14,7 +14,7 @@ from steadyslip.reports.elements import html_text
 def lab_results():
     records = [lab.record(lab.rig(b=b), lab.STEP, seed=i) for i, b in enumerate((0.0145, 0.0150, 0.0140))]
     fits = [ss.fit(lab.rig(), one, free=["a", "b", "d_c"]) for one in records]
-    draws = ss.bootstrap(fits[0], 16)
+    draws = ss.experiments.bootstrap(fits[0], 16)
     return {
         "draws": draws, "prediction": ss.predict(lab.rig(), draws),
         "population": ss.population(dict(zip("ABC", fits, strict=True)), count=200),

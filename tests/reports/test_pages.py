@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import html
-import inspect
 import re
 from pathlib import Path
 
@@ -15,9 +14,9 @@ import lab_records as lab
 import steadyslip as ss
 from command import run
 from fuzz_rigs import DRIVES, FRICTION
+from public_names import public_results
 from read_pages import words
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
-from steadyslip.core.records import FrozenRecord
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.files.standalone import write_page
@@ -28,16 +27,12 @@ from steadyslip.reports.results import MAX_ROWS, _distinct_rows, protocol_table
 from steadyslip.reports.rig import input_table
 
 MACHINES = Path(__file__).parents[2] / "examples" / "machines"
-OWN_RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
+OWN_RIG = rig(friction=rate_state(evolution=ss.laws.Aging()), radiation_damping=1e5, stiffness=6e9)
 
 
 # -- notebooks
 
-PUBLIC = [one for one in (getattr(ss, name) for name in dir(ss)) if inspect.isclass(one)]
-RESULTS = [
-    one for one in PUBLIC
-    if dataclasses.is_dataclass(one) and not issubclass(one, (Exception, FrozenRecord)) and one is not ss.Motion
-]  # fmt: skip
+RESULTS = [one for one in public_results() if dataclasses.is_dataclass(one)]
 
 
 @pytest.mark.parametrize("kind", RESULTS, ids=lambda kind: kind.__name__)
@@ -52,7 +47,7 @@ def test_every_public_result_has_html_and_every_number_of_it_a_unit(kind):
 @pytest.fixture(scope="module")
 def results():
     analysis = ss.analyze(OWN_RIG)
-    run = ss.simulate(OWN_RIG, ss.VelocityStep(at=1.0, to=2 * V0), until=60.0)
+    run = ss.simulate(OWN_RIG, ss.protocol.VelocityStep(at=1.0, to=2 * V0), until=60.0)
     return {
         "rig": OWN_RIG, "law": OWN_RIG.friction, "protocol": run.protocol, "model": ss.build_model(OWN_RIG),
         "analysis": analysis, "steady": analysis.steady, "margin": analysis.margins[0], "onset": analysis.onset,
@@ -110,7 +105,9 @@ def test_inputs_are_in_the_units_of_the_rigs_file(made):
     assert not re.search(r"Pa\b|kg/m|normal stress", words)
 
 
-@pytest.mark.parametrize(("drive", "name"), [(ss.PD(V0, kp=9e9, kd=0.0), "PD"), (ss.PID(V0, kp=9e9, ki=1e8), "PID")])
+@pytest.mark.parametrize(
+    ("drive", "name"), [(ss.machine.PD(V0, kp=9e9, kd=0.0), "PD"), (ss.machine.PID(V0, kp=9e9, ki=1e8), "PID")]
+)
 def test_sketches_name_the_controller_that_drives(drive, name):
     assert f">{name}</text>" in sketch(rig(stiffness=None, drive=drive))
 
@@ -199,7 +196,7 @@ def test_documents_of_runs_and_maps_give_the_hash_of_their_file(results, tmp_pat
 
 @pytest.mark.usefixtures("unpainted")
 def test_documents_of_maps_begin_with_what_was_found(tmp_path):
-    settings = {"slider.stiffness": ss.Grid("5 GPa/m", "50 GPa/m", 5)}
+    settings = {"slider.stiffness": ss.maps.Grid("5 GPa/m", "50 GPa/m", 5)}
     found = ss.run_map(
         ss.Map(rig(), settings, ["status", "safety_factor"]), tmp_path / "m.zarr", workers=1, progress=False
     )
@@ -210,12 +207,14 @@ def test_documents_of_maps_begin_with_what_was_found(tmp_path):
 
 
 def test_what_was_done_to_a_rig_is_told_in_units_that_people_read():
-    plan = ss.Protocol.of([ss.VelocityStep(at=10.0, to=2e-6), ss.Hold(at=20.0, duration=7200.0)])
+    plan = ss.Protocol.of([ss.protocol.VelocityStep(at=10.0, to=2e-6), ss.protocol.Hold(at=20.0, duration=7200.0)])
     text = "".join(protocol_table(rig(), plan))
     assert "at 10 s, to 2 µm/s" in text
     assert "duration 2 h" in text
     turning = ss.read_rig(MACHINES / "telescope.toml")
-    assert "to 0.05 rad/s" in "".join(protocol_table(turning, ss.Protocol.of([ss.VelocityStep(at=1.0, to=0.05)])))
+    assert "to 0.05 rad/s" in "".join(
+        protocol_table(turning, ss.Protocol.of([ss.protocol.VelocityStep(at=1.0, to=0.05)]))
+    )
 
 
 def test_lists_of_cycles_leave_out_what_reads_the_same():
@@ -251,7 +250,7 @@ def test_a_run_without_disturbance_says_that_it_tells_nothing_of_stability():
     run = ss.simulate(rig(), until=10.0)
     assert run.undisturbed
     assert "<h1>Undisturbed" in ss.report(run, explorer=False).html
-    pushed = ss.simulate(rig(), ss.VelocityStep(at=1.0, to=2e-6), until=10.0)
+    pushed = ss.simulate(rig(), ss.protocol.VelocityStep(at=1.0, to=2e-6), until=10.0)
     assert not pushed.undisturbed
     assert "<h1>Undisturbed" not in ss.report(pushed, explorer=False).html
 
@@ -347,7 +346,7 @@ def test_the_command_writes_a_report(tmp_path):
 
 @pytest.mark.usefixtures("unpainted")
 def test_locked_rigs_have_reports_too():
-    text = words(ss.report(rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0))).html)
+    text = words(ss.report(rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-1.0))).html)
     assert "No steady sliding at 1 µm/s" in text
 
 

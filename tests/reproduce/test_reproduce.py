@@ -44,7 +44,7 @@ def test_the_paper_rig_has_the_papers_parameters():
     assert [rig.value(n) for n in ("a", "b", "d_c", "mu_ref", "alpha")] == [0.0145, 0.0160, 1e-6, 0.7, 0.56]
     assert [rig.value(n) for n in ("preload", "v_ref", "velocity")] == [5e6, 1e-6, 1e-6]
     assert rig.value("angle") == 30 * deg
-    assert rig.friction.evolution == ss.Slip()
+    assert rig.friction.evolution == ss.laws.Slip()
     assert rig.friction.normal_memory.name == "linker-dieterich"
 
 

@@ -16,16 +16,16 @@ from steadyslip.testing.precise import disagreement
 @pytest.fixture(autouse=True)
 def _own_registry(monkeypatch):
     """Laws defined in a test are forgotten after it."""
-    for family in (ss.FrictionLaw, ss.ContactLaw):
+    for family in (ss.laws.FrictionLaw, ss.laws.ContactLaw):
         monkeypatch.setattr(family, "registry", dict(family.registry))
 
 
-class Ruina(ss.FrictionLaw):
+class Ruina(ss.laws.FrictionLaw):
     """The slip law once more, as an author would write it; the broken laws below change one thing each."""
 
-    a: float = ss.parameter("1", positive, "direct effect")
-    b: float = ss.parameter("1", real, "evolution effect")
-    d_c: float = ss.parameter("m", positive, "slip distance")
+    a: float = ss.laws.parameter("1", positive, "direct effect")
+    b: float = ss.laws.parameter("1", real, "evolution effect")
+    d_c: float = ss.laws.parameter("m", positive, "slip distance")
 
     def memory(self):
         return ("Theta",)
@@ -200,13 +200,13 @@ def test_wrong_fdiff_is_caught(monkeypatch):
     from steadyslip.core.expressions import asinh_exp
 
     monkeypatch.setattr(asinh_exp, "fdiff", lambda self, argindex=1: sp.Integer(1))
-    law = ss.RateState(a=0.0123, b=0.02, d_c=1e-6, mu_ref=0.61, v_ref=1e-6, regularised=True)
+    law = ss.laws.RateState(a=0.0123, b=0.02, d_c=1e-6, mu_ref=0.61, v_ref=1e-6, regularised=True)
     with pytest.raises(ContractViolation, match=r"∂\(strength\)/∂v is .*check fdiff"):
         testing.check_derivatives(law, Conditions())
 
 
 def test_instant_weakening_must_be_meant():
-    law = ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=1e-6)
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=1e-6)
     with pytest.raises(ContractViolation, match="without mass such a rig is ill-posed"):
         testing.check_friction_law(law)
     testing.check_friction_law(law, instant_weakening=True)
@@ -238,17 +238,17 @@ def test_violation_is_an_assertion_and_names_the_law():
 # --- contacts ---------------------------------------------------------------------------------------
 
 
-class Springy(ss.ContactLaw):
+class Springy(ss.laws.ContactLaw):
     """A contact that stiffens with slip; the broken ones below change one thing each."""
 
-    preload: float = ss.parameter("Pa", positive, "normal stress at rest")
-    gradient: float = ss.parameter("Pa/m", real, "rise of normal stress with slip")
+    preload: float = ss.laws.parameter("Pa", positive, "normal stress at rest")
+    gradient: float = ss.laws.parameter("Pa/m", real, "rise of normal stress with slip")
 
     def load(self):
         return self.preload
 
     def coupling(self, motion):
-        return self.gradient * motion.slip
+        return self.gradient * motion.lead
 
 
 def broken_contact(**methods):
@@ -257,7 +257,7 @@ def broken_contact(**methods):
 
 
 def kinked(self, motion):
-    return self.gradient * sp.Abs(motion.slip)
+    return self.gradient * sp.Abs(motion.lead)
 
 
 def doubled_contact(self):
@@ -282,12 +282,12 @@ CONTACT_FAULTS = [
     ("check_contact_names", {"load": lambda self: -self.preload}, "the load is -5000000.0 Pa, must be > 0"),
     (
         "check_contact_numbers",
-        {"coupling": lambda self, motion: 1e4 if isinstance(motion.slip, float) else 0},
+        {"coupling": lambda self, motion: 1e4 if isinstance(motion.lead, float) else 0},
         "called with floats is .*one expression for numbers and symbols",
     ),
     (
         "check_contact_numbers",
-        {"coupling": lambda self, motion: self.gradient * np.sin(motion.slip)},
+        {"coupling": lambda self, motion: self.gradient * np.sin(motion.lead)},
         "normal_stress does not accept SymPy symbols",
     ),
     (
@@ -314,7 +314,7 @@ CONTACT_FAULTS = [
         },
         "the steady normal stress is 5376344.* Pa, but steady_stress.. says 5000000.0 Pa",
     ),
-    ("check_linearisation", {"coupling": kinked}, r"∂σ/∂\(slip\) is 0 by differentiation.*check kinks"),
+    ("check_linearisation", {"coupling": kinked}, r"∂σ/∂\(lead\) is 0 by differentiation.*check kinks"),
     ("check_axis", {"sliding_stiffness": lambda self, k: 2 * k}, r"sliding_stiffness\(1\) is 2.0"),
     ("check_axis", {"sliding_stiffness": lambda self, k: 0.5 * k**2}, "a projection is proportional"),
     ("check_contact_states", with_film(rates=lambda self, motion: ()), r"names 1 states and rates\(\) has 0"),

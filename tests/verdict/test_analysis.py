@@ -15,10 +15,10 @@ from steadyslip.verdict.words import facts
 
 PAPER = ss.read_rig(Path(__file__).parents[2] / "examples" / "inclined-spring.toml")
 PLAIN = ss.Slider(
-    friction=ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6),
-    contact=ss.Constant(preload=1e7),
+    friction=ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6),
+    contact=ss.laws.ConstantNormalStress(preload=1e7),
     stiffness=4e9,
-    drive=ss.Steady(1e-6),
+    drive=ss.machine.SteadyDrive(1e-6),
 )
 
 
@@ -46,7 +46,7 @@ def test_numbers_are_those_of_the_library():
 
 def test_what_a_gain_alone_holds_is_told_of_the_gain():
     """In JSON too: `critical_stiffness` is of a spring beside it."""
-    press = replace(PLAIN, stiffness=None, drive=ss.PID(1e-6, kp=2e9), area=0.01)
+    press = replace(PLAIN, stiffness=None, drive=ss.machine.PID(1e-6, kp=2e9), area=0.01)
     data = ss.analyze(press).to_dict()
     held, (edge,) = data["held_by"], ss.boundary(press, "drive.kp")
     assert (held["parameter"], held["value"], held["critical_side"]) == ("drive.kp", 2e9, "above")
@@ -88,10 +88,16 @@ def test_margins_say_what_happens_beyond():
 
 def test_lugre_is_stable_below_the_edge_with_mass():
     """Theory 4: f < 0, S > 0: stable iff k < r S (m r + f)/(−f)."""
-    lugre = ss.LuGre(
+    lugre = ss.laws.LuGre(
         mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
     )
-    rig = ss.Slider(friction=lugre, contact=ss.Constant(preload=1e5), stiffness=1e3, mass=5e5, drive=ss.Steady(1e-3))
+    rig = ss.Slider(
+        friction=lugre,
+        contact=ss.laws.ConstantNormalStress(preload=1e5),
+        stiffness=1e3,
+        mass=5e5,
+        drive=ss.machine.SteadyDrive(1e-3),
+    )
     a = ss.analyze(rig)
     assert a.critical_side == "below"
     assert a.stable is (rig.stiffness < a.critical_stiffness)
@@ -100,8 +106,13 @@ def test_lugre_is_stable_below_the_edge_with_mass():
 
 
 def test_memoryless_law_is_warned_about():
-    law = ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3)
-    rig = ss.Slider(friction=law, contact=ss.Constant(preload=1e6), stiffness=1e9, drive=ss.Steady(1e-4))
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3)
+    rig = ss.Slider(
+        friction=law,
+        contact=ss.laws.ConstantNormalStress(preload=1e6),
+        stiffness=1e9,
+        drive=ss.machine.SteadyDrive(1e-4),
+    )
     a = ss.analyze(rig)
     assert a.stable is False
     assert a.growth_rate == math.inf
@@ -122,9 +133,9 @@ def test_on_the_edge_is_said():
 def test_axial_stiffness_is_given_back():
     press = ss.Slider(
         friction=PLAIN.friction,
-        contact=ss.Triaxial(angle="30 deg", confining_pressure="50 MPa"),
+        contact=ss.laws.Triaxial(angle="30 deg", confining_pressure="50 MPa"),
         axial_stiffness=1e11,
-        drive=ss.Steady(1e-6),
+        drive=ss.machine.SteadyDrive(1e-6),
     )
     a = ss.analyze(press)
     factor = math.sin(math.pi / 6) * math.cos(math.pi / 6) ** 2
@@ -166,7 +177,7 @@ def test_a_mass_that_swamps_the_direct_effect_costs_no_digits(mass):
 
 
 def test_static_edge_of_the_closed_form_is_a_divergence():
-    contact = ss.Linear(steady_normal_stress=1e7, b3=-1e10)
+    contact = ss.laws.LinearNormalStress(steady_normal_stress=1e7, b3=-1e10)
     rig = PLAIN.with_values({"friction.b": 0.005})
     rig = ss.Slider(friction=rig.friction, contact=contact, stiffness=1e10, drive=rig.drive)
     kinds = {e.kind: e.value for e in ss.boundary(rig, "stiffness")}
@@ -180,29 +191,39 @@ def test_what_is_printed_is_accepted():
             assert PAPER.resolve(line.split()[0]) in PAPER.parameters()
     text = ss.rig_to_text(PAPER)
     assert ss.rig_from_text(text, "x", ["friction.alpha=0.3"]).value("alpha") == 0.3
-    assert ss.rig_from_text(text, "x", ["control=pd", "kp=1"]).drive == ss.PD(1e-6, kp=1.0)
+    assert ss.rig_from_text(text, "x", ["control=pd", "kp=1"]).drive == ss.machine.PD(1e-6, kp=1.0)
     with pytest.raises(ss.UnknownNameError):
         PAPER.resolve("contact.alpha")
 
 
 def test_reason_names_the_direct_effect_where_that_is_the_fault():
-    lugre = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0)
-    rig = ss.Slider(friction=lugre, contact=ss.Constant(preload=1e5), stiffness=1e3, drive=ss.Steady(1e-3))
+    lugre = ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0)
+    rig = ss.Slider(
+        friction=lugre,
+        contact=ss.laws.ConstantNormalStress(preload=1e5),
+        stiffness=1e3,
+        drive=ss.machine.SteadyDrive(1e-3),
+    )
     assert "direct effect is negative" in ss.analyze(rig).reason
     taking = ss.Slider(
-        friction=PLAIN.friction, contact=ss.Linear(steady_normal_stress=1e7, b1=-1e12), stiffness=1e9, drive=PLAIN.drive
+        friction=PLAIN.friction,
+        contact=ss.laws.LinearNormalStress(steady_normal_stress=1e7, b1=-1e12),
+        stiffness=1e9,
+        drive=PLAIN.drive,
     )
     assert "velocity relieves the normal stress" in ss.analyze(taking).reason
 
 
 def test_controllers_are_judged_by_their_gain():
-    rig = ss.Slider(friction=PLAIN.friction, contact=PLAIN.contact, drive=ss.PD(1e-6, kp=4e9))
+    rig = ss.Slider(friction=PLAIN.friction, contact=PLAIN.contact, drive=ss.machine.PD(1e-6, kp=4e9))
     assert "gain kp, 4 GPa/m, is 0.8 times the critical 5 GPa/m" in ss.analyze(rig).reason
     assert all(edge.value > 0 for edge in ss.boundary(rig, "kp"))
 
 
 @pytest.mark.parametrize("contact", [0, 8, pytest.param(4, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize(("drive", "mass"), [(ss.PD(1e-6, kp=4e9, kd=1e9), 0.0), (ss.PID(1e-6, kp=4e9, ki=1e8), 1e6)])
+@pytest.mark.parametrize(
+    ("drive", "mass"), [(ss.machine.PD(1e-6, kp=4e9, kd=1e9), 0.0), (ss.machine.PID(1e-6, kp=4e9, ki=1e8), 1e6)]
+)
 def test_a_gain_that_is_all_the_stiffness_is_what_is_said_to_be_stable(drive, mass, contact):
     """The same edges as those of a spring beside the gain, the gain added; none is lost below the gain."""
     rig = ss.Slider(friction=PLAIN.friction, contact=CONTACTS[contact], drive=drive, mass=mass)

@@ -30,8 +30,8 @@ def test_half_of_the_rigs_about_the_edge_are_stable():
 
 
 def test_every_rig_looked_at_lies_inside_and_is_judged_as_by_itself():
-    law = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.3))
-    inclined = rig(friction=law, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=3e10)
+    law = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.3))
+    inclined = rig(friction=law, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=3e10)
     found = ss.tolerate(
         inclined, {"contact.angle": "10 deg", "friction.a": "20 %", "friction.normal_memory.alpha": 0.05}
     )
@@ -49,7 +49,7 @@ def test_every_rig_looked_at_lies_inside_and_is_judged_as_by_itself():
 
 
 def test_rigs_that_lock_up_within_tolerances_are_told():
-    found = ss.tolerate(rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.9)), {"contact.angle": 0.1})
+    found = ss.tolerate(rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.9)), {"contact.angle": 0.1})
     assert not np.all(found.exists)
     assert "no steady sliding" in str(found)
 

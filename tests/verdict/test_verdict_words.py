@@ -33,8 +33,8 @@ def text_of(a_rig, **options):
 
 def lifted(alpha, mass=0.0, angle=1.2):
     return rig(
-        friction=rate_state(mu_ref=0.3, normal_memory=ss.LinkerDieterich(alpha=alpha)),
-        contact=ss.InclinedSpring(preload=5e6, angle=angle),
+        friction=rate_state(mu_ref=0.3, normal_memory=ss.laws.LinkerDieterich(alpha=alpha)),
+        contact=ss.laws.InclinedSpring(preload=5e6, angle=angle),
         mass=mass,
     )
 
@@ -85,8 +85,8 @@ def test_a_rig_on_its_edge_says_so_first_and_lists_no_rounding(mass):
 def test_small_kicks_are_told_of_only_near_a_subcritical_edge():
     """Near is where the small unstable cycle that the edge predicts is small at the rig itself."""
     press = rig(
-        friction=rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56)),
-        contact=ss.InclinedSpring(preload=5e6, angle=np.pi / 6),
+        friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56)),
+        contact=ss.laws.InclinedSpring(preload=5e6, angle=np.pi / 6),
     )
     edge = float(ss.critical_stiffness(press))
     near, far = (press.with_values({"stiffness": s * edge}) for s in (1.0001, 18.0))
@@ -140,11 +140,13 @@ def test_a_rate_that_is_lost_in_rounding_is_said_to_be():
 
 def test_a_coefficient_of_either_sign_has_an_edge_at_zero():
     """A little normal stress by acceleration makes this rig ill-posed with one sign and not with the other: B0 = 0."""
-    friction = ss.RateState(
-        a=0.02, b=0.03, d_c=1e-5, mu_ref=0.25, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.6)
+    friction = ss.laws.RateState(
+        a=0.02, b=0.03, d_c=1e-5, mu_ref=0.25, v_ref=1e-6, normal_memory=ss.laws.LinkerDieterich(alpha=0.6)
     )
-    contact = ss.Linear(steady_normal_stress=2.6e5, b0=1e11)
-    rig = ss.Slider(friction=friction, contact=contact, stiffness=1e10, radiation_damping=2e9, drive=ss.Steady(1e-6))
+    contact = ss.laws.LinearNormalStress(steady_normal_stress=2.6e5, b0=1e11)
+    rig = ss.Slider(
+        friction=friction, contact=contact, stiffness=1e10, radiation_damping=2e9, drive=ss.machine.SteadyDrive(1e-6)
+    )
     near = [ss.analyze(rig.with_values({"contact.b0": b0})).stable for b0 in (1e6, 0.0, -1e6)]
     assert near == [False, True, True]
     edges = ss.boundary(rig, "contact.b0")
@@ -188,9 +190,9 @@ def test_where_one_root_is_zero_and_another_grows_sliding_is_unstable(mass):
 )  # fmt: skip
 def test_no_oscillation_is_said_to_grow_where_roots_are_real(stiffness, mass):
     """(α − μ) tan ψ > 1: two roots lie on the right at every stiffness, a pair only at some."""
-    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=2.5))
+    friction = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=2.5))
     a_rig = rig(
-        friction=friction, contact=ss.InclinedSpring(preload=5e6, angle=np.pi / 4), stiffness=stiffness, mass=mass
+        friction=friction, contact=ss.laws.InclinedSpring(preload=5e6, angle=np.pi / 4), stiffness=stiffness, mass=mass
     )
     found = ss.analyze(a_rig)
     assert not found.stable

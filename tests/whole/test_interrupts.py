@@ -52,10 +52,10 @@ def test_half_of_the_runs_of_a_fit_are_no_fit(monkeypatch):
 
 
 def test_bootstrap_keeps_the_refits_that_are_done(fitted, monkeypatch):
-    whole = ss.bootstrap(fitted, 96, threads=1)
+    whole = ss.experiments.bootstrap(fitted, 96, threads=1)
     with monkeypatch.context() as patch:
         patch.setattr(uncertainty, "minimise", once_more(uncertainty.minimise, 2))
-        found = ss.bootstrap(fitted, 96, threads=1)
+        found = ss.experiments.bootstrap(fitted, 96, threads=1)
     assert (len(whole), whole.interrupted) == (96, False)
     assert (len(found), found.interrupted) == (64, True)
     np.testing.assert_array_equal(found["friction.a"], whole["friction.a"][:64])
@@ -63,7 +63,7 @@ def test_bootstrap_keeps_the_refits_that_are_done(fitted, monkeypatch):
     assert "stopped" not in str(whole)
     monkeypatch.setattr(uncertainty, "minimise", once_more(uncertainty.minimise, 0))
     with pytest.raises(KeyboardInterrupt, match="before the first refits"):
-        ss.bootstrap(fitted, 96)
+        ss.experiments.bootstrap(fitted, 96)
 
 
 def test_laws_that_are_fitted_are_compared(fitted, monkeypatch):
@@ -118,7 +118,7 @@ def test_sensitivity_of_the_points_that_are_done(blocks):
 def test_sensitivity_does_not_depend_on_blocks(monkeypatch):
     over = {"friction.a": (0.010, 0.014), "friction.b": (0.015, 0.02)}
     one = ss.sensitivity(rig(), over, points=256)
-    monkeypatch.setattr(sys.modules[ss.Sensitivity.__module__], "BLOCK", 1000)
+    monkeypatch.setattr(sys.modules[ss.maps.Sensitivity.__module__], "BLOCK", 1000)
     other = ss.sensitivity(rig(), over, points=256)
     for name in one.total:
         np.testing.assert_array_equal(one.total[name], other.total[name])

@@ -26,7 +26,11 @@ def equations(rig):
 @pytest.mark.parametrize("what", ["a", "film", "share"])
 def test_equations_are_the_same_under_any_name_of_a_parameter(what):
     plain = equations(renamed())
-    free = [one for one in NAMES if not (one in PLAIN or hasattr(ss.FrictionLaw, one) or hasattr(ss.ContactLaw, one))]
+    free = [
+        one
+        for one in NAMES
+        if not (one in PLAIN or hasattr(ss.laws.FrictionLaw, one) or hasattr(ss.laws.ContactLaw, one))
+    ]
     for name in free[::5]:
         assert equations(renamed(((what, name),))) == plain, name
 
@@ -52,25 +56,34 @@ def test_two_observables_of_one_name_are_refused():
 
     with pytest.raises(ss.ParameterError, match="age: is the name of two observables"):
         build_model(ss.Slider(friction=Seen(**vars(renamed().friction)), contact=renamed().contact, stiffness=1e9,
-                              drive=ss.Steady(1e-6)))  # fmt: skip
+                              drive=ss.machine.SteadyDrive(1e-6)))  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["memory", "strength", "name", "law", "registry"])
 def test_fields_that_would_hide_what_laws_have_are_refused(name):
     with pytest.raises(TypeError, match=f"a field cannot be called '{name}'"):
-        type("Odd", (ss.FrictionLaw,), {"__annotations__": {name: "float"}, name: ss.parameter("1", positive, "odd")})
+        type(
+            "Odd",
+            (ss.laws.FrictionLaw,),
+            {"__annotations__": {name: "float"}, name: ss.laws.parameter("1", positive, "odd")},
+        )
 
 
 def test_a_part_may_not_name_a_parameter_as_its_owner_does():
-    class Odd(ss.Evolution):
-        a: float = ss.parameter("1", positive, "odd")
+    class Odd(ss.laws.Evolution):
+        a: float = ss.laws.parameter("1", positive, "odd")
 
         def rate(self, v, state, d_c, v_ref):
             return -self.a * v / d_c * state
 
-    law = ss.RateState(a=0.01, b=0.02, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=Odd(a=2.0))
+    law = ss.laws.RateState(a=0.01, b=0.02, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=Odd(a=2.0))
     with pytest.raises(ss.ParameterError, match=r"a: is a parameter of RateState and of Odd; rename one"):
-        ss.Slider(friction=law, contact=ss.Constant(preload=1e6), stiffness=1e9, drive=ss.Steady(1e-6)).parameters()
+        ss.Slider(
+            friction=law,
+            contact=ss.laws.ConstantNormalStress(preload=1e6),
+            stiffness=1e9,
+            drive=ss.machine.SteadyDrive(1e-6),
+        ).parameters()
 
 
 def test_symbols_of_equations_are_no_symbols_of_anybody_else():
@@ -83,13 +96,13 @@ def test_symbols_of_equations_are_no_symbols_of_anybody_else():
 def test_results_under_odd_names_are_written_and_read(tmp_path):
     rig = renamed(pairs(1))
     run = ss.simulate(rig, PUSH, until=20.0, times=TIMES)
-    for law, family in ((type(rig.friction), ss.FrictionLaw), (type(rig.contact), ss.ContactLaw)):
+    for law, family in ((type(rig.friction), ss.laws.FrictionLaw), (type(rig.contact), ss.laws.ContactLaw)):
         family.registry[law.name] = law
     try:
         run.save(tmp_path / "run.nc")
         again = ss.load_history(tmp_path / "run.nc")
     finally:
-        for family in (ss.FrictionLaw, ss.ContactLaw):
+        for family in (ss.laws.FrictionLaw, ss.laws.ContactLaw):
             family.registry.pop("renamed-friction", None), family.registry.pop("renamed-contact", None)
     assert again.units == run.units
     assert all(np.array_equal(again[name], run[name]) for name in run)

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import steadyslip as ss
 from steadyslip.files.specifications import protocol_from_text
-from steadyslip.protocol import pack
+from steadyslip.protocol.segments import pack
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")

@@ -28,12 +28,12 @@ def test_a_difference_of_one_bit_is_seen():
 def test_a_number_has_one_zero():
     """Files leave out what equals its default, so that -0.0 came back as 0.0."""
     assert str(rig(damping=-0.0).damping) == "0.0"
-    assert str(ss.VelocityStep(at=-0.0, to=-0.0).to) == "0.0"
+    assert str(ss.protocol.VelocityStep(at=-0.0, to=-0.0).to) == "0.0"
 
 
 def test_an_edge_infinitely_far_in_its_own_size_is_no_number_in_json():
     """5e-324 to 1.57 is a factor that no float holds; --json ended in a traceback."""
-    found = ss.analyze(rig(contact=ss.InclinedSpring(preload=5e6, angle=5e-324)))
+    found = ss.analyze(rig(contact=ss.laws.InclinedSpring(preload=5e6, angle=5e-324)))
     edges = [one for one in found.to_dict()["boundaries"] if one["parameter"] == "contact.angle"]
     assert edges
     assert {one["relative_distance"] for one in edges} == {None}
@@ -53,6 +53,6 @@ def test_lines_of_a_column_do_not_end_inside_of_a_text():
     area = 0.43
     change = tuple(one for n in range(1, 400) if (one := (-10.0) ** (n % 9) / n) * area / area != one)
     assert len(change) > 20
-    plan = ss.Protocol(pieces=(ss.DisturbanceTable(time=tuple(range(len(change))), change=change),))
+    plan = ss.Protocol(pieces=(ss.protocol.DisturbanceTable(time=tuple(range(len(change))), change=change),))
     text = ss.rig_to_text(rig(area=area), plan)
     assert ss.protocol_from_text(text) == plan

@@ -2,7 +2,7 @@
 
 A record declares each parameter once, with unit, domain and meaning::
 
-    class Constant(ContactLaw, name="constant"):
+    class ConstantNormalStress(ContactLaw, name="constant"):
         stress: float = parameter("Pa", positive, "normal stress")
 
 The constructor and its checks, reading and writing of rig files, the JSON schema, the reference page, the symbol in

@@ -32,7 +32,8 @@ from steadyslip.model.reducing import EVERYWHERE, reduce_model
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.weights import LEAST_WEIGHT, eliminable
 from steadyslip.motion.jobs import Options, automatic_method
-from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep, pack
+from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep
+from steadyslip.protocol.segments import pack
 
 OPTIONS = Options(rtol=1e-6, most_steps=100_000)
 DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {

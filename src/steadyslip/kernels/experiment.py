@@ -16,7 +16,8 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
-from steadyslip.model import Model, OperatingPoint
+from steadyslip.model import Model
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import PORES, reduce_model
 from steadyslip.model.reduction import Reduction, W
 from steadyslip.model.variational import with_directions

@@ -16,7 +16,8 @@ from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import SETTINGS, Status
-from steadyslip.model import Model, OperatingPoint
+from steadyslip.model import Model
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import Reduction
 

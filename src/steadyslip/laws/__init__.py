@@ -1,4 +1,9 @@
-"""Friction and contact laws: frozen records whose methods return SymPy expressions.
+"""Friction laws, contact laws, and what the author of a new law needs: parameters, units and allowed values.
 
-Laws do not depend on their users: rigs, Models, files or anything computed from them.
+Laws are frozen records whose methods return SymPy expressions. They know nothing of where they are used: rigs, Models,
+files, anything that is computed of them. Names are listed in ``__init__.pyi`` and loaded on first use.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

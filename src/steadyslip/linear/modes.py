@@ -14,7 +14,7 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
-from steadyslip.laws.contact import Motion
+from steadyslip.laws.contact import ContactInputs
 from steadyslip.linear.pencil import best_spectrum, matrix_function
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, ContactPort, Mechanism
@@ -216,7 +216,7 @@ def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[s
 
 def _stiffness_of(touch: ContactPort) -> Any:
     """Normal stiffness of a contact, from its law."""
-    at_rest = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    at_rest = ContactInputs(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     apart = replace(at_rest, separation=1.0)
     return touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart)
 

@@ -37,7 +37,7 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         return 0
 
 
-class Steady(Drive, name="steady", kw_only=False):
+class SteadyDrive(Drive, name="steady", kw_only=False):
     """A load point pulled at constant velocity."""
 
 

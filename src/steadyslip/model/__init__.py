@@ -4,7 +4,15 @@ This folder depends on the methods of laws and rigs; it does not depend on kerne
 """
 
 from steadyslip.model.build import build_model
-from steadyslip.model.equations import Contact, Model, Variable
-from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.equations import Model
+from steadyslip.model.sliding import SteadyContact, SteadyMachine, SteadySliding, steady_state, steady_states
 
-__all__ = ["Contact", "Model", "OperatingPoint", "Variable", "build_model", "operating_point"]
+__all__ = [
+    "Model",
+    "SteadyContact",
+    "SteadyMachine",
+    "SteadySliding",
+    "build_model",
+    "steady_state",
+    "steady_states",
+]

@@ -17,7 +17,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.symbols import Letters, inner_symbol
-from steadyslip.laws.contact import Motion
+from steadyslip.laws.contact import ContactInputs
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
 from steadyslip.model.equations import EITHER, MOVED, V_LP, LettingGo, P, Q
 from steadyslip.model.statics import NormalStress, Statics, row_of, statics
@@ -172,8 +172,8 @@ class Forces:
 
     def _motion(
         self, site: SymbolicContact, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any
-    ) -> Motion:
-        return Motion(
+    ) -> ContactInputs:
+        return ContactInputs(
             site.slip, site.velocity, site.acceleration, site.spring, spring_ss, site.tau, site.tau_ss,
             stiffness, site.speed, separation, steady_separation, row_of(site.port.separation, self.v),
             site.states, tuple(map(sp.sympify, site.port.contact.steady_memory(site.speed))), site.outside,
@@ -330,7 +330,7 @@ class Forces:
             self.definitions[self.sites[0].tau] = self._slider_friction()
         self.definitions |= {site.sigma: law for site, law in zip(self.sites, self.normal, strict=True)}
 
-    def _contact_motion(self, site: SymbolicContact) -> Motion:
+    def _contact_motion(self, site: SymbolicContact) -> ContactInputs:
         """Motion passed to a contact law; also defines T, the pull at the body per area of the contact."""
         port, body = site.port, next(name for name in site.port.slip if name != LOAD_POINT)
         belt = LOAD_POINT in port.slip  # the body slides on the moving load point and is held by links to the ground

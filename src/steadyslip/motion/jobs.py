@@ -31,8 +31,9 @@ from steadyslip.model.scales import natural_scales, shortest_time
 from steadyslip.model.start import guesses, initial_values
 from steadyslip.model.weights import eliminable, slip_rates
 from steadyslip.motion.targets import NOTHING, Targets, targets
-from steadyslip.protocol import Protocol, Segments, pack
+from steadyslip.protocol import Protocol
 from steadyslip.protocol.creep import FREE
+from steadyslip.protocol.segments import Segments, pack
 
 METHOD_WORDS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 TIGHT_RTOL = (

@@ -10,8 +10,9 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.kernels.runner import Runner
 from steadyslip.machine.mechanism import LOAD_POINT
-from steadyslip.model import Model, OperatingPoint
+from steadyslip.model import Model
 from steadyslip.model.equations import HELD
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import FREE
 from steadyslip.motion.jobs import Jobs
 from steadyslip.motion.targets import Targets

@@ -19,7 +19,8 @@ from steadyslip.kernels.runner import TALLY, Runner
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model import Model, OperatingPoint
+from steadyslip.model import Model
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import AnyEvent, ContactEvent, event_of, events_of

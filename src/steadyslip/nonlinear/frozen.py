@@ -19,7 +19,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.records import parameters, replaced
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.output import write_columns
-from steadyslip.laws.contact import ContactLaw, Motion
+from steadyslip.laws.contact import ContactInputs, ContactLaw
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
@@ -27,9 +27,10 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.reducing import PORES
 from steadyslip.motion import History, simulate
 from steadyslip.motion.targets import targets
-from steadyslip.protocol import Protocol, pack
+from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import inputs_at, segment_of
 from steadyslip.protocol.protocol import LOAD_POINT
+from steadyslip.protocol.segments import pack
 
 Array = np.ndarray
 MOMENTS = 1000  # at which the verdict is asked, besides those at which something jumps
@@ -211,10 +212,10 @@ def frozen_verdicts(
     A rock is pressed ever harder: σ(b − a)/d_c reaches the stiffness of the press at 10 MPa, after 100 s.
 
     >>> import steadyslip as ss
-    >>> rock = ss.RateState(a=.010, b=.015, d_c=1e-5, mu_ref=.6, v_ref=1e-5)
-    >>> face, drive = ss.Constant(preload=5e6), ss.Steady(1e-5)
+    >>> rock = ss.laws.RateState(a=.010, b=.015, d_c=1e-5, mu_ref=.6, v_ref=1e-5)
+    >>> face, drive = ss.laws.ConstantNormalStress(preload=5e6), ss.machine.SteadyDrive(1e-5)
     >>> press = ss.Slider(friction=rock, contact=face, stiffness=5e9, mass=1e4, drive=drive)
-    >>> found = ss.frozen_verdicts(press, ss.NormalStressRamp(at=0, by=10e6, duration=200), until=400)
+    >>> found = ss.frozen_verdicts(press, ss.protocol.NormalStressRamp(at=0, by=10e6, duration=200), until=400)
     >>> [(round(time), verdict) for time, verdict in found.crossings]
     [(100, 'unstable')]
     >>> found.departure > 100
@@ -311,11 +312,11 @@ def _contacts(rig: Slider | Machine) -> dict[str, tuple[ContactLaw, float]]:
 
 def _refuse_remembered(rig: Slider | Machine) -> None:
     """Contacts that count from the steady sliding at the start: another has not the parameters of the rig."""
-    seen = {one.name: sp.Symbol(one.name) for one in fields(Motion)}
+    seen = {one.name: sp.Symbol(one.name) for one in fields(ContactInputs)}
     for prefix, (law, _) in _contacts(rig).items():
         memory = {f"{kind}memory": tuple(sp.symbols([f"{kind}{n}" for n in law.memory()])) for kind in ("", "steady_")}
-        stress = sp.sympify(law.normal_stress(Motion(**seen | memory)))
-        if any(one.name == "slip" or one.name.startswith("steady_") for one in stress.free_symbols):
+        stress = sp.sympify(law.normal_stress(ContactInputs(**seen | memory)))
+        if any(one.name == "lead" or one.name.startswith("steady_") for one in stress.free_symbols):
             raise NotAvailable(
                 f"{prefix.rstrip('.')} counts its normal stress from the steady sliding at the start, which a slow "
                 "change leaves; give a preload in place of steady_normal_stress, and none that depends on displacement"

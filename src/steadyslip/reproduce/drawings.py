@@ -15,7 +15,7 @@ import numpy as np
 
 from steadyslip import figures
 from steadyslip.figures import style
-from steadyslip.laws.contact import Constant
+from steadyslip.laws.contact import ConstantNormalStress
 from steadyslip.linear import critical_stiffness
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
@@ -44,7 +44,9 @@ def _figure_7(ax: Any) -> Any:
 def simulate_shear(protocol: Any, slip: float = 8 * D_C) -> History:
     """Simulated shear of the rock of the paper in a stiff machine at constant normal stress, over a slip in m."""
     paper = paper_rig()
-    rig = Slider(friction=paper.friction, contact=Constant(preload=SIGMA), stiffness=_STIFF, drive=paper.drive)
+    rig = Slider(
+        friction=paper.friction, contact=ConstantNormalStress(preload=SIGMA), stiffness=_STIFF, drive=paper.drive
+    )
     return simulate(rig, protocol, until=slip / V0, method="rosenbrock", events=False)
 
 

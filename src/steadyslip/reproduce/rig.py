@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steadyslip.laws.contact import InclinedSpring
 from steadyslip.laws.friction import LinkerDieterich, RateState, Slip
-from steadyslip.machine.drive import Steady
+from steadyslip.machine.drive import SteadyDrive
 from steadyslip.machine.slider import Slider
 from steadyslip.units import GPa, MPa, deg, m, s, um
 
@@ -21,4 +21,4 @@ def paper_rig(angle: float = -45 * deg) -> Slider:
         a=0.0145, b=0.0160, d_c=D_C, mu_ref=0.7, v_ref=V0, evolution=Slip(), normal_memory=LinkerDieterich(alpha=0.56)
     )
     contact = InclinedSpring(preload=5 * MPa, angle=angle)
-    return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=Steady(V0))
+    return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=SteadyDrive(V0))

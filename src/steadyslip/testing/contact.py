@@ -9,10 +9,10 @@ import mpmath
 import sympy as sp
 
 from steadyslip.core.errors import NoSteadySliding
-from steadyslip.laws.contact import ContactLaw, Motion
+from steadyslip.laws.contact import ContactInputs, ContactLaw
 from steadyslip.laws.friction import FrictionLaw, RateState
 from steadyslip.machine.bodies import PlanarBody
-from steadyslip.machine.drive import Steady
+from steadyslip.machine.drive import SteadyDrive
 from steadyslip.machine.links import Spring
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.servo import Pull
@@ -66,7 +66,7 @@ class Surroundings:
             mass=self.mass,
             damping=self.damping,
             radiation_damping=self.radiation_damping,
-            drive=Steady(self.velocity),
+            drive=SteadyDrive(self.velocity),
         )
 
     def _machine(self, contact: ContactLaw) -> Machine:
@@ -93,13 +93,15 @@ class Surroundings:
                 f"{contact!r}: {error}; check it with numbers that have a steady state, or give `surroundings`"
             ) from error
 
-    def steady_motion(self, contact: ContactLaw, sigma: float, velocity: float | None = None) -> Motion:
+    def steady_motion(self, contact: ContactLaw, sigma: float, velocity: float | None = None) -> ContactInputs:
         """Motion in steady sliding at normal stress `sigma` (Pa) and a velocity (m/s), by default that of the drive."""
         v = self.velocity if velocity is None else velocity
         tau = float(self.friction.steady_strength(v, sigma))
         spring = tau + self.radiation_damping * v
         memory = tuple(float(one) for one in contact.steady_memory(v))
-        motion = Motion(0.0, v, 0.0, spring, spring, tau, tau, self.stiffness, v, memory=memory, steady_memory=memory)
+        motion = ContactInputs(
+            0.0, v, 0.0, spring, spring, tau, tau, self.stiffness, v, memory=memory, steady_memory=memory
+        )
         if not contact.is_compliant():
             return motion
 
@@ -135,19 +137,19 @@ class SymbolicContactLaw:
         memory = tuple(sp.Symbol(f"m_{i}", real=True) for i in range(len(contact.memory())))
         steady = tuple(sp.Symbol(f"m_ss_{i}", real=True) for i in range(len(contact.memory())))
         self.inputs = (*plain, outside, *memory, *steady)
-        self.motion = replace(Motion(*plain), outside=outside, memory=memory, steady_memory=steady)
+        self.motion = replace(ContactInputs(*plain), outside=outside, memory=memory, steady_memory=steady)
         self.stress = call_with_symbols(contact, "normal_stress", self.copy.normal_stress, self.motion)
         require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
 
-    def at(self, motion: Motion) -> Any:
+    def at(self, motion: ContactInputs) -> Any:
         """Normal stress (Pa) to fifty digits, for a Motion of numbers."""
         function = precise_function(self.contact, [*self.inputs, *self.numbers], [self.stress])
         return function(*motion_values(motion), *self.numbers.values())[0]
 
 
-def motion_values(motion: Motion) -> list[Any]:
-    """Numbers of a Motion, in the order of `SymbolicContactLaw.inputs`."""
-    plain = [getattr(motion, name) for name in Motion.__dataclass_fields__ if not name.endswith("memory")]
+def motion_values(motion: ContactInputs) -> list[Any]:
+    """Numbers of a ContactInputs, in the order of `SymbolicContactLaw.inputs`."""
+    plain = [getattr(motion, name) for name in ContactInputs.__dataclass_fields__ if not name.endswith("memory")]
     return [*plain, *motion.memory, *motion.steady_memory]
 
 
@@ -223,7 +225,7 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAUL
         b0, b1, b2, b3 = (float(b) for b in function(*values.arguments, sigma))
         k_part = abs(place.stiffness * b2) + abs(b3)
         expected = {
-            "slip": (place.stiffness * b2 + b3, k_part),
+            "lead": (place.stiffness * b2 + b3, k_part),
             "velocity": (b1, abs(b1)),
             "acceleration": (b0, abs(b0)),
         }
@@ -247,13 +249,15 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAUL
             )
 
 
-def _displaced(place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: Any, acceleration: Any) -> Motion:
+def _displaced(
+    place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: Any, acceleration: Any
+) -> ContactInputs:
     """Motion displaced from steady sliding by x (m), at velocity v and an acceleration; forces from the balance."""
     rest = place.steady_motion(contact, sigma)
     with mpmath.workdps(DIGITS):
         spring = rest.spring - mpmath.mpf(place.stiffness) * x - place.damping * (v - mpmath.mpf(place.velocity))
         tau = spring - mpmath.mpf(place.radiation_damping) * v - mpmath.mpf(place.mass) * acceleration
-        return replace(rest, slip=x, velocity=v, acceleration=acceleration, spring=spring, friction=tau)
+        return replace(rest, lead=x, velocity=v, acceleration=acceleration, spring=spring, friction=tau)
 
 
 def check_axis(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:

@@ -56,8 +56,8 @@ def check_names(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -
 
 def check_symbols(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
     """Check that equations depend on their arguments only, and that no symbol of the law collides with the Model's."""
-    from steadyslip.laws.contact import Constant
-    from steadyslip.machine.drive import Steady
+    from steadyslip.laws.contact import ConstantNormalStress
+    from steadyslip.machine.drive import SteadyDrive
     from steadyslip.machine.slider import Slider
     from steadyslip.model import build_model
 
@@ -70,8 +70,8 @@ def check_symbols(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS)
         *(("steady_memory", y) for y in symbolic.steady_memory),
     ]:
         require_known_symbols(law, what, expression, [symbolic.v, symbolic.sigma, *own])
-    press = Constant(steady_normal_stress=conditions.normal_stress)
-    rig = Slider(friction=law, contact=press, stiffness=1.0, drive=Steady(conditions.velocity))
+    press = ConstantNormalStress(steady_normal_stress=conditions.normal_stress)
+    rig = Slider(friction=law, contact=press, stiffness=1.0, drive=SteadyDrive(conditions.velocity))
     model = build_model(rig, present=["slider.mass", "slider.damping", "slider.radiation_damping"])
     used = [
         *model.parameters.items(),

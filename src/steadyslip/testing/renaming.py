@@ -108,10 +108,10 @@ def _require_equal_equations(law: L, rig: Callable[[L], Slider | Machine]) -> No
 
 def check_renaming(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
     """Check that the equations of a rig with this friction law do not depend on its names."""
-    from steadyslip.laws.contact import Constant
-    from steadyslip.machine.drive import Steady
+    from steadyslip.laws.contact import ConstantNormalStress
+    from steadyslip.machine.drive import SteadyDrive
 
-    press, drive = Constant(steady_normal_stress=conditions.normal_stress), Steady(conditions.velocity)
+    press, drive = ConstantNormalStress(steady_normal_stress=conditions.normal_stress), SteadyDrive(conditions.velocity)
     _require_equal_equations(law, lambda one: Slider(friction=one, contact=press, stiffness=1e9, mass=1.0, drive=drive))
 
 

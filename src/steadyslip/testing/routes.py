@@ -18,10 +18,10 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIO
     The cubic takes dτ/dv and dτ/dσ in steady sliding from `steady_strength`, the Jacobian everything from `strength`
     and `rates`. They must agree up to a positive factor, with mass, dampings and B0...B3.
     """
-    from steadyslip.laws.contact import Linear
+    from steadyslip.laws.contact import LinearNormalStress
     from steadyslip.linear import cubic
     from steadyslip.linear.response import response
-    from steadyslip.machine.drive import Steady
+    from steadyslip.machine.drive import SteadyDrive
     from steadyslip.model.linearisation import characteristic_coefficients
     from steadyslip.model.point import operating_point
 
@@ -32,7 +32,9 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIO
     point = symbolic.steady(v, sigma)
     rate = abs(float(symbolic.relaxation()(*point)[0]))
     size = float(point[-1]) / v  # damping in Pa s/m of the size of friction over velocity
-    linear = Linear(steady_normal_stress=sigma, b0=0.3 * size / rate, b1=0.2 * size, b2=0.4, b3=0.1 * size * rate)
+    linear = LinearNormalStress(
+        steady_normal_stress=sigma, b0=0.3 * size / rate, b1=0.2 * size, b2=0.4, b3=0.1 * size * rate
+    )
     rig = Slider(
         friction=law,
         contact=linear,
@@ -40,7 +42,7 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIO
         mass=size / rate,
         damping=0.5 * size,
         radiation_damping=0.7 * size,
-        drive=Steady(v),
+        drive=SteadyDrive(v),
     )
     values = operating_point(rig)
     model = values.model
@@ -65,11 +67,11 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIO
 
 def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
     """Check that a rig with this law is unchanged after writing it to a rig file and reading it back."""
-    from steadyslip.laws.contact import Constant
-    from steadyslip.machine.drive import Steady
+    from steadyslip.laws.contact import ConstantNormalStress
+    from steadyslip.machine.drive import SteadyDrive
 
-    press = Constant(preload=conditions.normal_stress)
-    round_trip(law, Slider(friction=law, contact=press, stiffness=1e9, drive=Steady(conditions.velocity)))
+    press = ConstantNormalStress(preload=conditions.normal_stress)
+    round_trip(law, Slider(friction=law, contact=press, stiffness=1e9, drive=SteadyDrive(conditions.velocity)))
 
 
 def round_trip(law: FrozenRecord, rig: Slider | Machine) -> None:

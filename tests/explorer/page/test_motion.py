@@ -93,7 +93,7 @@ def test_motion_goes_on_where_no_worker_may_run(browser, file, tmp_path):
 
 
 def test_the_rig_moves_and_stops_when_asked(browser, moved):
-    run = ss.simulate(MOVED, ss.VelocityStep(at=10.0, to=2e-6), until=200.0, rtol=1e-6)
+    run = ss.simulate(MOVED, ss.protocol.VelocityStep(at=10.0, to=2e-6), until=200.0, rtol=1e-6)
     with Visit(browser, moved["explorer"]) as visit:
         visit.page.get_by_label("length of the run").fill("200 s")
         visit.page.get_by_label("length of the run").press("Tab")

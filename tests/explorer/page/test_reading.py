@@ -119,15 +119,15 @@ HOSTILE_WORDS = "</script><script>throw 1</script><img src=x onerror=throw(1)>{{
 @pytest.mark.usefixtures("unpainted")
 def test_hostile_words_of_a_law_are_text(browser, tmp_path):
     """What a user's law calls itself and its parameters stands on the page as it is, and does nothing."""
-    known = dict(ss.ContactLaw.registry)
+    known = dict(ss.laws.ContactLaw.registry)
 
-    class Hostile(ss.PreloadedContact, name=HOSTILE_WORDS):
-        share: float = ss.parameter("1", positive, HOSTILE_WORDS)
+    class Hostile(ss.laws.PreloadedContact, name=HOSTILE_WORDS):
+        share: float = ss.laws.parameter("1", positive, HOSTILE_WORDS)
 
         def coupling(self, motion):
             return self.share * motion.friction
 
-    ss.ContactLaw.registry = known
+    ss.laws.ContactLaw.registry = known
     own = rig(contact=Hostile(preload=SIGMA, share=0.1))
     for make in (ss.explore, ss.report):
         make(own).save(tmp_path / "page.html")

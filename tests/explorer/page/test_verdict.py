@@ -82,9 +82,9 @@ def test_the_locus_shows_eigenvalues_and_where_stability_changes(browser, file):
 
 RIGS = {
     "area": rig(area=0.01, stiffness=9e9),
-    "axial": rig(contact=ss.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
-    "controller": rig(stiffness=None, drive=ss.PID(1e-6, kp=9e9, ki=1e8), mass=1e3),
-    "locked": rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0)),
+    "axial": rig(contact=ss.laws.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
+    "controller": rig(stiffness=None, drive=ss.machine.PID(1e-6, kp=9e9, ki=1e8), mass=1e3),
+    "locked": rig(contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-1.0)),
     "bristles": rig(friction=ONE_MEMORY[-1]),
 }
 

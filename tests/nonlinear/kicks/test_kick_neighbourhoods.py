@@ -14,7 +14,7 @@ from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.settled import rest_of
 
-STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
+STEEP = rate_state(b=0.022, normal_memory=ss.laws.LinkerDieterich(alpha=0.3))
 
 
 def rest_at(a_rig, velocity=None, pressure=0.0):
@@ -41,7 +41,7 @@ def test_own_steady_sliding_and_its_growth_rate(contact):
 
 @pytest.mark.parametrize("friction", ONE_MEMORY, ids=lambda f: f.name + str(getattr(f, "regularised", "")))
 def test_after_a_velocity_step_the_rig_is_one_driven_at_the_new_velocity(friction):
-    contact = ss.InclinedSpring(preload=SIGMA, angle=0.3)
+    contact = ss.laws.InclinedSpring(preload=SIGMA, angle=0.3)
     a_rig = rig(friction=friction, contact=contact)
     for factor in (0.2, 7.0):
         moved = rest_at(a_rig, factor * V0)
@@ -64,21 +64,23 @@ def test_there_is_none_where_the_stress_is_gone():
 # -- the neighbourhood
 
 
-TWO_STATES = ss.RateState(a=0.0145, mu_ref=0.7, v_ref=V0, evolution=ss.Slip(),
-                          states=(ss.State(b=0.01, d_c=1e-6), ss.State(b=0.01, d_c=1e-5)))  # fmt: skip
+TWO_STATES = ss.laws.RateState(a=0.0145, mu_ref=0.7, v_ref=V0, evolution=ss.laws.Slip(),
+                          states=(ss.laws.State(b=0.01, d_c=1e-6), ss.laws.State(b=0.01, d_c=1e-5)))  # fmt: skip
 UNIT_MASS = 0.0145 * SIGMA * D_C / V0**2  # of mass in units of theory 5
 
 
 def bristles(velocity, mass, damping=10.0, stiffness=1e12, contact=None):
-    friction = ss.LuGre(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, bristle_stiffness=1e5,
+    friction = ss.laws.LuGre(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, bristle_stiffness=1e5,
                         bristle_damping=damping, viscous=5.0)  # fmt: skip
-    return ss.Slider(friction=friction, contact=contact or ss.Constant(preload=1e6), stiffness=stiffness, mass=mass,
-                     drive=ss.Steady(velocity))  # fmt: skip
+    return ss.Slider(friction=friction, contact=contact or ss.laws.ConstantNormalStress(preload=1e6),
+        stiffness=stiffness,
+        mass=mass,
+                     drive=ss.machine.SteadyDrive(velocity))  # fmt: skip
 
 
 def of_law(friction, mass=0.0, factor=1.03):
     """Close to the edge, where balls are small and modes decay at very different rates."""
-    base = rig(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=0.4), mass=mass * UNIT_MASS)
+    base = rig(friction=friction, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=0.4), mass=mass * UNIT_MASS)
     return base.with_values({"stiffness": factor * ss.critical_stiffness(base)})
 
 
@@ -93,7 +95,7 @@ STABLE = {
     "regularised nagata, mass of 1e-8": lambda: of_law(ONE_MEMORY[4], 1e-8, factor=3.0),
     "two states": lambda: of_law(TWO_STATES),
     "two states, mass": lambda: of_law(TWO_STATES, 1e-2),
-    "lugre, massless": lambda: bristles(3e-4, 0.0, contact=ss.InclinedSpring(preload=1e6, angle=0.3)),
+    "lugre, massless": lambda: bristles(3e-4, 0.0, contact=ss.laws.InclinedSpring(preload=1e6, angle=0.3)),
     "lugre, light": lambda: bristles(3e-3, 1.0, damping=0.0),
     "lugre, heavy": lambda: bristles(3e-3, 3e3),
     "lugre, damped bristles": lambda: bristles(3e-3, 3e3, damping=300.0),

@@ -34,18 +34,18 @@ def outcomes(a_rig, kick, sizes, direction=1):
 
 def test_ringing_while_the_block_sticks_is_no_cycle():
     """It makes two peaks agree to 1e-8 on the way back to steady sliding."""
-    a_rig = heavy(ss.Slip(), 1.3, 1e10)
+    a_rig = heavy(ss.laws.Slip(), 1.3, 1e10)
     assert outcomes(a_rig, "displacement", [5.0, 20.0, 39.1, 60.0, 150.0]) == ["returns"] * 5
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_block_may_be_stopped_beyond_floating_point(direction):
     """Friction follows ln v to -65 000 e-folds while the spring is taken up again: no kick is too large to be told."""
-    a_rig = heavy(ss.Slip(), 1.3, 1e10)
+    a_rig = heavy(ss.laws.Slip(), 1.3, 1e10)
     found = ss.threshold(a_rig, "displacement", direction=direction)
     assert (found.size, found.searched, found.decided) == (np.inf, 1e5, True)
     lengths = 2000.0
-    step = ss.DisplacementStep(at=0.0, by=direction * lengths * 1e-6)
+    step = ss.protocol.DisplacementStep(at=0.0, by=direction * lengths * 1e-6)
     run = ss.simulate(a_rig, step, until=2 * lengths, times=[30.0, 0.9 * lengths, 2 * lengths], rtol=1e-8)
     assert run["v"][:2] == pytest.approx(0.0, abs=1e-30)
     assert np.diff(run["x"][:2]) == pytest.approx(1e-6 * (30.0 - 0.9 * lengths))  # the load point alone moves
@@ -53,23 +53,28 @@ def test_a_block_may_be_stopped_beyond_floating_point(direction):
 
 
 def test_peaks_that_shrink_towards_a_cycle_are_no_return():
-    a_rig = heavy(ss.Aging(), 0.5, 2.5e9)
+    a_rig = heavy(ss.laws.Aging(), 0.5, 2.5e9)
     assert outcomes(a_rig, "displacement", [1.0, 50.0, 90.8, 120.0]) == ["oscillation"] * 4
     assert outcomes(a_rig, "velocity", [0.5], -1) == ["oscillation"]
 
 
 def test_cycles_of_several_slip_events_are_cycles():
     """Two states, past two period doublings: four events, no two alike, until the motion repeats itself."""
-    states = (ss.State(b=0.010313918056883623, d_c=1e-6), ss.State(b=0.008294462572654671, d_c=4.530570134031203e-6))
-    friction = ss.RateState(a=0.013579666218587378, mu_ref=0.6, v_ref=1e-6, states=states, evolution=ss.Slip())
-    a_rig = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=6945501792.881493,
-                      drive=ss.Steady(1e-6))  # fmt: skip
+    states = (
+        ss.laws.State(b=0.010313918056883623, d_c=1e-6),
+        ss.laws.State(b=0.008294462572654671, d_c=4.530570134031203e-6),
+    )
+    friction = ss.laws.RateState(
+        a=0.013579666218587378, mu_ref=0.6, v_ref=1e-6, states=states, evolution=ss.laws.Slip()
+    )
+    a_rig = ss.Slider(friction=friction, contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=6945501792.881493,
+                      drive=ss.machine.SteadyDrive(1e-6))  # fmt: skip
     assert outcomes(a_rig, "normal-stress", [0.008168182941285275], -1) == ["oscillation"]
 
 
 def test_outcomes_change_at_a_threshold_with_mass():
     """A step of velocity, beyond which mass makes the new sliding unstable."""
-    a_rig = heavy(ss.Slip(), 1.3, 1e10)
+    a_rig = heavy(ss.laws.Slip(), 1.3, 1e10)
     found = ss.threshold(a_rig, "velocity", precision=1e-3)
     below, above = outcomes(a_rig, "velocity", [0.95 * found.size, 1.05 * found.size])
     assert (below, above) == ("returns", "oscillation")
@@ -80,9 +85,9 @@ def test_outcomes_change_at_a_threshold_with_mass():
 
 def test_a_block_thrown_far_ahead_is_waited_for():
     """It stands still until the load point has caught up, for as long as that takes: friction stops what it may."""
-    friction = ss.RateState(a=0.0128, b=0.0172, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=ss.Slip())
-    base = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=2.8e10, mass=1.5e8,
-                     drive=ss.Steady(1e-6))  # fmt: skip
+    friction = ss.laws.RateState(a=0.0128, b=0.0172, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.Slip())
+    base = ss.Slider(friction=friction, contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=2.8e10, mass=1.5e8,
+                     drive=ss.machine.SteadyDrive(1e-6))  # fmt: skip
     sizes = np.array([1e5, 2e6, 1e9])
     assert outcomes(base, "impulse", sizes) == ["returns"] * 3
     kicked = Kicked(base, "impulse", 1, "before", {}, 0, None)
@@ -92,9 +97,10 @@ def test_a_block_thrown_far_ahead_is_waited_for():
 
 def test_steps_that_damping_makes_stiff_are_followed():
     """At e^20 times the velocity memory follows slip at once, and damping lets the spring follow slowly."""
-    friction = ss.RateState(a=0.0139, b=0.0208, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=ss.PRZ())
-    damped = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=6.8e10, radiation_damping=3.2e8,
-                       drive=ss.Steady(1e-6))  # fmt: skip
+    friction = ss.laws.RateState(a=0.0139, b=0.0208, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.PRZ())
+    damped = ss.Slider(friction=friction, contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=6.8e10,
+        radiation_damping=3.2e8,
+                       drive=ss.machine.SteadyDrive(1e-6))  # fmt: skip
     assert outcomes(damped, "velocity", [5.0, 20.0, 25.0]) == ["returns"] * 3
     kicked = Kicked(damped, "velocity", 1, "before", {}, 0, None)
     roots = kicked.rest_after(np.zeros(1, dtype=int), np.array([25.0])).roots[0].real
@@ -105,10 +111,11 @@ def test_steps_that_damping_makes_stiff_are_followed():
 
 def folding(factor=1.03):
     """Bristles without mass, whose forces balance at three velocities: .6, .8 and 1 times the drive's."""
-    friction = ss.LuGre(mu_coulomb=0.148, mu_static=0.214, v_stribeck=0.00168, viscous=4.55,
+    friction = ss.laws.LuGre(mu_coulomb=0.148, mu_static=0.214, v_stribeck=0.00168, viscous=4.55,
                         bristle_stiffness=1.29e4, bristle_damping=26.3)  # fmt: skip
-    base = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=4e9, radiation_damping=2490.0,
-                     drive=ss.Steady(0.00285))  # fmt: skip
+    base = ss.Slider(friction=friction, contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=4e9,
+        radiation_damping=2490.0,
+                     drive=ss.machine.SteadyDrive(0.00285))  # fmt: skip
     return base.with_values({"stiffness": factor * ss.hopf(base).value})
 
 
@@ -116,7 +123,7 @@ def test_a_block_without_mass_takes_the_nearest_velocity_that_balances_forces():
     """A step of a thousandth changes the velocity by as little, whichever way the search for it steps."""
     a_rig, drive = folding(), 0.00285
     for size in np.linspace(-0.02, 0.01, 11):
-        run = ss.simulate(a_rig, ss.VelocityStep(at=0.0, to=drive * (1 + size)), until=1e-6)
+        run = ss.simulate(a_rig, ss.protocol.VelocityStep(at=0.0, to=drive * (1 + size)), until=1e-6)
         assert run["v"] == pytest.approx(drive, rel=0.03)
     assert outcomes(a_rig, "velocity", np.geomspace(1e-3, 5e-3, 9)) == ["returns"] * 9
 
@@ -134,10 +141,15 @@ def test_where_no_velocity_balances_forces_any_further_there_is_no_solution():
 
 def test_a_motion_goes_on_at_the_velocity_at_which_it_stopped():
     """Two spans are one: where three velocities balance forces, a state alone begins at the wrong one of them."""
-    friction = ss.LuGre(
+    friction = ss.laws.LuGre(
         mu_coulomb=0.3, mu_static=0.8, v_stribeck=0.05, viscous=1.0, bristle_stiffness=5e5, bristle_damping=140.0
     )
-    a_rig = rig(friction=friction, contact=ss.Constant(preload=5e6), stiffness=1.4e10, drive=ss.Steady(5e-4))
+    a_rig = rig(
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        stiffness=1.4e10,
+        drive=ss.machine.SteadyDrive(5e-4),
+    )
     kicked = Kicked(a_rig, "displacement", 1, "before", {}, 0, None)
     runs, one, span = kicked.runs(np.zeros(1, dtype=int), np.array([1e-9])), np.zeros(1, dtype=int), np.array([1e-5])
     initial, velocity = initial_values(runs.jobs.reduction, runs.jobs.point, {"v": 50.0})
@@ -175,11 +187,11 @@ def test_no_threshold_beyond_the_edge_of_the_new_sliding():
 
 @pytest.mark.parametrize(("angle", "expected"), [(30, 2.9124235), (-30, 2.2918127)])
 def test_a_given_steady_stress_holds_at_the_rigs_own_velocity(angle, expected):
-    rock = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
-    loaded = rig(friction=rock, contact=ss.InclinedSpring(preload=SIGMA, angle=np.radians(angle)))
+    rock = rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56))
+    loaded = rig(friction=rock, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=np.radians(angle)))
     loaded = loaded.with_values({"stiffness": 1.2 * ss.critical_stiffness(loaded)})
     stress = ss.steady_state(loaded).normal_stress
-    given = rig(friction=rock, contact=ss.InclinedSpring(steady_normal_stress=stress, angle=np.radians(angle)),
+    given = rig(friction=rock, contact=ss.laws.InclinedSpring(steady_normal_stress=stress, angle=np.radians(angle)),
                 stiffness=loaded.stiffness)  # fmt: skip
     found = ss.threshold(given, reference="after").size
     assert found == pytest.approx(ss.threshold(loaded, reference="after").size, rel=1e-7)
@@ -216,7 +228,7 @@ def test_doubt_is_carried_through(monkeypatch):
     assert np.isnan(brackets.size).all()
     assert np.all(brackets.low <= 5.0)
     assert np.all((brackets.low > 4.8) & (brackets.high >= 6.0) & (brackets.high < 6.2))
-    margin = ss.margin_to_kick(a_rig, ss.DisplacementStep(at=0.0, by=5.5 * found.amount / found.size))
+    margin = ss.margin_to_kick(a_rig, ss.protocol.DisplacementStep(at=0.0, by=5.5 * found.amount / found.size))
     assert margin.survives is None
     assert f"undecided ({why})" in str(margin)
     assert (margin.to_dict()["survives"], margin.to_dict()["doubt"]) == (None, why)
@@ -237,8 +249,10 @@ def test_doubt_is_said_on_maps(monkeypatch):
     assert set(found["limit"].sel(angle=0.3).values) == {why}
     words = " | ".join(ss.figures.threshold_map(found).get_legend_handles_labels()[1]).replace("\n", " ")
     assert words == f"no steady sliding | {why}"
-    measured = ss.KickThreshold(kick="displacement").arrays(a_rig, ss.Protocol(), {"contact.angle": np.array([0.3])})
-    (limit,) = [o for o in ss.KickThreshold(kick="displacement").outputs(a_rig, ()) if o.name == "threshold_limit"]
+    measured = ss.maps.KickThreshold(kick="displacement").arrays(
+        a_rig, ss.Protocol(), {"contact.angle": np.array([0.3])}
+    )
+    (limit,) = [o for o in ss.maps.KickThreshold(kick="displacement").outputs(a_rig, ()) if o.name == "threshold_limit"]
     assert limit.flags[int(measured["threshold_limit"][0])] == why
 
 
@@ -314,10 +328,14 @@ def test_all_kicks_of_a_threshold_share_their_steps(monkeypatch):
 
 
 def lugre_with_mass(static, coulomb, v_stribeck, viscous, stiffness, damping, k, mass, drive):
-    friction = ss.LuGre(mu_coulomb=coulomb, mu_static=static, v_stribeck=v_stribeck, viscous=viscous,
+    friction = ss.laws.LuGre(mu_coulomb=coulomb, mu_static=static, v_stribeck=v_stribeck, viscous=viscous,
                         bristle_stiffness=stiffness, bristle_damping=damping)  # fmt: skip
     return ss.Slider(
-        friction=friction, contact=ss.Constant(preload=5e6), stiffness=k, mass=mass, drive=ss.Steady(drive)
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        stiffness=k,
+        mass=mass,
+        drive=ss.machine.SteadyDrive(drive),
     )
 
 
@@ -361,15 +379,15 @@ def test_a_span_with_too_many_steps_goes_on_from_where_it_ended(monkeypatch, mos
     """What comes of a motion does not depend on how many steps are taken at a time."""
     own = kicks_module.options_for
     monkeypatch.setattr(kicks_module, "options_for", lambda *given: replace(own(*given), most_steps=most))
-    assert outcomes(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["oscillation"]
-    assert outcomes(heavy(ss.Slip(), 1.3, 1e10), "displacement", [60.0]) == ["returns"]
+    assert outcomes(heavy(ss.laws.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["oscillation"]
+    assert outcomes(heavy(ss.laws.Slip(), 1.3, 1e10), "displacement", [60.0]) == ["returns"]
 
 
 def test_a_block_pulled_back_out_of_all_proportion_is_followed():
     """It stops so hard that ln v falls by thousands; numbers stay numbers on its way back, for every size."""
-    friction = rate_state(a=0.0126, b=0.0153, mu_ref=0.6, normal_memory=ss.LinkerDieterich(alpha=0.175))
-    a_rig = ss.Slider(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.016), stiffness=2.74e10,
-                      mass=2.58e5, drive=ss.Steady(V0))  # fmt: skip
+    friction = rate_state(a=0.0126, b=0.0153, mu_ref=0.6, normal_memory=ss.laws.LinkerDieterich(alpha=0.175))
+    a_rig = ss.Slider(friction=friction, contact=ss.laws.InclinedSpring(preload=SIGMA, angle=-0.016), stiffness=2.74e10,
+                      mass=2.58e5, drive=ss.machine.SteadyDrive(V0))  # fmt: skip
     kicked = Kicked(a_rig, "velocity", -1, "after", {}, 0, None)
     sizes = np.linspace(13.5, 14.9, 64)
     assert set(kicked.outcomes(np.zeros(64, dtype=int), sizes).tolist()) == {RETURNS}
@@ -381,7 +399,7 @@ def test_what_takes_too_long_is_undecided(monkeypatch):
     monkeypatch.setattr(outcomes_module, "EARLY", np.inf)
     monkeypatch.setattr(spans_module, "MOST_TURNS", 20.0)
     monkeypatch.setattr(spans_module, "MOST_LOADING", 50.0)
-    kicked = Kicked(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", 1, "before", {}, 0, None)
+    kicked = Kicked(heavy(ss.laws.Aging(), 0.5, 2.5e9), "displacement", 1, "before", {}, 0, None)
     assert kicked.outcomes(np.zeros(1, int), np.array([2.0])).tolist() == [LATE]
 
 
@@ -389,7 +407,7 @@ def test_doubt_has_a_colour_and_a_reason():
     a_rig = tilted(0.3, 1.2)
     outcome = np.array([["returns", "undecided"], ["blow-up", "returns"]])
     doubt = np.array([["", DOUBTS[0]], ["", ""]])
-    found = ss.Basin(a_rig, np.array([-1e-6, 1e-6]), np.array([1e-7, 1e-6]), outcome, doubt, ())
+    found = ss.nonlinear.Basin(a_rig, np.array([-1e-6, 1e-6]), np.array([1e-7, 1e-6]), outcome, doubt, ())
     words = [word.replace("\n", " ") for word in found.plot().get_legend_handles_labels()[1]]
     assert words[1:] == ["returns", "blow-up", f"undecided: {DOUBTS[0]}"]
 
@@ -418,9 +436,11 @@ def test_random_kicks_equal_scipy(kind):
 
 
 CLOSE_TO_A_FOLD = ss.Slider(
-    friction=ss.LuGre(mu_coulomb=0.30885889, mu_static=0.4471462411, v_stribeck=3.173016221e-4, viscous=0.6422815173,
+    friction=ss.laws.LuGre(mu_coulomb=0.30885889, mu_static=0.4471462411, v_stribeck=3.173016221e-4,
+    viscous=0.6422815173,
                       bristle_stiffness=11754.66919, bristle_damping=7.284784178),
-    contact=ss.Constant(preload=5e6), stiffness=10145846886.0, drive=ss.Steady(1.253958662e-4),
+    contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=10145846886.0,
+    drive=ss.machine.SteadyDrive(1.253958662e-4),
 )  # fmt: skip
 
 
@@ -465,8 +485,8 @@ def test_beyond_an_edge_near_the_end_of_the_range_it_is_looked_at_the_end(monkey
 def test_where_the_balance_has_no_fold_no_state_is_at_one():
     """Forces of a press with a controller rise with velocity everywhere; the answer has one entry a rig."""
     press = next(contact for contact in CONTACTS if contact.name == "triaxial")
-    a_rig = rig(friction=rate_state(evolution=ss.PRZ(), regularised=True), contact=press, stiffness=9e9,
-                drive=ss.PD(1e-6, kp=2e10, kd=1e9))  # fmt: skip
+    a_rig = rig(friction=rate_state(evolution=ss.laws.PRZ(), regularised=True), contact=press, stiffness=9e9,
+                drive=ss.machine.PD(1e-6, kp=2e10, kd=1e9))  # fmt: skip
     jobs = prepare(a_rig, (), 1.0, {}, {}, Options())
     assert jobs.reduction.unknowns
     rest = rest_of(jobs, np.full(3, 1e-6), np.zeros(3))

@@ -43,14 +43,14 @@ def test_a_machine_of_one_body_survives_what_its_slider_does(seed, kick, of_mach
 def weak():
     """A light table on a controlled motor, all of it without dashpots at the load point."""
     return ss.Machine(
-        bodies={"motor": ss.RotatingBody(inertia=0.5), "table": ss.SlidingBody(mass=0.0)},
+        bodies={"motor": ss.machine.RotatingBody(inertia=0.5), "table": ss.machine.SlidingBody(mass=0.0)},
         links={
-            "shaft": ss.Shaft(between=("drive", "motor"), stiffness=4.0),
-            "brake": ss.Shaft(between=("ground", "motor"), damping=1.5),
-            "screw": ss.Screw(between=("motor", "table"), lead=1.0, stiffness=3.0),
+            "shaft": ss.machine.Shaft(between=("drive", "motor"), stiffness=4.0),
+            "brake": ss.machine.Shaft(between=("ground", "motor"), damping=1.5),
+            "screw": ss.machine.Screw(between=("motor", "table"), lead=1.0, stiffness=3.0),
         },
-        contacts={"guide": surface("table", ss.RateState(a=0.5, b=0.8, d_c=1.0, mu_ref=0.6, v_ref=1.0))},
-        drive=ss.RotaryPull(velocity=1.0),
+        contacts={"guide": surface("table", ss.laws.RateState(a=0.5, b=0.8, d_c=1.0, mu_ref=0.6, v_ref=1.0))},
+        drive=ss.machine.RotaryPull(velocity=1.0),
     )
 
 
@@ -119,7 +119,7 @@ def test_what_a_push_makes_of_a_machine_is_what_it_comes_to():
     kicked = Kicked(machine, "force", 1, "before", {}, 0, 1e-6, "table")
     size = 0.05
     rest = kicked.rest_after(np.zeros(1, dtype=int), np.array([size]))
-    push = ss.DisturbanceStep(at=0.0, by=float(kicked.amount(size)[0]), on="table")
+    push = ss.protocol.DisturbanceStep(at=0.0, by=float(kicked.amount(size)[0]), on="table")
     run = ss.simulate(machine, push, until=400.0, times=[0.0, 400.0])
     names = dict(zip(rest.reduction.names, rest.state[0], strict=True))
     for name in ("motor.x", "table.x"):
@@ -163,17 +163,17 @@ def test_the_verdict_tells_kicks_of_bodies():
 
 def test_the_contact_that_a_kick_lifts_off_is_named():
     """A block on two surfaces that its spring lifts: the lighter pressed one goes first."""
-    away = ss.InclinedSpring(steady_normal_stress=0.2, angle=0.5)
+    away = ss.laws.InclinedSpring(steady_normal_stress=0.2, angle=0.5)
     machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=1.0)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=4.0, damping=1.0)},
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=4.0, damping=1.0)},
         contacts={
-            "base": surface("block", ss.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0)),
-            "rail": ss.Surface(
-                body="block", friction=ss.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0), contact=away
+            "base": surface("block", ss.laws.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0)),
+            "rail": ss.machine.Surface(
+                body="block", friction=ss.laws.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0), contact=away
             ),
         },
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )
     assert ss.steady_state(machine).contacts["rail"].normal_force == pytest.approx(0.2)  # given, whatever the base rubs
     felt = 1 + 0.6 * np.tan(0.5)  # theory 11, typed: m = c = r = 1, k = 4, f and S of both surfaces together

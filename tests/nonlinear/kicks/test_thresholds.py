@@ -14,10 +14,10 @@ from rigs_of_theory import rate_state, rig
 
 def inclined(angle, factor=1.2, law=None, **more):
     """The paper's rig at a multiple of its critical stiffness."""
-    rock = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=law or ss.Slip(),
-                        normal_memory=ss.LinkerDieterich(alpha=0.56))  # fmt: skip
-    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(angle))
-    base = ss.Slider(friction=rock, contact=contact, stiffness=9e9, drive=ss.Steady(1e-6), **more)
+    rock = ss.laws.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=law or ss.laws.Slip(),
+                        normal_memory=ss.laws.LinkerDieterich(alpha=0.56))  # fmt: skip
+    contact = ss.laws.InclinedSpring(preload=5e6, angle=np.radians(angle))
+    base = ss.Slider(friction=rock, contact=contact, stiffness=9e9, drive=ss.machine.SteadyDrive(1e-6), **more)
     return base.with_values({"stiffness": factor * ss.critical_stiffness(base)})
 
 
@@ -97,9 +97,9 @@ def test_motion_on_both_sides(kick, direction, near):
     a_rig = inclined(30)
     found = ss.threshold(a_rig, kick, direction=direction, precision=1e-6)
     pieces = {
-        "velocity": lambda amount: ss.VelocityStep(at=0.0, to=amount),
-        "displacement": lambda amount: ss.DisplacementStep(at=0.0, by=amount),
-        "normal-stress": lambda amount: ss.NormalStressStep(at=0.0, by=amount),
+        "velocity": lambda amount: ss.protocol.VelocityStep(at=0.0, to=amount),
+        "displacement": lambda amount: ss.protocol.DisplacementStep(at=0.0, by=amount),
+        "normal-stress": lambda amount: ss.protocol.NormalStressStep(at=0.0, by=amount),
     }
     for factor, survives in ((1 - near, True), (1 + near, False)):
         amount = found.amount * factor
@@ -124,10 +124,17 @@ def test_impulse_with_mass():
 
 def test_velocity_that_is_solved_for_is_watched_in_lanes_too():
     """LuGre without mass: the velocity is no variable of the state; kicks and events run side by side all the same."""
-    friction = ss.LuGre(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10.0,
+    friction = ss.laws.LuGre(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, bristle_stiffness=1e5,
+        bristle_damping=10.0,
                         viscous=5.0)  # fmt: skip
-    a_rig = ss.Slider(friction=friction, contact=ss.Constant(preload=1e6), stiffness=1e12, drive=ss.Steady(3e-3))
-    found = ss.simulate_many(a_rig, {"stiffness": [1e12, 2e12]}, ss.DisplacementStep(at=0.0, by=1e-7), until=0.1,
+    a_rig = ss.Slider(
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=1e6),
+        stiffness=1e12,
+        drive=ss.machine.SteadyDrive(3e-3),
+    )
+    found = ss.simulate_many(a_rig, {"stiffness": [1e12, 2e12]}, ss.protocol.DisplacementStep(at=0.0, by=1e-7),
+        until=0.1,
                              events=True)  # fmt: skip
     assert list(found.status) == ["done", "done"]
     assert ss.threshold(a_rig, "displacement").size == np.inf
@@ -170,13 +177,13 @@ def test_close_to_a_subcritical_edge_the_unstable_cycle_is_the_limit(above):
 def test_margin_to_an_expected_step():
     a_rig = inclined(30)
     limit = ss.threshold(a_rig).amount
-    good = ss.margin_to_kick(a_rig, ss.VelocityStep(at=5.0, to=1e-6 * (limit / 1e-6) ** 0.5))
+    good = ss.margin_to_kick(a_rig, ss.protocol.VelocityStep(at=5.0, to=1e-6 * (limit / 1e-6) ** 0.5))
     assert (good.survives, good.ratio) == (True, pytest.approx(2, rel=1e-6))
-    bad = ss.margin_to_kick(a_rig, ss.DisplacementStep(at=0.0, by=2e-5))
+    bad = ss.margin_to_kick(a_rig, ss.protocol.DisplacementStep(at=0.0, by=2e-5))
     assert not bad.survives
     assert "does not survive" in str(bad)
     with pytest.raises(ss.NotAvailable, match="simulate"):
-        ss.margin_to_kick(a_rig, ss.Hold(at=0.0, duration=1.0))
+        ss.margin_to_kick(a_rig, ss.protocol.Hold(at=0.0, duration=1.0))
 
 
 def test_map_equals_single_thresholds():
@@ -248,7 +255,7 @@ def test_bad_arguments_are_named(options, message):
 
 def test_lock_up_is_said():
     with pytest.raises(ss.NoSteadySliding):
-        ss.threshold(rig(friction=rate_state(mu_ref=0.7), contact=ss.InclinedSpring(preload=5e6, angle=-1.4)))
+        ss.threshold(rig(friction=rate_state(mu_ref=0.7), contact=ss.laws.InclinedSpring(preload=5e6, angle=-1.4)))
 
 
 def test_verdict_with_kicks():
@@ -274,7 +281,14 @@ def test_map_is_drawn_with_units():
 
 def test_a_block_whose_velocity_is_a_formula_has_a_threshold():
     """Regularised PRZ without mass: nothing is left to solve for, so that motion goes on without a guess."""
-    friction = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.PRZ(), regularised=True)
-    rig = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=9e9, drive=ss.Steady(1e-6))
+    friction = ss.laws.RateState(
+        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.laws.PRZ(), regularised=True
+    )
+    rig = ss.Slider(
+        friction=friction,
+        contact=ss.laws.ConstantNormalStress(preload=5e6),
+        stiffness=9e9,
+        drive=ss.machine.SteadyDrive(1e-6),
+    )
     found = ss.threshold(rig, precision=0.01)
     assert found.bracket[0] > 0

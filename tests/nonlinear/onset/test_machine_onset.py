@@ -33,7 +33,7 @@ def test_a_machine_of_one_body_has_the_onset_of_its_slider(seed):
 @pytest.mark.parametrize("measured", ["motor", "table"])
 def test_the_coefficient_is_that_of_equations_typed_by_hand(measured):
     """Kuznetsov's formula, eq. 5.34, on an ordinary differential equation that nothing of the package has seen."""
-    machine = two_mass(measured=measured, friction=rate_state(0.5, -0.3, 1.0, evolution=ss.Aging()))
+    machine = two_mass(measured=measured, friction=rate_state(0.5, -0.3, 1.0, evolution=ss.laws.Aging()))
     found = ss.hopf(machine, KP)
     x1, v1, x2, v2, theta = y = sp.symbols("x1 v1 x2 v2 theta")
     f, slope, r, mu, kp = 0.5, -0.3, 1.0, 0.6, sp.Float(found.value)
@@ -85,33 +85,33 @@ def test_names_and_order_change_nothing():
 def test_an_idle_body_changes_nothing():
     machine = two_mass()
     idle = replace(
-        machine, bodies={**machine.bodies, "idle": ss.SlidingBody(mass=0.3)},
-        links={**machine.links, "held": ss.Spring(between=("drive", "idle"), stiffness=5.0, damping=0.4)},
+        machine, bodies={**machine.bodies, "idle": ss.machine.SlidingBody(mass=0.3)},
+        links={**machine.links, "held": ss.machine.Spring(between=("drive", "idle"), stiffness=5.0, damping=0.4)},
     )  # fmt: skip
     np.testing.assert_allclose(numbers(ss.hopf(idle, KP)), numbers(ss.hopf(machine, KP)), rtol=1e-9)
 
 
 def test_two_springs_in_a_row_are_one_whatever_massless_body_is_between():
     machine = two_mass()
-    plain = replace(machine, links={"screw": ss.Spring(between=("motor", "table"), stiffness=100.0)})
-    halves = {"one": ss.Spring(between=("motor", "nut"), stiffness=150.0),
-              "two": ss.Spring(between=("nut", "table"), stiffness=300.0)}  # fmt: skip
-    between = replace(machine, bodies={**machine.bodies, "nut": ss.SlidingBody(mass=0.0)}, links=halves)
+    plain = replace(machine, links={"screw": ss.machine.Spring(between=("motor", "table"), stiffness=100.0)})
+    halves = {"one": ss.machine.Spring(between=("motor", "nut"), stiffness=150.0),
+              "two": ss.machine.Spring(between=("nut", "table"), stiffness=300.0)}  # fmt: skip
+    between = replace(machine, bodies={**machine.bodies, "nut": ss.machine.SlidingBody(mass=0.0)}, links=halves)
     np.testing.assert_allclose(numbers(ss.hopf(between, KP)), numbers(ss.hopf(plain, KP)), rtol=1e-8)
 
 
 def test_the_onset_without_mass_is_the_limit_of_small_masses():
     machine = ss.Machine(
-        bodies={"left": ss.SlidingBody(mass=0.0), "right": ss.SlidingBody(mass=0.0)},
+        bodies={"left": ss.machine.SlidingBody(mass=0.0), "right": ss.machine.SlidingBody(mass=0.0)},
         links={
-            "one": ss.Spring(between=("drive", "left"), stiffness=1.0, damping=0.2),
-            "two": ss.Spring(between=("left", "right"), stiffness=2.0),
-            "rail": ss.Spring(between=("ground", "right"), damping=0.1),
+            "one": ss.machine.Spring(between=("drive", "left"), stiffness=1.0, damping=0.2),
+            "two": ss.machine.Spring(between=("left", "right"), stiffness=2.0),
+            "rail": ss.machine.Spring(between=("ground", "right"), damping=0.1),
         },
         contacts={
             "one": surface("left", rate_state(0.5, -0.4, 1.0)), "two": surface("right", rate_state(0.4, -0.1, 2.0)),
         },
-        drive=ss.Pull(velocity=1.0),
+        drive=ss.machine.Pull(velocity=1.0),
     )  # fmt: skip
     along = "links.one.stiffness"
     limit = numbers(ss.hopf(machine, along))
@@ -127,7 +127,7 @@ def test_a_contact_with_an_area_is_that_of_its_forces():
     machine = two_mass()
     area, guide = 0.02, machine.contacts["guide"]
     wide = replace(machine, contacts={
-        "guide": replace(guide, area=area, contact=ss.Constant(preload=1.0 / area)),
+        "guide": replace(guide, area=area, contact=ss.laws.ConstantNormalStress(preload=1.0 / area)),
     })  # fmt: skip
     found, own = ss.hopf(wide, KP), ss.hopf(machine, KP)
     np.testing.assert_allclose(numbers(found), numbers(own), rtol=1e-9)
@@ -153,7 +153,7 @@ def test_amplitudes_fall_at_the_edge_as_the_coefficient_says():
 def test_an_onset_on_arrays_is_that_of_each(tmp_path):
     machine = two_mass()
     screws = np.array([20.0, 100.0, 1000.0])
-    plan = ss.Map(machine, {"links.screw.stiffness": screws}, ss.OnsetKind(along=KP))
+    plan = ss.Map(machine, {"links.screw.stiffness": screws}, ss.maps.OnsetKind(along=KP))
     found = ss.run_map(plan, tmp_path / "onset.zarr", progress=False)
     for i, stiffness in enumerate(screws):
         one = ss.hopf(machine.with_values({"links.screw.stiffness": stiffness}), KP)

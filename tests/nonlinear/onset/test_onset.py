@@ -50,10 +50,12 @@ def test_mass(lam, m):
 
 
 def inclined(angle, law=None, a=0.0145, b=0.016, alpha=0.56, **more):
-    memory = ss.LinkerDieterich(alpha=alpha)
-    rock = ss.RateState(a=a, b=b, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=law or ss.Slip(), normal_memory=memory)
-    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(angle))
-    numbers = {"stiffness": 9e9, "drive": ss.Steady(1e-6)} | more
+    memory = ss.laws.LinkerDieterich(alpha=alpha)
+    rock = ss.laws.RateState(
+        a=a, b=b, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=law or ss.laws.Slip(), normal_memory=memory
+    )
+    contact = ss.laws.InclinedSpring(preload=5e6, angle=np.radians(angle))
+    numbers = {"stiffness": 9e9, "drive": ss.machine.SteadyDrive(1e-6)} | more
     return ss.Slider(friction=rock, contact=contact, **numbers)
 
 
@@ -65,7 +67,7 @@ def test_inclined_spring(angle, alpha, excess):
     c, g, lam = alpha * t / (1 + 0.7 * t), a * t / (1 + 0.7 * t), excess
     slip = g * lam**2 * (c**2 - 3 * c + 2 - 2 * g) / (16 * (1 - c) ** 2)
     aging = g * lam**2 * (c**2 - 2 * c - 2 * g * (1 + lam)) / (16 * (1 - c) ** 2 * (1 + lam))
-    for law, expected in ((ss.Slip(), slip), (ss.Aging(), aging)):
+    for law, expected in ((ss.laws.Slip(), slip), (ss.laws.Aging(), aging)):
         found = ss.hopf(inclined(angle, law, b=a * (1 + lam), alpha=alpha))
         assert found.coefficient == pytest.approx(expected, rel=1e-7, abs=1e-14)
 
@@ -135,7 +137,7 @@ def test_first_derivatives_are_those_of_the_linearisation(law, mass):
 
 
 def test_units_do_not_matter():
-    base = inclined(30, ss.Aging())
+    base = inclined(30, ss.laws.Aging())
     other = base.with_values(
         {"friction.d_c": 1e-2, "friction.v_ref": 1.0, "drive.velocity": 1.0, "contact.preload": 7.0}
     )
@@ -202,9 +204,11 @@ def test_verdict_tells_the_kind_of_onset():
 
 def test_a_gain_stands_in_for_the_stiffness():
     """A drive under position control has kp where others have a spring."""
-    friction = ss.RateState(a=0.01, b=0.016, d_c=4e-6, mu_ref=0.15, v_ref=1e-5, evolution=ss.Aging())
-    contact = ss.Constant(preload=150e3)
-    a_rig = ss.Slider(friction=friction, contact=contact, mass=2000.0, drive=ss.PD(velocity=2e-5, kp=1.5e8, kd=5e5))
+    friction = ss.laws.RateState(a=0.01, b=0.016, d_c=4e-6, mu_ref=0.15, v_ref=1e-5, evolution=ss.laws.Aging())
+    contact = ss.laws.ConstantNormalStress(preload=150e3)
+    a_rig = ss.Slider(
+        friction=friction, contact=contact, mass=2000.0, drive=ss.machine.PD(velocity=2e-5, kp=1.5e8, kd=5e5)
+    )
     onset = ss.hopf(a_rig)
     assert onset.along == "drive.kp"
     assert ss.analyze(a_rig).onset == onset

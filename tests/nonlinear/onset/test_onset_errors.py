@@ -16,7 +16,7 @@ from steadyslip.nonlinear.onset.coefficient import even_scales
 
 LAMBDA = 0.5
 TURNS = (np.sqrt(16 + 4 * LAMBDA) - 3) / (4 * LAMBDA + 7)  # theory 6: aging with this mass changes kind
-CHAIN = {"masses": (0.2, 0.3), "damping": 0.05, "stiffness": 2.0, "a": 0.1, "falls": 0.5, "evolution": ss.Aging()}
+CHAIN = {"masses": (0.2, 0.3), "damping": 0.05, "stiffness": 2.0, "a": 0.1, "falls": 0.5, "evolution": ss.laws.Aging()}
 
 
 def heavy(share):

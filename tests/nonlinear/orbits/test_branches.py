@@ -128,10 +128,10 @@ def test_smallest_masses_lead_to_the_stable_cycles(mass):
 
 def test_cycles_on_sheets_of_their_own_are_found_where_they_are_asked_for():
     """Two states, among irregular motion: one large slip event and two small ones, on no sheet from the edge."""
-    states = (ss.State(b=0.0185158760, d_c=8.909265618e-6), ss.State(b=0.0160886248, d_c=3.90524125e-5))
-    friction = ss.RateState(a=0.0151007230, mu_ref=0.6, v_ref=9.268313582e-7, states=states)
-    a_rig = ss.Slider(friction=friction, contact=ss.Constant(preload=1.38968961e7), stiffness=2e10,
-                      radiation_damping=5.337161414e8, drive=ss.Steady(9.268313582e-7))  # fmt: skip
+    states = (ss.laws.State(b=0.0185158760, d_c=8.909265618e-6), ss.laws.State(b=0.0160886248, d_c=3.90524125e-5))
+    friction = ss.laws.RateState(a=0.0151007230, mu_ref=0.6, v_ref=9.268313582e-7, states=states)
+    a_rig = ss.Slider(friction=friction, contact=ss.laws.ConstantNormalStress(preload=1.38968961e7), stiffness=2e10,
+                      radiation_damping=5.337161414e8, drive=ss.machine.SteadyDrive(9.268313582e-7))  # fmt: skip
     edge = ss.hopf(a_rig).value
     branch = ss.cycles(a_rig, between=(0.79 * edge, 1.01 * edge), doublings=0)
     *unstable, cycle = branch.at(0.8 * edge)
@@ -179,10 +179,12 @@ def test_degenerate_edge_carries_the_closed_orbits_of_the_reference():
 
 
 def paper(angle, **more):
-    memory = ss.LinkerDieterich(alpha=0.56)
-    rock = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=memory, evolution=ss.Slip())
-    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(angle))
-    return ss.Slider(friction=rock, contact=contact, stiffness=9e9, drive=ss.Steady(1e-6), **more)
+    memory = ss.laws.LinkerDieterich(alpha=0.56)
+    rock = ss.laws.RateState(
+        a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=memory, evolution=ss.laws.Slip()
+    )
+    contact = ss.laws.InclinedSpring(preload=5e6, angle=np.radians(angle))
+    return ss.Slider(friction=rock, contact=contact, stiffness=9e9, drive=ss.machine.SteadyDrive(1e-6), **more)
 
 
 @pytest.mark.parametrize(

@@ -98,8 +98,8 @@ def test_long_motions_come_to_the_stable_cycle():
 def test_names_and_an_idle_body_change_nothing():
     machine = two_mass()
     idle = replace(
-        machine, bodies={**machine.bodies, "idle": ss.SlidingBody(mass=0.3)},
-        links={**machine.links, "held": ss.Spring(between=("drive", "idle"), stiffness=5.0, damping=0.4)},
+        machine, bodies={**machine.bodies, "idle": ss.machine.SlidingBody(mass=0.3)},
+        links={**machine.links, "held": ss.machine.Spring(between=("drive", "idle"), stiffness=5.0, damping=0.4)},
     )  # fmt: skip
     (found,) = ss.cycles(renamed(idle), KP, between=(LOW, 10.0)).at(cycle().value)
     apart = np.abs(looks(found) / looks(cycle()) - 1)
@@ -131,25 +131,26 @@ def test_tables_and_words_are_in_forces(tmp_path):
 def carriages(left, velocity):
     """Two carriages on a plate that the drive moves; springs hold the left one to the ground."""
     return ss.Machine(
-        bodies={"left": ss.SlidingBody(mass=1.0), "right": ss.SlidingBody(mass=2.0)},
+        bodies={"left": ss.machine.SlidingBody(mass=1.0), "right": ss.machine.SlidingBody(mass=2.0)},
         links={
-            "ground": ss.Spring(between=("ground", "left"), stiffness=3e3, damping=1.0),
-            "bar": ss.Spring(between=("left", "right"), stiffness=2e3),
+            "ground": ss.machine.Spring(between=("ground", "left"), stiffness=3e3, damping=1.0),
+            "bar": ss.machine.Spring(between=("left", "right"), stiffness=2e3),
         },
         contacts={
-            "one": ss.Surface(body="drive", against="left", friction=left, contact=ss.Constant(preload=10.0)),
-            "two": ss.Surface(
-                body="drive", against="right", contact=ss.Constant(preload=20.0),
-                friction=ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=5e-3),
+            "one": ss.machine.Surface(body="drive", against="left", friction=left,
+            contact=ss.laws.ConstantNormalStress(preload=10.0)),
+            "two": ss.machine.Surface(
+                body="drive", against="right", contact=ss.laws.ConstantNormalStress(preload=20.0),
+                friction=ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=5e-3),
             ),
         },
-        drive=ss.Pull(velocity=velocity),
+        drive=ss.machine.Pull(velocity=velocity),
     )  # fmt: skip
 
 
 def test_small_cycles_are_found_beside_forces_that_are_far_larger_than_theirs():
     """Friction of 15 N, of which a cycle changes some micronewtons: rounding of the sum is much of that."""
-    bristles = ss.LuGre(
+    bristles = ss.laws.LuGre(
         mu_coulomb=0.3, mu_static=0.5, v_stribeck=5e-3, bristle_stiffness=1e4, bristle_damping=20, stribeck_exponent=1
     )
     machine = carriages(bristles, 4e-3)

@@ -153,9 +153,9 @@ def test_bad_arguments_are_named(damped, options, message):
 
 
 def test_prescribed_normal_stress_has_no_cycles_of_its_own():
-    contact = ss.Prescribed(preload=5e6, amplitude=1e5, period=3.0)
+    contact = ss.laws.Prescribed(preload=5e6, amplitude=1e5, period=3.0)
     with pytest.raises(ss.NotAvailable, match="prescribed"):
-        ss.cycles(ss.Slider(friction=rate_state(), contact=contact, stiffness=1e9, drive=ss.Steady(1e-6)))
+        ss.cycles(ss.Slider(friction=rate_state(), contact=contact, stiffness=1e9, drive=ss.machine.SteadyDrive(1e-6)))
 
 
 def test_command_line_writes_branch_and_thresholds(tmp_path):

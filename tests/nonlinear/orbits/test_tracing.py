@@ -155,10 +155,10 @@ def test_cycles_end_where_no_velocity_balances_the_forces(monkeypatch):
     The cycle comes as close to the fold as steps allow, which takes ever more of them, but not minutes.
     """
     monkeypatch.setattr("steadyslip.nonlinear.orbits.flow.MOST_STEPS", 8_000)
-    friction = rate_state(evolution=ss.PRZ(), regularised=True)
+    friction = rate_state(evolution=ss.laws.PRZ(), regularised=True)
     lift = next(contact for contact in CONTACTS if contact.name == "lift")
     branch = ss.cycles(
-        rig(friction=friction, contact=lift, stiffness=9e9, drive=ss.PD(1e-6, kp=2e10, kd=1e9)), doublings=0
+        rig(friction=friction, contact=lift, stiffness=9e9, drive=ss.machine.PD(1e-6, kp=2e10, kd=1e9)), doublings=0
     )
     assert branch.end == tracer_module.ENDS["too many steps"]
     assert len(branch) > 5
@@ -201,11 +201,11 @@ def test_what_lies_between_distant_neighbours_is_found_on_the_parabola_through_t
 
 def test_a_branch_begins_at_larger_cycles_where_small_ones_drown_in_rounding():
     """An onset so nearly degenerate that the edge moves by a millionth while cycles grow a thousandfold."""
-    friction = ss.LuGre(mu_coulomb=0.1189310343, mu_static=0.1882742085, v_stribeck=1.6888334216e-3,
+    friction = ss.laws.LuGre(mu_coulomb=0.1189310343, mu_static=0.1882742085, v_stribeck=1.6888334216e-3,
                         viscous=2.3663122754, bristle_stiffness=255249.776917, bristle_damping=7.12855521)  # fmt: skip
-    contact = ss.InclinedSpring(preload=1292214.83, angle=-0.05289007)
+    contact = ss.laws.InclinedSpring(preload=1292214.83, angle=-0.05289007)
     heavy = ss.Slider(friction=friction, contact=contact, stiffness=1e10, mass=962.847238,
-                      drive=ss.Steady(1.5017969314e-3))  # fmt: skip
+                      drive=ss.machine.SteadyDrive(1.5017969314e-3))  # fmt: skip
     edge = ss.hopf(heavy).value
     branch = ss.cycles(heavy, between=(0.5 * edge, 1.2 * edge))
     assert branch.end.startswith("end of the range")

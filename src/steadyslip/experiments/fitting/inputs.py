@@ -16,8 +16,9 @@ from steadyslip.experiments.fitting.commanded import STRAIGHT
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
 from steadyslip.experiments.measured.record import Record
-from steadyslip.protocol import Protocol, Segments, pack
+from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import inputs_at
+from steadyslip.protocol.segments import Segments, pack
 
 LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
 PER_PERIOD = 300  # rows per period of a sine wave, on which it becomes straight: 6e-5 of its amplitude

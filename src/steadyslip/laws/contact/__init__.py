@@ -1,9 +1,9 @@
 """Contact laws: normal stress as a function of displacement, velocity, acceleration and forces."""
 
-from steadyslip.laws.contact.basic import Constant, Linear, Prescribed, pressed_at
+from steadyslip.laws.contact.basic import ConstantNormalStress, LinearNormalStress, Prescribed, pressed_at
 from steadyslip.laws.contact.compliant import Compliant
 from steadyslip.laws.contact.fluid import PoreFluid, porous
-from steadyslip.laws.contact.law import ContactLaw, Motion, PreloadedContact
+from steadyslip.laws.contact.law import ContactInputs, ContactLaw, PreloadedContact
 from steadyslip.laws.contact.mechanisms import (
     DilatingLayer,
     InclinedSpring,
@@ -15,11 +15,27 @@ from steadyslip.laws.contact.mechanisms import (
     Triaxial,
 )
 
-USUAL = Constant.name
+USUAL = ConstantNormalStress.name
 """Default contact law of rig files."""
 
 __all__ = [
-    "USUAL", "Compliant", "Constant", "ContactLaw", "DilatingLayer", "InclinedSpring", "LeadScrew", "Lift", "Linear",
-    "Motion", "PoreFluid", "PreloadedContact", "Prescribed", "SelfEnergising", "SliderCrank", "SlopedGuide",
-    "Triaxial", "porous", "pressed_at",
+    "USUAL",
+    "Compliant",
+    "ConstantNormalStress",
+    "ContactInputs",
+    "ContactLaw",
+    "DilatingLayer",
+    "InclinedSpring",
+    "LeadScrew",
+    "Lift",
+    "LinearNormalStress",
+    "PoreFluid",
+    "PreloadedContact",
+    "Prescribed",
+    "SelfEnergising",
+    "SliderCrank",
+    "SlopedGuide",
+    "Triaxial",
+    "porous",
+    "pressed_at",
 ]  # fmt: skip

@@ -10,10 +10,10 @@ import sympy as sp
 from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.core.records import parameter
-from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact
+from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, PreloadedContact
 
 
-class Constant(PreloadedContact, name="constant"):
+class ConstantNormalStress(PreloadedContact, name="constant"):
     """A normal stress that never changes (dead weight, servo-controlled press): B0 = ... = B3 = 0."""
 
 
@@ -21,7 +21,7 @@ def pressed_at(stress: float, like: ContactLaw | None = None) -> ContactLaw:
     """Contact with a constant normal stress (Pa), effective where `like` has pores, which are kept."""
     if isinstance(like, PreloadedContact) and like.has_pores():
         return replace(like, preload=None, steady_normal_stress=stress)
-    return Constant(steady_normal_stress=stress)
+    return ConstantNormalStress(steady_normal_stress=stress)
 
 
 class Prescribed(PreloadedContact, name="prescribed"):
@@ -49,7 +49,7 @@ class Prescribed(PreloadedContact, name="prescribed"):
         return self.amplitude * sp.cos(2 * sp.pi * time / self.period)
 
 
-class Linear(PreloadedContact, name="linear"):
+class LinearNormalStress(PreloadedContact, name="linear"):
     """The general linear law, eq. 12 of Dupont & Bapna: σ̂ = (B0 s² + B1 s + k B2 + B3) x̂.
 
     σ = σss + B0 v̇ + B1 (v − v0) + (k B2 + B3) x; x is the slip ahead of steady sliding and k the total
@@ -61,9 +61,9 @@ class Linear(PreloadedContact, name="linear"):
     b2: float = parameter("1", real, "B2, with displacement through the stiffness", default=0.0, structural=True)
     b3: float = parameter("Pa/m", real, "B3, with displacement directly", default=0.0, structural=True)
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return (
             self.b0 * motion.acceleration
             + self.b1 * (motion.velocity - motion.steady_velocity)
-            + (motion.stiffness * self.b2 + self.b3) * motion.slip
+            + (motion.stiffness * self.b2 + self.b3) * motion.lead
         )

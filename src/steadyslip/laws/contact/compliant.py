@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.records import parameter
-from steadyslip.laws.contact.law import ContactLaw, Expression, Motion
+from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression
 
 
 class Compliant(ContactLaw, name="compliant"):
@@ -22,7 +22,7 @@ class Compliant(ContactLaw, name="compliant"):
     def load(self) -> Expression | None:
         return 0
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return -self.normal_stiffness * motion.separation - self.normal_damping * motion.separation_rate
 
     def is_compliant(self) -> bool:

@@ -6,7 +6,7 @@ import sympy as sp
 
 from steadyslip.core.domains import positive, real
 from steadyslip.core.records import parameter
-from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
+from steadyslip.laws.contact.law import ContactInputs, Expression, PreloadedContact
 
 
 class PoreFluid(PreloadedContact, name="pore-fluid"):
@@ -29,7 +29,7 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
     def memory(self) -> tuple[str, ...]:
         return ("dilation", "pore_pressure")
 
-    def rates(self, motion: Motion) -> tuple[Expression, ...]:
+    def rates(self, motion: ContactInputs) -> tuple[Expression, ...]:
         dilation, pressure = motion.memory
         v = motion.velocity
         opening = -v / self.slip_distance * (dilation - self.suction * sp.log(v / self.v_ref))
@@ -41,7 +41,7 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
     def steady_memory(self, velocity: Expression) -> tuple[Expression, ...]:
         return self.suction * sp.log(velocity / self.v_ref), sp.Integer(0)
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return -motion.memory[1]
 
 

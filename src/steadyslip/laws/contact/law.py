@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,13 +15,13 @@ Expression = Any  # SymPy expression, or a plain number when a law is evaluated 
 
 
 @dataclass(frozen=True)
-class Motion:
+class ContactInputs:
     """Variables that a normal stress may depend on; passed to the methods of a contact law.
 
     Attributes
     ----------
-    slip
-        x (m): slip of the block ahead of the load point, relative to steady sliding.
+    lead
+        x (m): lead of the block over the load point, relative to steady sliding.
     velocity, acceleration
         v (m/s) and v̇ (m/s²) of the block.
     spring, steady_spring
@@ -40,7 +41,7 @@ class Motion:
         Change (Pa) of the pressure around the contact, for laws with pores.
     """
 
-    slip: Expression
+    lead: Expression
     velocity: Expression
     acceleration: Expression
     spring: Expression
@@ -57,11 +58,17 @@ class Motion:
     outside: Expression = 0
 
     @property
-    def steady(self) -> Motion:
+    def slip(self) -> Expression:
+        """Former name of `lead`."""
+        warnings.warn("ContactInputs.slip is ContactInputs.lead now", DeprecationWarning, stacklevel=2)
+        return self.lead
+
+    @property
+    def steady(self) -> ContactInputs:
         """Values of all variables in steady sliding."""
         return replace(
             self,
-            slip=0,
+            lead=0,
             velocity=self.steady_velocity,
             acceleration=0,
             separation=self.steady_separation,
@@ -114,7 +121,7 @@ class ContactLaw(FrozenRecord, family="contact law"):
         """Normal stress in steady sliding, σss (Pa), if given instead of the load; else None."""
         return None
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         """Normal stress due to the motion (Pa)."""
         return 0
 
@@ -126,7 +133,7 @@ class ContactLaw(FrozenRecord, family="contact law"):
         """SI units of the states; Pa unless overridden."""
         return tuple("Pa" for _ in self.memory())
 
-    def rates(self, motion: Motion) -> tuple[Expression, ...]:
+    def rates(self, motion: ContactInputs) -> tuple[Expression, ...]:
         """Time derivatives of the states (their unit per s)."""
         return ()
 
@@ -139,7 +146,7 @@ class ContactLaw(FrozenRecord, family="contact law"):
         return type(self).coupling is ContactLaw.coupling
 
     def has_pores(self) -> bool:
-        """True if the law depends on the surrounding pore pressure, `Motion.outside`."""
+        """True if the law depends on the surrounding pore pressure, `ContactInputs.outside`."""
         return False
 
     def is_compliant(self) -> bool:
@@ -150,7 +157,7 @@ class ContactLaw(FrozenRecord, family="contact law"):
         """Prescribed change of normal stress (Pa) as a function of `time` (s), zero on average."""
         return 0
 
-    def normal_stress(self, motion: Motion) -> Expression:
+    def normal_stress(self, motion: ContactInputs) -> Expression:
         """Normal stress σ (Pa) without the `imposed` part."""
         load = self.load()
         if load is not None:

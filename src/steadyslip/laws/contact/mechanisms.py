@@ -15,7 +15,7 @@ from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import acute, angle, nonnegative, positive, real, turn
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import option, parameter
-from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact, Shape
+from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, PreloadedContact, Shape
 from steadyslip.units import deg
 
 
@@ -29,7 +29,7 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
 
     angle: float = parameter("rad", angle, "spring angle ψ, positive when it pulls out of the surface", letter="psi")
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return -motion.spring * sp.tan(self.angle)
 
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
@@ -68,7 +68,7 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
         tangent = sine / sp.sqrt(1 - sine**2)
         return tangent if self.stroke == "pull" else -tangent
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return -motion.spring * self._tangent()
 
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
@@ -105,7 +105,7 @@ class Triaxial(ContactLaw, name="triaxial"):
     def steady_stress(self) -> Expression | None:
         return self.steady_normal_stress
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return motion.spring * sp.tan(self.angle)
 
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
@@ -142,7 +142,7 @@ class SelfEnergising(PreloadedContact, name="self-energising"):
             return self.gain
         return 1 / sp.tan(self.wedge_angle) if self.wedge_angle is not None else sp.tan(self.lead_angle)
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return self._gain() * motion.friction
 
     def lock_up(self, friction_coefficient: float) -> str:
@@ -166,7 +166,7 @@ class LeadScrew(ContactLaw, name="lead-screw"):
     def load(self) -> Expression | None:
         return self.axial_load / sp.cos(self.lead_angle)
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         gain = sp.tan(self.lead_angle) * (1 if self.direction == "raising" else -1)
         return gain * motion.friction
 
@@ -190,7 +190,7 @@ class DilatingLayer(PreloadedContact, name="dilating-layer"):
     dilatancy: float = parameter("m", real, "thickening e of the layer per e-fold of velocity")
     v_ref: float = parameter("m/s", positive, "velocity at which the normal stress is the preload")
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return self.ram_stiffness * self.dilatancy * sp.log(motion.velocity / self.v_ref)
 
     def shape(self) -> Shape:
@@ -206,7 +206,7 @@ class Lift(PreloadedContact, name="lift"):
     lift: float = parameter("Pa s/m", nonnegative, "loss of normal stress per unit velocity, l")
     v_ref: float = parameter("m/s", positive, "velocity at which the normal stress is the preload")
 
-    def coupling(self, motion: Motion) -> Expression:
+    def coupling(self, motion: ContactInputs) -> Expression:
         return -self.lift * (motion.velocity - self.v_ref)
 
     def shape(self) -> Shape:
@@ -222,8 +222,8 @@ class SlopedGuide(PreloadedContact, name="sloped-guide"):
     guide_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the guide")
     slope: float = parameter("rad", angle, "slope β of the surface along the slide")
 
-    def coupling(self, motion: Motion) -> Expression:
-        return self.guide_stiffness * motion.slip * sp.tan(self.slope)
+    def coupling(self, motion: ContactInputs) -> Expression:
+        return self.guide_stiffness * motion.lead * sp.tan(self.slope)
 
     def shape(self) -> Shape:
         return Shape(tilt=self.slope)

@@ -7,7 +7,7 @@ import sympy as sp
 
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
-from steadyslip.model import OperatingPoint
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.single import areas as areas_of

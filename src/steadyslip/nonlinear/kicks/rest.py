@@ -10,7 +10,7 @@ import sympy as sp
 
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
-from steadyslip.model import OperatingPoint
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales
 

@@ -16,7 +16,7 @@ import sympy as sp
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
-from steadyslip.model import OperatingPoint
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import SPEED, V_LP, P, Reduction, W
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.jobs import Jobs

@@ -16,7 +16,7 @@ from steadyslip.motion.engine import LANES, run_chunk, run_many
 from steadyslip.motion.jobs import Jobs, Options
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.rest import Rest, picked
-from steadyslip.protocol import Segments
+from steadyslip.protocol.segments import Segments
 
 Array = np.ndarray
 DOUBTS = (

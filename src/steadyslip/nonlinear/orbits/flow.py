@@ -32,7 +32,7 @@ from steadyslip.motion.observe import observe
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact, remedy
 from steadyslip.nonlinear.continuation import Failure
-from steadyslip.protocol import Segments
+from steadyslip.protocol.segments import Segments
 
 Array = np.ndarray
 DONE = WORDS.index("done")

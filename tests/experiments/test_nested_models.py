@@ -13,7 +13,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting import search
 from steadyslip.experiments.fitting.nested import simpler
 from steadyslip.experiments.fitting.planning import make_plan
-from steadyslip.experiments.fitting.search import in_order, ordered, standing
+from steadyslip.experiments.fitting.search import first_computable, sort_states, with_states_sorted
 from steadyslip.experiments.fitting.starts import features_of, starting_points
 from steadyslip.experiments.numerics.least_squares import Minima
 
@@ -143,7 +143,7 @@ def test_states_are_put_in_order_only_where_that_changes_nothing():
     long, short = (names.index(f"friction.states.{k}.d_c") for k in (1, 2))
     z[0, long], z[0, short] = -9.0, -12.0
     found = replace(Minima.at(z), ssq=np.array([2.0]))
-    rising = ordered(z, space)[0]
+    rising = sort_states(z, space)[0]
     assert rising[long] < rising[short]
 
     def compared(slope):
@@ -152,8 +152,8 @@ def test_states_are_put_in_order_only_where_that_changes_nothing():
 
         return SimpleNamespace(space=space, residuals=residuals)
 
-    np.testing.assert_array_equal(in_order(compared(np.nan), found)[0], z[0])
-    best, ssq = in_order(compared(0.5), found)
+    np.testing.assert_array_equal(with_states_sorted(compared(np.nan), found)[0], z[0])
+    best, ssq = with_states_sorted(compared(0.5), found)
     np.testing.assert_array_equal(best, rising)
     assert ssq == 2.0
 
@@ -169,8 +169,8 @@ class Fragile:
 def test_a_minimum_stands_only_if_its_motion_comes_through_alone():
     """With its derivatives; the best that does is the first, and without any there is none."""
     found = replace(Minima.at(np.arange(4.0)[:, None]), ssq=np.array([0.1, 0.2, 0.3, 0.4]))
-    kept = standing(Fragile(), found)
+    kept = first_computable(Fragile(), found)
     assert kept.coordinates[0, 0] == 2.0
     assert kept.ssq.tolist() == [0.3, 0.4, np.inf, np.inf]
     none = replace(Minima.at(np.zeros((2, 1))), ssq=np.array([0.1, 0.2]))
-    assert np.all(np.isinf(standing(Fragile(), none).ssq))
+    assert np.all(np.isinf(first_computable(Fragile(), none).ssq))

@@ -12,7 +12,7 @@ from scipy.stats import binom
 import lab_records as lab
 import steadyslip as ss
 from command import run
-from steadyslip.experiments.numerics.pooling import Told, log_evidence, pooled
+from steadyslip.experiments.numerics.pooling import ExperimentEstimate, log_evidence, pooled
 
 MEAN, SPREAD = np.array([-4.5, 1.2]), np.array([0.12, 0.05])
 
@@ -26,7 +26,7 @@ def experiments(seed, count, errors=(0.03, 0.04), slope=None):
         own = MEAN + (0.0 if slope is None else slope * x[1]) + SPREAD * rng.standard_normal(2)
         deviation = np.array(errors) * 10 ** rng.uniform(-0.3, 0.3, 2)
         covariance = np.outer(deviation, deviation) * np.array([[1.0, 0.8], [0.8, 1.0]])
-        told.append(Told(np.arange(2), rng.multivariate_normal(own, covariance), covariance, x))
+        told.append(ExperimentEstimate(np.arange(2), rng.multivariate_normal(own, covariance), covariance, x))
         truth.append(own)
     return told, np.array(truth)
 
@@ -107,12 +107,14 @@ def test_intervals_contain_the_truth_as_often_as_they_say(count):
 def test_experiments_that_say_little_are_drawn_to_the_others():
     """Partial pooling lies between none and complete, and leaves smaller errors than none."""
     told, truth = experiments(11, 8, errors=(0.05, 0.05))
-    vague = Told(np.arange(2), truth[0] + 0.6, 0.5**2 * np.eye(2), np.array([1.0]))
+    vague = ExperimentEstimate(np.arange(2), truth[0] + 0.6, 0.5**2 * np.eye(2), np.array([1.0]))
     found = pooled([*told, vague], 2, np.ones(2), 1000, 0)
     own = found.members[:, -1]
     assert np.all(np.std(own, axis=0) < 0.3)
     assert np.all(np.mean(own, axis=0) < truth[0] + 0.35)
-    unseen = Told(np.array([1]), truth[:1, 1], np.array([[1e-4]]), np.array([1.0]))  # says nothing of the first
+    unseen = ExperimentEstimate(
+        np.array([1]), truth[:1, 1], np.array([[1e-4]]), np.array([1.0])
+    )  # says nothing of the first
     members = pooled([*told, unseen], 2, np.ones(2), 1000, 0).members[:, -1, 0]
     assert np.mean(members) == pytest.approx(MEAN[0], abs=0.15)
     assert np.std(members) > 0.8 * SPREAD[0]

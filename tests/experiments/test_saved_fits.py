@@ -12,7 +12,7 @@ from steadyslip.experiments.fitting import numbers, refit
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import SearchStory
+from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.numerics.noise import Noise, white
 
 
@@ -51,7 +51,8 @@ def made(rig, records, chance, **options):
         for k in range(1, len(plan.records) + 1)
     )
     fit = Fit(
-        plan, coordinates, float(chance.uniform()), SearchStory(8, 3, (1.5, 1 / 3), 12, True, bool(chance.integers(2))),
+        plan, coordinates, float(chance.uniform()),
+        SearchSummary(8, 3, (1.5, 1 / 3), 12, True, bool(chance.integers(2))),
         noise, root @ root.T, (Combination({space.unknowns[0].name: 1 / 3}, float("inf")),),
         (coordinates - chance.uniform(size=count), coordinates + 1), "0.0.7",
     )  # fmt: skip

@@ -32,7 +32,7 @@ from steadyslip.experiments.answers.population import POPULATION, Population
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import SearchStory
+from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.fitting.store import FIT
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.experiments.numerics.pooling import Pooled
@@ -78,7 +78,7 @@ def small_fit():
     values = [0.01, 0.02, 1e-5, 0.6, 1e10, 40.0, 0.0]
     coordinates = np.array([float(u.coordinate(v)) for u, v in zip(space.unknowns, values, strict=False)])
     found = Fit(
-        plan, coordinates, 1e-4, SearchStory(8, 3, (1.5,), 12, True), (noise,), np.diag(np.full(len(space), 1e-4)),
+        plan, coordinates, 1e-4, SearchSummary(8, 3, (1.5,), 12, True), (noise,), np.diag(np.full(len(space), 1e-4)),
         (Combination({"friction.a": 1.0, "friction.b": -0.5}, float("inf")),),
         (coordinates - 5, coordinates + 5), ss.__version__,
     )  # fmt: skip

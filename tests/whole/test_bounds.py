@@ -258,10 +258,10 @@ def test_a_used_fit_can_be_copied_and_sent():
     import pickle
 
     from steadyslip.experiments.fitting.result import Fit
-    from steadyslip.experiments.fitting.search import SearchStory
+    from steadyslip.experiments.fitting.search import SearchSummary
 
     numbers = np.array([1.0, 2.0])
-    fit = Fit("plan", numbers, 1.0, SearchStory(1, 1, (), 3, True), (), np.eye(2), (), (numbers, numbers), "1")
+    fit = Fit("plan", numbers, 1.0, SearchSummary(1, 1, (), 3, True), (), np.eye(2), (), (numbers, numbers), "1")
     fit.__dict__["comparison"] = lambda: "a kernel, which nobody can copy"
     for twin in (copy.deepcopy(fit), pickle.loads(pickle.dumps(fit))):
         assert "comparison" not in vars(twin)

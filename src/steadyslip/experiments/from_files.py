@@ -13,7 +13,7 @@ from steadyslip.core.progress import progress_text
 from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.answers.population import FEWEST, Population, population
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import Told
+from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.settings import PopulationSettings
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.spec import Spec, spec_from_text
@@ -132,7 +132,7 @@ def _read(plan: Spec, paths: Paths, skip_bad_lines: bool) -> list[Record]:
     return records
 
 
-def _teller(said: Callable[[str], None], of: str = "") -> Told:
+def _teller(said: Callable[[str], None], of: str = "") -> Progress:
     def told(what: str, starts: int, rms: float) -> None:
         reached = f", residuals {rms:.3g} of friction" if math.isfinite(rms) else ""
         said(f"{of}{what}: {starts} starts tried{reached}; Ctrl-C ends it")

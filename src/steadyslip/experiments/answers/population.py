@@ -27,7 +27,7 @@ from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import DRAWS, STRESS
 from steadyslip.experiments.fitting.unknowns import Unknown
-from steadyslip.experiments.numerics.pooling import Pooled, Told, pooled
+from steadyslip.experiments.numerics.pooling import ExperimentEstimate, Pooled, pooled
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.model.sliding import steady_state
@@ -331,19 +331,20 @@ def population(
     given = _conditions(labelled, conditions)
     centred = np.array([x - np.mean(x) for x in given.values()]).reshape(len(given), len(labelled))
     unknowns = tuple(_unknown(labelled, name) for name in own_names)
-    told = [
-        _told(one, own_names, unknowns, np.append(1.0, x)) for one, x in zip(labelled.values(), centred.T, strict=True)
+    estimates = [
+        _estimate_of(one, own_names, unknowns, np.append(1.0, x))
+        for one, x in zip(labelled.values(), centred.T, strict=True)
     ]
     needed = FEWEST + len(given)
     for p, name in enumerate(own_names):
-        determined = sum(p in one.seen for one in told)
+        determined = sum(p in one.indices for one in estimates)
         if determined < needed:
             message = f"is determined by {determined} of the experiments; a mean and a spread"
             message += f" with {len(given)} conditions" if given else ""
             problems.append(Problem(name, f"{message} need {needed}"))
     if problems:
         raise ParameterError(problems)
-    draws = pooled(told, len(own_names), np.full(len(own_names), scale), count, seed)
+    draws = pooled(estimates, len(own_names), np.full(len(own_names), scale), count, seed)
     return Population(labelled, own_names, given, scale, unknowns, draws)
 
 
@@ -398,7 +399,7 @@ def _conditions(fits: Mapping[str, Fit], conditions: Any) -> dict[str, Array]:
     return found
 
 
-def _told(one: Fit, names: tuple[str, ...], unknowns: tuple[Unknown, ...], design: Array) -> Told:
+def _estimate_of(one: Fit, names: tuple[str, ...], unknowns: tuple[Unknown, ...], design: Array) -> ExperimentEstimate:
     """What a fit says of some parameters, those that it does not determine left out."""
     places = {p: one.names.index(name) for p, name in enumerate(names) if name in one.names}
     seen = [p for p, k in places.items() if np.isfinite(one.covariance[k, k])]
@@ -406,7 +407,7 @@ def _told(one: Fit, names: tuple[str, ...], unknowns: tuple[Unknown, ...], desig
     mine, theirs = [unknowns[p] for p in seen], [one.space.unknowns[k] for k in own]
     units = np.array([1.0 if a.logarithmic else b.size / a.size for a, b in zip(mine, theirs, strict=True)])
     covariance = one.covariance[np.ix_(own, own)] * np.outer(units, units)
-    return Told(np.array(seen, dtype=int), one.coordinates[own] * units, covariance, design)
+    return ExperimentEstimate(np.array(seen, dtype=int), one.coordinates[own] * units, covariance, design)
 
 
 def _unknown(fits: Mapping[str, Fit], name: str) -> Unknown:

@@ -20,7 +20,7 @@ from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
-from steadyslip.experiments.numerics.sampling import walked
+from steadyslip.experiments.numerics.sampling import run_walkers
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
@@ -298,7 +298,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     generator = np.random.default_rng(seed)
     width = np.sqrt(np.minimum(np.diag(fit.covariance), 0.25))
     begin = np.clip(fit.coordinates + 0.5 * width * generator.standard_normal((walkers, size)), low, high)
-    sampler, time = walked(log_probability, begin, steps, seed, "posterior sampling")
+    sampler, time = run_walkers(log_probability, begin, steps, seed, "posterior sampling")
     cut = {"discard": steps // 3, "thin": max(1, int(time / 2))}
     kept = sampler.get_chain(**cut).swapaxes(0, 1).reshape(-1, size)  # one walker after another
     probable = sampler.get_log_prob(**cut).T.ravel()

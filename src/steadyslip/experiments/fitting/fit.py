@@ -17,7 +17,15 @@ from steadyslip.experiments.fitting.identify import combinations, prior_informat
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import MOST, Found, SearchStory, Told, in_order, searched, standing
+from steadyslip.experiments.fitting.search import (
+    MAX_ITERATIONS,
+    Progress,
+    SearchResult,
+    SearchSummary,
+    find_minimum,
+    first_computable,
+    with_states_sorted,
+)
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record
@@ -52,7 +60,7 @@ def fit(
     starts: int = STARTS,
     effort: float = 1.0,
     threads: int | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> Fit:
     """Fit a rig to one or several records of experiments.
 
@@ -136,20 +144,20 @@ def fit(
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
     if plan.loss == "linear" or plan.width is not None:
-        found = searched(plan, starts, allowed, progress)
+        found = find_minimum(plan, starts, allowed, progress)
     else:  # outliers widen the scatter about a fit that they have pulled; less so each time
-        found = searched(replace(plan, loss="linear"), starts, allowed, progress)
+        found = find_minimum(replace(plan, loss="linear"), starts, allowed, progress)
         last = np.inf
         for _ in range(WIDTHS):
             plan = with_width(plan, _scatter(found))
             if (plan.width or 0.0) > NARROWER * last:
                 break
             last = plan.width or 0.0
-            found = searched(plan, starts, allowed, progress)
-    return finished(plan, found.comparison, found.coordinates, found.story, errors, found.bounds)
+            found = find_minimum(plan, starts, allowed, progress)
+    return finished(plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
 
 
-def _scatter(found: Found) -> Array:
+def _scatter(found: SearchResult) -> Array:
     """Weighted residuals as they are, whatever the loss."""
     one = found.comparison
     return np.asarray((one.data - one.model(found.coordinates[None])[0][0]) * one.weights)
@@ -169,11 +177,13 @@ def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
     budget = Budget.of_fit(result.samples, len(space))
     comparison = plan.comparison(Effort(budget=budget))
     z = space.coordinates(np.clip(begin, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
-    ends = minimise(lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST, enough=budget.part(np.inf))
-    ends = standing(comparison, ends.sorted())
+    ends = minimise(
+        lambda x, _: comparison.residuals(x), z, *result.bounds, most=MAX_ITERATIONS, stop=budget.part(np.inf)
+    )
+    ends = first_computable(comparison, ends.sorted())
     if not ends.ssq[0] < result.ssq * (1 - BETTER):
         return result
-    found, _ = in_order(comparison, ends)
+    found, _ = with_states_sorted(comparison, ends)
     errors = "correlated" if result.correlated else "independent"
     search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
     return finished(plan, comparison, found, search, errors, result.bounds)
@@ -196,7 +206,7 @@ def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> A
 
 
 def finished(
-    plan: Plan, comparison: Comparison, z: Array, search: SearchStory, errors: str, bounds: tuple[Array, Array]
+    plan: Plan, comparison: Comparison, z: Array, search: SearchSummary, errors: str, bounds: tuple[Array, Array]
 ) -> Fit:
     """Errors and everything else that belongs to a minimum."""
     from steadyslip import __version__

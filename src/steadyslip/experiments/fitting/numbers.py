@@ -26,9 +26,9 @@ from steadyslip.experiments.fitting.refit import (
     with_memories,
     with_ramps,
 )
-from steadyslip.experiments.fitting.search import SearchStory
+from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.numerics.noise import DETECTED, Noise
+from steadyslip.experiments.numerics.noise import SIGNIFICANT, Noise
 from steadyslip.machine.slider import Slider
 
 
@@ -93,7 +93,7 @@ class FitNumbers(ReadOnly):
         Where the sum of squares is least, in the coordinates of ``plan.space()``.
     ssq : float
         Sum of squared residuals (weighted, or as the loss has them).
-    search : SearchStory
+    search : SearchSummary
     noise : tuple of Noise
         Of the residuals of every record.
     covariance : ndarray (p, p)
@@ -108,7 +108,7 @@ class FitNumbers(ReadOnly):
     plan: Plan
     coordinates: Array = field(repr=False)
     ssq: float
-    search: SearchStory
+    search: SearchSummary
     noise: tuple[Noise, ...] = field(repr=False)
     covariance: Array = field(repr=False)
     unidentified: tuple[Combination, ...]
@@ -209,16 +209,16 @@ class FitNumbers(ReadOnly):
     def has_structure(self) -> bool:
         """True if residuals of a record are correlated from sample to sample."""
         pairs = zip(self.noise, self.plan.records, strict=True)
-        return any(abs(noise.lag1) > DETECTED / np.sqrt(len(record)) for noise, record in pairs)
+        return any(abs(noise.lag1) > SIGNIFICANT / np.sqrt(len(record)) for noise, record in pairs)
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:
-        """Where the coordinates were searched, by name."""
+        """Where the coordinates were find_minimum, by name."""
         return dict(zip(self.names, zip(*self.bounds, strict=True), strict=True))
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
-        """Parameters that ran to the end of what was searched, each in a sentence."""
+        """Parameters that ran to the end of what was find_minimum, each in a sentence."""
         low, high = self.bounds
         found = []
         for i, one in enumerate(self.space.unknowns):
@@ -232,7 +232,7 @@ class FitNumbers(ReadOnly):
                         if one.unit == "s"
                         else format_quantity(value, one.unit, area=self.plan.rig.area)
                     )
-                    text = f"{one.name} ended at the {word} value that was searched, {end}"
+                    text = f"{one.name} ended at the {word} value that was find_minimum, {end}"
                     found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
         return tuple(found)
 

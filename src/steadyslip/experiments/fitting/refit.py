@@ -13,7 +13,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.effort import Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.planning import can_be_free
-from steadyslip.experiments.fitting.search import searched
+from steadyslip.experiments.fitting.search import find_minimum
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
@@ -70,9 +70,9 @@ def driven_as_measured(
 def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) -> Minima:
     """Where the search ends from z, (m, p), if it is no more work than that of a fit."""
     samples = sum(len(record) for record in plan.records)
-    enough = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
+    allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.comparison(Effort(budget=budget))
-    return minimise(lambda x, _: comparison.residuals(x), z, low, high, enough=enough, **options)
+    return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, **options)
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def with_memories(plan: Plan) -> tuple[Remembered, ...]:
             richer = replace(plan, rig=rig, free=free)
             budget = Budget.of_fit(sum(map(len, plan.records)), len(richer.space()), BRIEF)
             try:
-                best = searched(richer, FEW_STARTS, Effort(budget=budget), None)
+                best = find_minimum(richer, FEW_STARTS, Effort(budget=budget), None)
             except NotAvailable:
                 continue
             names = (one.name for one in richer.space().unknowns)

@@ -1,4 +1,8 @@
-"""The search for the best minimum: from many starts on few samples, then on all of them."""
+"""Global search for the least sum of squares: many starts on few samples, then the best of them on all samples.
+
+Constants without a stated bound were chosen by trial on synthetic and published records; they trade computing time
+against the chance that the best minimum is missed.
+"""
 
 from __future__ import annotations
 
@@ -17,49 +21,49 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
-from steadyslip.experiments.numerics.least_squares import CLOSE, HOPE, SAME, Minima, minimise
-from steadyslip.experiments.numerics.noise import DETECTED, lag_one
+from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SAME_SSQ, Minima, minimise
+from steadyslip.experiments.numerics.noise import SIGNIFICANT, lag_one
 
-THIN = 400  # samples on which many starts are tried
-HASTY = 8  # steps of the model per sample, on average, before a trial on few of them is given up
-SLOWER = 2.0  # times the steps of the slowest motion so far: beyond, one of a trial is given up
-ROUGH = 40  # iterations on few samples
-MOST = 300  # iterations on all samples, or on what stands for them;
-LAST = 12  # on all samples after that
-FIRST = 8  # starts, which fill the lanes of one vector
-ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
-FINALISTS = 8  # of them that go on with all samples: one vector of lanes
-FEW = 8  # starts of a simpler model, to see whether it comes near
-NEAREST = 3  # of the ends on few numbers that go on with all samples
-STARTING, REFINING = 0.5, 0.8  # of the work of a search: what may be done by the ends of its first two stages
-BESIDES = 0.2  # of it: what may be done with each simpler model, besides its own search
-SAME_IN_ORDER = 1e-9  # of the sum of squares: what the order of states may change of it
-SURPASSED = 1e-8  # of the sum of squares: by so much less on few numbers, an end is worth a look on all samples
-SMALL = 50_000  # derivatives at all samples, of all the promising: so few that nothing is won by fewer
-INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
+ROUGH_SAMPLES = 400  # samples, over all records, of the first stage
+ROUGH_PATIENCE = 8  # integration steps per sample at most in the first stage; the final stages allow effort.MOST_STEPS
+ROUGH_GROWTH = 2.0  # first stage: give a motion up after this multiple of the steps of the slowest finished one
+ROUGH_ITERATIONS = 40  # iterations at most in the first stage; its tolerance is loose, so most starts end earlier
+MAX_ITERATIONS = 300  # iterations at most on all samples, or on the condensed ones
+FINAL_ITERATIONS = 12  # iterations at most on all samples after condensed ones: the minimum is nearly reached by then
+FIRST_STARTS = 8  # starts of the first round: one per SIMD lane, so they cost about as much as one
+MIN_ARRIVED = 3  # starts that must reach the best minimum before the search may stop; one alone may be a chance
+FINALISTS = 8  # ends of the first stage that go on: one per SIMD lane
+NESTED_STARTS = 8  # starts that test whether a nested model can compete: one per SIMD lane
+MAX_POLISHED = 3  # ends on condensed samples that are refined on all samples
+ROUGH_SHARE, REFINE_SHARE = 0.5, 0.8  # shares of the work of one search spent when its first and second stages end
+NESTED_SHARE = 0.2  # share of the work of one search that each nested model may add, besides its own search
+REORDER_TOLERANCE = 1e-9  # relative change of the sum of squares by rounding when states are renumbered
+MIN_GAIN = 1e-8  # least relative gain on condensed samples that is worth iterations on all samples
+MIN_CONDENSED_SIZE = 50_000  # elements of the derivatives of all finalists; condensing fewer costs more than it saves
+WINDOW_SHARES = (0.25, 0.5, 0.75)  # shares of its window at which a time that reached an end of the window starts again
 
-Told = Callable[[str, int, float], None]
-"""What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
+Progress = Callable[[str, int, float], None]
+"""Progress callback: name of the stage, number of starts tried, root mean square of the best residuals."""
 
 
 @dataclass(frozen=True)
-class SearchStory:
-    """How the minimum was found.
+class SearchSummary:
+    """Record of a search: how many starts agree, and whether it converged.
 
     Attributes
     ----------
     starts : int
-        Points that the search started from.
+        Number of starting points.
     arrived : int
-        How many of them ended at the best minimum.
+        Number of starts that ended at the best minimum.
     others : tuple of float
         Sums of squares of other minima, as multiples of the best.
     iterations : int
-        Of the last stage.
+        Iterations of the last stage.
     converged : bool
-        Whether the sum of squares is within 1e-7 of where it ends.
+        True if further iterations would reduce the sum of squares by less than a share of 1e-7.
     cut : bool
-        Whether the search ended because the work that it may be was done.
+        True if the search ended because its budget of work was spent.
     """
 
     starts: int
@@ -71,47 +75,52 @@ class SearchStory:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """What a search found.
+class SearchResult:
+    """Result of a search: the best minimum, its sum of squares and how it was reached.
 
     Attributes
     ----------
     coordinates : ndarray (p,)
-        Of the best minimum.
+        Coordinates of the best minimum.
     ssq : float
+        Sum of squares there.
     comparison : Comparison
-        In which it is one.
-    story : SearchStory
+        Model and records whose sum of squares was minimised.
+    summary : SearchSummary
     bounds : (ndarray, ndarray)
-        Of the search.
+        Lower and upper bounds of the coordinates, each (p,).
     """
 
     coordinates: Array
     ssq: float
     comparison: Comparison
-    story: SearchStory
+    summary: SearchSummary
     bounds: tuple[Array, Array]
 
 
-Known = dict[tuple[tuple[str, ...], int, bool, str], Found | None]
-"""Fits of simpler models that are there already, by what is free."""
+SearchCache = dict[tuple[tuple[str, ...], int, bool, str], SearchResult | None]
+"""Results for nested models that were already find_minimum, by free parameters, trend order, offset and initial."""
 
 
-def _tried(plan: Plan, starts: int, effort: Effort, progress: Told | None, known: Known) -> Found | None:
-    """The best minimum of a simpler model, if it has any."""
+def _search_or_none(
+    plan: Plan, starts: int, effort: Effort, progress: Progress | None, known: SearchCache
+) -> SearchResult | None:
+    """Search a nested model; None if it cannot follow the records."""
     try:
-        return searched(plan, starts, effort, progress, known)
+        return find_minimum(plan, starts, effort, progress, known)
     except NotAvailable:
         return None
 
 
-def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, known: Known | None = None) -> Found:
-    """The best minimum, and how it was found.
+def find_minimum(
+    plan: Plan, starts: int, effort: Effort, progress: Progress | None, known: SearchCache | None = None
+) -> SearchResult:
+    """Search for the least sum of squares of a plan.
 
-    A few of the starts are tried first, then a third. The others follow unless these agree and leave nothing but white
-    noise, and then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it
-    also starts from where these end. When the work that its own search may be is done, it goes on with the best that
-    it has; what a simpler model may be is what it may be alone, so that it ends at the same place.
+    The first round tries `FIRST_STARTS` starts. More rounds follow until several starts agree and the residuals are
+    white noise, or until four times as many as asked for have been tried. Where the model contains simpler (nested)
+    ones, their minima are further starts. When the budget of the search is spent it returns the best minimum so far. A
+    nested model has the budget of a fit of its own, so that it ends where a separate fit of it ends.
 
     Raises
     ------
@@ -120,229 +129,232 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
     """
     search = _Search(plan, starts, effort, progress)
     third = -(-starts // 3)
-    for upto in dict.fromkeys((min(FIRST, third), third, starts, 2 * starts, 3 * starts, 4 * starts)):
+    for upto in dict.fromkeys((min(FIRST_STARTS, third), third, starts, 2 * starts, 3 * starts, 4 * starts)):
         search.try_starts(upto)
-        last = search.enough.was_met
+        last = search.allowance.was_met
         if not search.any_followed:
             if last:
                 break
             continue
-        search.promising()
-        if search.arrived < ENOUGH and upto >= starts:
-            search.quick = search.thin.comparison(effort)  # with all the patience there is
-        if not last and (search.arrived < ENOUGH or (upto < starts and search.arrived < upto / 3)):
+        search.refine_finalists()
+        if search.arrived < MIN_ARRIVED and upto >= starts:
+            search.rough_model = search.rough_plan.comparison(effort)  # motions are no longer given up early
+        if not last and (search.arrived < MIN_ARRIVED or (upto < starts and search.arrived < upto / 3)):
             continue
-        found = search.polished()
+        found = search.refine_best()
         if last or upto >= starts or not _leaves_structure(search.whole, found.coordinates[0]):
             break
     else:
-        found = search.polished() if search.any_followed else Minima.none(len(search.whole.space))
+        found = search.refine_best() if search.any_followed else Minima.none(len(search.whole.space))
     if not search.any_followed:
         raise NotAvailable(
             "the model cannot follow these records from any start; are law and drive those of the experiment?"
         )
-    found = standing(search.whole, found)
-    found = standing(search.whole, search.nested(found, {} if known is None else known))
+    found = first_computable(search.whole, found)
+    found = first_computable(search.whole, search.nested(found, {} if known is None else known))
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
-    best, ssq = in_order(search.whole, found)
-    return Found(best, ssq, search.whole, search.story(found), (search.low, search.high))
+    best, ssq = with_states_sorted(search.whole, found)
+    return SearchResult(best, ssq, search.whole, search.summary(found), (search.low, search.high))
 
 
 class _Search:
-    """A search under way.
+    """State of a search between its stages.
 
     Parameters
     ----------
     plan : Plan
     starts : int
-        As the user has them, for simpler models.
+        Number of starts that the user asked for; nested models are searched from as many.
     effort : Effort
-        Its budget that of the fit.
+        Limits of the computation, with the budget of the whole fit.
     progress : callable or None
 
     Attributes
     ----------
     rough : Minima
-        Where starts ended on few samples.
+        Ends of all starts on few samples.
     best : Minima
-        Where the most promising of those end on what stands for all samples.
-    followed : ndarray (m, p)
-        The finalists, whose motion goes through all samples.
+        Ends of the finalists on condensed samples, or on all samples if none are condensed.
+    finalists : ndarray (m, p)
+        Finalists whose motion reaches the last sample.
     arrived : int
-        How many starts lead to the best minimum.
+        Number of starts that lead to the best minimum.
     stages : list of Allowance
-        Of work: for starts, for the promising, for the end on all samples, then for each simpler model.
-    enough : Allowance
-        That of the stage that it is in.
+        Work allowed for the starts, the finalists, the end on all samples, and each nested model.
+    allowance : Allowance
+        The allowance of the current stage.
     """
 
-    def __init__(self, plan: Plan, starts: int, effort: Effort, progress: Told | None) -> None:
+    def __init__(self, plan: Plan, starts: int, effort: Effort, progress: Progress | None) -> None:
         self.plan, self.starts, self.effort, self.progress = plan, starts, effort, progress
         self.whole = plan.comparison(effort)
-        self.thin = replace(_thinned(plan), rtol=1e-5)
-        self.quick = self.thin.comparison(replace(effort, patience=HASTY, growth=SLOWER))
-        self.told_by_records = features_of(self.whole.parts)
-        self.low, self.high = search_bounds(self.whole.parts, self.told_by_records, self.whole.space)
+        self.rough_plan = replace(_rough_plan(plan), rtol=1e-5)
+        self.rough_model = self.rough_plan.comparison(replace(effort, patience=ROUGH_PATIENCE, growth=ROUGH_GROWTH))
+        self.features = features_of(self.whole.parts)
+        self.low, self.high = search_bounds(self.whole.parts, self.features, self.whole.space)
         self.rough = self.best = Minima.none(len(self.whole.space))
-        self.few: Comparison | Condensed = self.whole
-        self.followed = self.best.coordinates
+        self.condensed: Comparison | Condensed = self.whole
+        self.finalists = self.best.coordinates
         self.arrived = 0
         self.work = work_of_search(self.whole.size, len(self.whole.space)) * effort.budget.scale
-        self.stages = [effort.budget.part(share * self.work) for share in (STARTING, REFINING, 1.0)]
-        self.enough = self.stages[0]
+        self.stages = [effort.budget.part(share * self.work) for share in (ROUGH_SHARE, REFINE_SHARE, 1.0)]
+        self.allowance = self.stages[0]
 
     @property
     def any_followed(self) -> bool:
-        """Whether the model could follow the records from any start."""
+        """True if the model could follow the records from at least one start."""
         return bool(np.any(np.isfinite(self.rough.ssq)))
 
     @property
     def cut(self) -> bool:
-        """Whether something was left undone because the work for it was done."""
+        """True if a stage ended because its work was spent."""
         return any(stage.was_met for stage in self.stages)
 
-    def told(self, what: str, among: Comparison) -> Callable[[Minima], None]:
-        def tell(ends: Minima) -> None:
+    def reporter(self, what: str, among: Comparison) -> Callable[[Minima], None]:
+        def report(ends: Minima) -> None:
             if self.progress is not None:
                 tried, least = len(self.rough.ssq), float(np.min(ends.ssq, initial=np.inf))
                 self.progress(what, tried, float(np.sqrt(least / among.size)))
 
-        return tell
+        return report
 
     def try_starts(self, upto: int) -> None:
-        """Starts up to a number of them, on few samples."""
+        """Minimise on few samples from further starting points, until `upto` have been tried."""
         already = len(self.rough.ssq)
-        begin = starting_points(self.whole.parts, self.told_by_records, self.whole.space, upto - already, already)
-        self.enough = self.stages[0]
+        begin = starting_points(self.whole.parts, self.features, self.whole.space, upto - already, already)
+        self.allowance = self.stages[0]
         self.rough = self.rough + minimise(
-            lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH, tolerance=1e-4,
-            race=ENOUGH, told=self.told("searching", self.quick), enough=self.enough,
+            lambda z, _: self.rough_model.residuals(z), begin, self.low, self.high, most=ROUGH_ITERATIONS,
+            tolerance=1e-4, race=MIN_ARRIVED,
+            callback=self.reporter("searching", self.rough_model), stop=self.allowance,
         )  # fmt: skip
 
-    def promising(self) -> None:
-        """The most promising ends: on what stands for all samples, where anything does, and how many starts agree."""
-        self.enough = self.stages[1]
+    def refine_finalists(self) -> None:
+        """Refine the finalists on condensed samples (all, if none are condensed) and count the starts that agree."""
+        self.allowance = self.stages[1]
         begin, counts = self.rough.distinct(FINALISTS)
-        if len(self.best.ssq):  # where earlier starts have led
+        if len(self.best.ssq):  # the best of earlier rounds competes as well
             begin = np.concatenate([begin, self.best.sorted().coordinates[:1]])
             counts = np.append(counts, 0)
-        begin, counts, seen, slopes = self._followed(begin, counts)
-        self.followed = begin
-        self.few = self.whole
-        if slopes.size > SMALL:
-            self.few = condensed_along(self.plan, self.whole, seen, slopes)
-        if self.few is self.whole:
+        begin, counts, predicted, slopes = self._computable(begin, counts)
+        self.finalists = begin
+        self.condensed = self.whole
+        if slopes.size > MIN_CONDENSED_SIZE:
+            self.condensed = condensed_along(self.plan, self.whole, predicted, slopes)
+        if self.condensed is self.whole:
             self.best = Minima.at(begin)
-            self.arrived = int(np.sum(self.rough.ssq <= np.min(self.rough.ssq) * (1 + SAME)))
+            self.arrived = int(np.sum(self.rough.ssq <= np.min(self.rough.ssq) * (1 + SAME_SSQ)))
             return
         self.best = minimise(
-            lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=ENOUGH,
-            told=self.told("refining", self.whole), enough=self.enough, damping=CLOSE,
+            lambda z, _: self.condensed.residuals(z), begin, self.low, self.high, most=MAX_ITERATIONS, race=MIN_ARRIVED,
+            callback=self.reporter("refining", self.whole), stop=self.allowance, damping=DAMPING_NEAR,
         )  # fmt: skip
-        self.arrived = int(np.sum(counts[self.best.ssq <= np.min(self.best.ssq) * (1 + SAME)]))
+        self.arrived = int(np.sum(counts[self.best.ssq <= np.min(self.best.ssq) * (1 + SAME_SSQ)]))
 
-    def _followed(self, begin: Array, counts: Array) -> tuple[Array, Array, Array, Array]:
-        """Those of the finalists whose motion goes through all samples, and what the model says there.
+    def _computable(self, begin: Array, counts: Array) -> tuple[Array, Array, Array, Array]:
+        """Finalists whose motion reaches the last sample, with counts, model friction (m, n) and derivatives (m, p, n).
 
-        On few samples, with looser tolerances, a motion may pass that runs away on all. If all of them do, the next.
+        A motion that passes on few samples, with looser tolerances, may run away on all. If all finalists do, the next
+        best ends of the first stage are tried.
         """
         waiting, first = [(begin, counts)], 0
         while waiting:
             points, own = waiting.pop()
-            seen, slopes = self.whole.model(points)
-            good = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(slopes), axis=(1, 2))
-            if np.any(good):
-                return points[good], own[good], seen[good], slopes[good]
+            predicted, slopes = self.whole.model(points)
+            usable = np.all(np.isfinite(predicted), axis=1) & np.all(np.isfinite(slopes), axis=(1, 2))
+            if np.any(usable):
+                return points[usable], own[usable], predicted[usable], slopes[usable]
             first += len(points)
             every, numbers = self.rough.distinct(len(self.rough.ssq), hope=np.inf)
-            if len(every) > first and not self.enough():
+            if len(every) > first and not self.allowance():
                 waiting = [(every[first : first + FINALISTS], numbers[first : first + FINALISTS])]
         return begin, counts, np.empty((0, self.whole.size)), np.empty((0, begin.shape[1], self.whole.size))
 
-    def polished(self) -> Minima:
-        """The best of the promising brought to their end on all samples, the best first."""
-        self.enough = self.stages[2]
-        begin = self.best.coordinates if self.few is self.whole else self.best.distinct(NEAREST)[0]
-        found = self._on_all(begin)
-        if not len(begin) or not np.isfinite(found.ssq[0]):  # few numbers have led astray
-            found = self._on_all(self.followed)
-        inside = _released(self.whole.space, found.coordinates[0], self.low, self.high)
-        return (found + self._refined(inside)).sorted() if len(inside) else found
+    def refine_best(self) -> Minima:
+        """Minimise the best finalists on all samples; the best first."""
+        self.allowance = self.stages[2]
+        begin = self.best.coordinates if self.condensed is self.whole else self.best.distinct(MAX_POLISHED)[0]
+        found = self._minimise_on_all(begin)
+        if not len(begin) or not np.isfinite(found.ssq[0]):  # the condensed samples were misleading
+            found = self._minimise_on_all(self.finalists)
+        inside = _moved_inside(self.whole.space, found.coordinates[0], self.low, self.high)
+        return (found + self._refine_from(inside)).sorted() if len(inside) else found
 
-    def nested(self, found: Minima, known: Known) -> Minima:
-        """The same, or better ones where simpler models inside this one lead."""
+    def nested(self, found: Minima, known: SearchCache) -> Minima:
+        """Add minima reached from the minima of nested models; the best first."""
         for model in simpler(self.plan):
-            if not self.cut and not self._near(model):
+            if not self.cut and not self._can_compete(model):
                 continue
             key = model.plan.free, model.plan.trend, model.plan.offset, model.plan.initial
             if key not in known:
-                known[key] = _tried(model.plan, self.starts, self.effort, self.progress, known)
+                known[key] = _search_or_none(model.plan, self.starts, self.effort, self.progress, known)
             if (other := known[key]) is None:
                 continue
-            self.enough = self.effort.budget.part(BESIDES * self.work)
-            self.stages.append(self.enough)
+            self.allowance = self.effort.budget.part(NESTED_SHARE * self.work)
+            self.stages.append(self.allowance)
             begin = model.within(self.whole.space, other.coordinates, self.low, self.high)
-            better = other.ssq < found.ssq[0] * (1 - SURPASSED)
-            found = (found + (self._on_all(begin) if better else self._refined(begin))).sorted()
+            better = other.ssq < found.ssq[0] * (1 - MIN_GAIN)
+            found = (found + (self._minimise_on_all(begin) if better else self._refine_from(begin))).sorted()
         return found
 
-    def _near(self, model: Simpler) -> bool:
-        """Whether a simpler model comes anywhere near, on few samples and from a few starts."""
+    def _can_compete(self, model: Simpler) -> bool:
+        """True if a nested model, on few samples and from few starts, comes near the best sum of squares."""
         held, at = model.held(self.whole.space)
-        begin = np.where(held, at, self.rough.sorted().coordinates[:FEW])
+        begin = np.where(held, at, self.rough.sorted().coordinates[:NESTED_STARTS])
         for i, one in enumerate(self.whole.space.unknowns):
             if one.parameter in model.scales:
                 begin[:, i] = self.rough.sorted().coordinates[: len(begin), i]
         ends = minimise(
-            lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH,
-            held=np.tile(held, (len(begin), 1)), tolerance=1e-4, race=3, told=self.told("refining", self.quick),
-            enough=self.effort.budget.part(BESIDES * self.work),
+            lambda z, _: self.rough_model.residuals(z), begin, self.low, self.high, most=ROUGH_ITERATIONS,
+            held=np.tile(held, (len(begin), 1)), tolerance=1e-4, race=3,
+            callback=self.reporter("refining", self.rough_model),
+            stop=self.effort.budget.part(NESTED_SHARE * self.work),
         )  # fmt: skip
         return bool(np.min(ends.ssq, initial=np.inf) <= HOPE * np.min(self.rough.ssq))
 
-    def _refined(self, begin: Array) -> Minima:
-        """Where starts end on all samples: on what stands for them to begin with."""
-        if self.few is not self.whole:
+    def _refine_from(self, begin: Array) -> Minima:
+        """Minimise on condensed samples first, then on all samples those ends that improve on the best."""
+        if self.condensed is not self.whole:
             known = float(np.min(self.best.ssq))
             ends = minimise(
-                lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=1,
-                known=known, told=self.told("refining", self.whole), enough=self.enough,
+                lambda z, _: self.condensed.residuals(z), begin, self.low, self.high, most=MAX_ITERATIONS, race=1,
+                known=known, callback=self.reporter("refining", self.whole), stop=self.allowance,
             )  # fmt: skip
-            begin = ends.distinct(NEAREST)[0] if np.any(ends.ssq < known * (1 - SURPASSED)) else begin[:0]
-        return self._on_all(begin)
+            begin = ends.distinct(MAX_POLISHED)[0] if np.any(ends.ssq < known * (1 - MIN_GAIN)) else begin[:0]
+        return self._minimise_on_all(begin)
 
-    def _on_all(self, begin: Array) -> Minima:
-        """Where starts end on all samples; from what few numbers lead to, a few steps, and more if those do not do."""
+    def _minimise_on_all(self, begin: Array) -> Minima:
+        """Minimise on all samples; after condensed samples with few iterations, and more if those do not converge."""
 
         def ends(start: Array, most: int) -> Minima:
-            told = self.told("refining", self.whole)
+            report = self.reporter("refining", self.whole)
             return minimise(
-                lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, told=told,
-                enough=self.enough, damping=CLOSE,
+                lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, callback=report,
+                stop=self.allowance, damping=DAMPING_NEAR,
             ).sorted()  # fmt: skip
 
-        if self.few is self.whole:
-            return ends(begin, MOST)
-        found = ends(begin, LAST)
+        if self.condensed is self.whole:
+            return ends(begin, MAX_ITERATIONS)
+        found = ends(begin, FINAL_ITERATIONS)
         if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0]:
-            found = (ends(found.coordinates[:1], MOST) + found).sorted()
+            found = (ends(found.coordinates[:1], MAX_ITERATIONS) + found).sorted()
         return found
 
-    def story(self, found: Minima) -> SearchStory:
-        """How the minimum was found."""
+    def summary(self, found: Minima) -> SearchSummary:
+        """Summary of the search that ended with minima `found`, the best first."""
         others = [found.ssq / found.ssq[0]]
         for ends in (self.rough, self.best):
             done = ends.ssq[ends.converged]
             others.append(done / np.min(ends.ssq) if len(done) else done)
-        ratios = {float(f"{x:.3g}") for x in np.concatenate(others) if np.isfinite(x) and x > 1 + SAME}
+        ratios = {float(f"{x:.3g}") for x in np.concatenate(others) if np.isfinite(x) and x > 1 + SAME_SSQ}
         last = int(found.iterations[0])
         ended = bool(found.converged[0])
-        return SearchStory(len(self.rough.ssq), self.arrived, tuple(sorted(ratios)), last, ended, self.cut)
+        return SearchSummary(len(self.rough.ssq), self.arrived, tuple(sorted(ratios)), last, ended, self.cut)
 
 
-def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
-    """The same point with times that ran to the end of their windows put back inside, (0 or more, p).
+def _moved_inside(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
+    """Copies of a point, (0 or more, p), with times that ended at a bound of their window moved inside it.
 
     Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
     """
@@ -350,20 +362,21 @@ def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Arra
     ended = times & ((coordinates <= low) | (coordinates >= high))
     if not np.any(ended):
         return np.empty((0, len(coordinates)))
-    share = np.array(INSIDE)[:, None]
+    share = np.array(WINDOW_SHARES)[:, None]
     return np.where(ended, low + share * np.where(ended, high - low, 0.0), coordinates)
 
 
 def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
-    """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
+    """True if residuals are correlated from sample to sample: by the machine, or because a better minimum exists."""
     r = whole.residuals(coordinates[None])[0][0]
-    return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
+    return any(abs(lag_one(r[where])) > SIGNIFICANT / np.sqrt(len(r[where])) for where in whole.slices)
 
 
-def standing(comparison: Comparison, found: Minima) -> Minima:
-    """The same, the first a minimum that its motion comes through alone, with its derivatives, if there is such a one.
+def first_computable(comparison: Comparison, found: Minima) -> Minima:
+    """Minima sorted so that the first has finite residuals and derivatives when it is computed alone.
 
-    A motion that quickens without end for a moment may come through it or not by a rounding of the row it is in.
+    The steps of a motion that accelerates strongly depend on rounding, which differs with the lane of the SIMD vector;
+    such a motion may be completed among others and fail alone. Its sum of squares is then set to inf.
     """
     while np.isfinite(found.ssq[0]):
         residuals, slopes = comparison.residuals(found.coordinates[:1])
@@ -373,23 +386,23 @@ def standing(comparison: Comparison, found: Minima) -> Minima:
     return found
 
 
-def in_order(comparison: Comparison, found: Minima) -> tuple[Array, float]:
-    """The first of some minima and its sum of squares, states by rising slip distance.
+def with_states_sorted(comparison: Comparison, found: Minima) -> tuple[Array, float]:
+    """Coordinates and sum of squares of the first minimum, its states numbered by rising slip distance.
 
-    Of a motion that amplifies whatever there is, rounding too, the order decides; then it stays.
+    The states keep their order where renumbering changes the sum of squares, as rounding does in unstable motions.
     """
     best, ssq = found.coordinates[0], float(found.ssq[0])
-    rising = ordered(found.coordinates[:1], comparison.space)
+    rising = sort_states(found.coordinates[:1], comparison.space)
     if np.any(rising[0] != best):
         residuals, slopes = comparison.residuals(rising)
         again = float(residuals[0] @ residuals[0])
-        if np.all(np.isfinite(slopes)) and again <= ssq * (1 + SAME_IN_ORDER):
+        if np.all(np.isfinite(slopes)) and again <= ssq * (1 + REORDER_TOLERANCE):
             return rising[0], min(again, ssq)
     return best, ssq
 
 
-def ordered(coordinates: Array, space: Space) -> Array:
-    """States by rising slip distance, so that equal minima look equal."""
+def sort_states(coordinates: Array, space: Space) -> Array:
+    """Coordinates (m, p) with the states of each law renumbered by rising slip distance; equal minima become equal."""
     members: dict[tuple[int | None, str], dict[str, dict[str, int]]] = {}
     for i, one in enumerate(space.unknowns):
         owner, _, last = one.parameter.rpartition(".")
@@ -408,9 +421,9 @@ def ordered(coordinates: Array, space: Space) -> Array:
     return found
 
 
-def _thinned(plan: Plan) -> Plan:
-    """The same plan on few samples of every record."""
-    count = max(THIN // len(plan.records), 100)
+def _rough_plan(plan: Plan) -> Plan:
+    """Plan with about `ROUGH_SAMPLES` samples over all records, dense where the loading changes."""
+    count = max(ROUGH_SAMPLES // len(plan.records), 100)
     rows = []
     for record, sharp in zip(plan.records, plan.sharp, strict=True):
         few = transient_rows(record, count) if len(record) > count else np.arange(len(record))

@@ -16,7 +16,7 @@ from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.refit import Ramped, Remembered
-from steadyslip.experiments.fitting.search import SearchStory
+from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.loading.pressing import JoinedCurves
 from steadyslip.experiments.measured.columns import ROLES
@@ -155,7 +155,7 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
         plan=plan,
         coordinates=found["coordinates"],
         ssq=table.attributes["ssq"],
-        search=SearchStory(**search | {"others": tuple(search["others"])}),
+        search=SearchSummary(**search | {"others": tuple(search["others"])}),
         noise=tuple(
             Noise(lag1, correlated, found[f"noise_coefficients_{i}"], innovation, found[f"noise_covariance_{i}"])
             for i, (lag1, correlated, innovation) in enumerate(noises, start=1)

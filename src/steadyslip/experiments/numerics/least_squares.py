@@ -1,6 +1,7 @@
-"""Nonlinear least squares for many problems of one kind at once: Levenberg–Marquardt within bounds.
+"""Nonlinear least squares for many problems at once: Levenberg–Marquardt within bounds.
 
-Every lane is a problem of its own: other starts, other data (bootstrap), or other fixed values (profiles).
+Each problem has its own starting point, data (bootstrap) or fixed values (profiles). Constants without a stated bound
+were chosen by trial; they trade iterations against the risk of ending too early.
 """
 
 from __future__ import annotations
@@ -13,33 +14,36 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 Residuals = Callable[[Array, Array], tuple[Array, Array]]
-"""From coordinates (m, p) and the lanes they belong to (m,): residuals (m, n) and their derivatives (m, p, n)."""
+"""Function of coordinates (m, p) and problem indices (m,) to residuals (m, n), data less model, and the derivatives
+(m, p, n) of the model."""
 
-CONVERGED = 1e-10  # reduction of the sum of squares that is still to be had, as a share of it
-STALLED = 1e-7  # the same, where no step succeeds any more: below this the sum is at its rounding
-STILL = 1e-9  # the same, of a step however short that failed: at a kink, no direction leads down
-MOST_RAISED = 64.0  # times the damping rises from one step that fails to the next
-ALONG = 0.95  # cosine of the angle between two steps along one line
-MOST_SHARE = 0.95  # of the step before that a step may be: it is stretched up to twenty times
-HOPE = 2.0  # times the best sum of squares: rough minima beyond have no chance
-NEAR = 0.02  # of a coordinate: the same place
-SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
-PACE = 10  # iterations over which the progress of a problem is judged
-CRAWL = 3e-7  # of its sum of squares in as many: along a valley that data do not tell from its bottom; it ends there
-LARGEST = 1e100  # sum of squares, of residuals and of derivatives
-DAMPED, CLOSE = 1e-2, 1e-6  # damping to begin with, far from a minimum and close to one
-LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
+CONVERGED = 1e-10  # predicted relative decrease of the sum of squares at which a problem has converged
+STALLED = 1e-7  # the same where no step succeeds any more: smaller decreases are lost in rounding of the model
+KINK = 1e-9  # a failed step with a smaller predicted relative decrease ends the problem: it is at a kink
+MAX_DAMPING_FACTOR = 64.0  # largest factor by which the damping grows after a failed step; it doubles with each failure
+PARALLEL = 0.95  # cosine of the angle between successive steps above which they count as parallel
+MAX_STEP_RATIO = 0.95  # largest ratio of successive steps in the geometric series: stretches a step at most 20 times
+HOPE = 2.0  # ends of a rough search above this multiple of the best sum of squares are dropped
+MERGE_DISTANCE = 0.02  # largest difference in any coordinate (2 % of a logarithmic parameter) of equal minima
+SAME_SSQ = 1e-2  # relative difference of sums of squares between ends at one minimum of a rough search
+PROGRESS_ITERATIONS = 10  # iterations over which the progress of a problem is averaged
+LEAST_PROGRESS = (
+    3e-7  # relative decrease in `PROGRESS_ITERATIONS` iterations below which a problem ends: it follows a flat valley
+)
+MAX_SSQ = 1e100  # sums of squares above count as infinite; their products would overflow
+DAMPING_FAR, DAMPING_NEAR = 1e-2, 1e-6  # initial damping, relative to the curvature: far from a minimum, and near one
+MAX_STEP = 2.0  # largest step in any coordinate: a factor exp(2) of a logarithmic parameter
 
 
 @dataclass
 class Minima:
-    """Where each problem ended.
+    """Final points of m minimisations in p coordinates.
 
     Attributes
     ----------
     coordinates : ndarray (m, p)
     ssq : ndarray (m,)
-        Sum of squares; inf where none could be computed.
+        Sums of squares; inf where none could be computed.
     converged : ndarray of bool (m,)
     iterations : ndarray of int (m,)
     """
@@ -50,7 +54,7 @@ class Minima:
     iterations: Array
 
     def __add__(self, other: Minima) -> Minima:
-        """Those of both."""
+        """Concatenate two sets of minima."""
         return Minima(
             np.concatenate([self.coordinates, other.coordinates]),
             np.concatenate([self.ssq, other.ssq]),
@@ -59,30 +63,33 @@ class Minima:
         )
 
     def sorted(self) -> Minima:
-        """The same, the best first."""
+        """Copy sorted by sum of squares, the least first."""
         order = np.argsort(self.ssq, kind="stable")
         return Minima(self.coordinates[order], self.ssq[order], self.converged[order], self.iterations[order])
 
     @classmethod
     def none(cls, size: int) -> Minima:
-        """No problems, of so many coordinates."""
+        """Empty set of minima in `size` coordinates."""
         return cls.at(np.empty((0, size)))
 
     @classmethod
     def at(cls, coordinates: Array) -> Minima:
-        """Problems that have not begun."""
+        """Starting points (m, p) as minima with infinite sums of squares."""
         count = len(coordinates)
         return cls(coordinates, np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
 
     def distinct(self, most: int, hope: float = HOPE) -> tuple[Array, Array]:
-        """Coordinates of the best, each place once, as far as there is hope for them; how many ended at each."""
+        """Coordinates of up to `most` different minima, the best first, and the number of problems that ended at each.
+
+        Minima whose sum of squares is more than `hope` times the least are left out.
+        """
         ranked = self.sorted()
         chosen: list[Array] = []
         counts: list[int] = []
         for z, ssq in zip(ranked.coordinates, ranked.ssq, strict=True):
             if not np.isfinite(ssq) or ssq > hope * ranked.ssq[0]:
                 break
-            near = [i for i, other in enumerate(chosen) if np.max(np.abs(z - other)) < NEAR]
+            near = [i for i, other in enumerate(chosen) if np.max(np.abs(z - other)) < MERGE_DISTANCE]
             if near:
                 counts[near[0]] += 1
             elif len(chosen) < most:
@@ -93,35 +100,41 @@ class Minima:
 
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
-    tolerance: float = CONVERGED, race: int = 0, known: float = np.inf, told: Callable[[Minima], None] | None = None,
-    enough: Callable[[], bool] | None = None, damping: float = DAMPED,
+    tolerance: float = CONVERGED, race: int = 0, known: float = np.inf,
+    callback: Callable[[Minima], None] | None = None, stop: Callable[[], bool] | None = None,
+    damping: float = DAMPING_FAR,
 ) -> Minima:  # fmt: skip
     """Minimise the sum of squares of every problem.
 
     Parameters
     ----------
     residuals : callable
+        See `Residuals`.
     start : ndarray (m, p)
+        Starting points.
     low, high : ndarray (p,) or (m, p)
-        Bounds.
+        Bounds of the coordinates.
     most : int
-        Iterations.
+        Largest number of iterations.
     held : ndarray of bool (m, p), optional
-        Coordinates that stay where they are.
+        True for coordinates that keep their starting values.
     tolerance : float
-        Reduction still to be had, as a share of the sum, at which a problem is done.
+        Predicted relative decrease of the sum of squares at which a problem has converged.
     race : int
-        All problems are one, from several starts: once so many are done at the best place, or a step away from it,
-        those that promise no better stop too; once one is, those that at their pace will not get there. Zero: they are
-        not.
+        If positive, all problems are starts of one: once `race` of them have converged to the best minimum or are one
+        step away from it, those that predict no better end stop; once one has, those too slow to get there stop.
     known : float
         Sum of squares that this one problem is known to reach from elsewhere.
-    told : callable, optional
-        Called after every iteration with what is known by then.
-    enough : callable, optional
-        Asked before every iteration whether to end where the problems are.
+    callback : callable, optional
+        Called after every iteration with the `Minima` so far.
+    stop : callable, optional
+        Called before every iteration; the minimisation ends if it returns True.
     damping : float
-        To begin with, as a share of the curvature in each coordinate: the less, the closer a minimum is.
+        Initial damping relative to the curvature in each coordinate; small values suit starts near a minimum.
+
+    Returns
+    -------
+    Minima
     """
     count, size = start.shape
     if not count:
@@ -135,13 +148,13 @@ def minimise(
     found.ssq[:] = ssq
     damped, raised, scale = np.full(count, damping), np.full(count, 2.0), np.zeros((count, size))
     stuck = np.zeros(count, dtype=bool)
-    last, plain = np.zeros((count, size)), np.zeros(count, dtype=bool)  # the step before, if it was not stretched
+    last, plain = np.zeros((count, size)), np.zeros(count, dtype=bool)  # previous step; True if it was not stretched
     earlier = ssq.copy()
     active = everyone[np.isfinite(ssq)]
     keep = np.isfinite(ssq)
     normal, gradient = normal[keep], gradient[keep]
     for iteration in range(1, most + 1):
-        if not len(active) or (enough is not None and enough()):
+        if not len(active) or (stop is not None and stop()):
             break
         z, before = found.coordinates[active], found.ssq[active]
         scale[active] = curvature = np.maximum(scale[active] * 0.5, np.einsum("mii->mi", normal))
@@ -150,16 +163,16 @@ def minimise(
         promise, step = _steps(normal, gradient, free, damped[active], curvature)
         over = done = (promise <= tolerance * np.maximum(before, 1e-300)) | stuck[active]
         best = min(known, float(np.min(np.append(found.ssq[found.converged], before[done]), initial=np.inf)))
-        if iteration % PACE == 0:
-            gone = (earlier[active] - before) / PACE
-            over = over | (gone * PACE <= CRAWL * before)
+        if iteration % PROGRESS_ITERATIONS == 0:
+            gone = (earlier[active] - before) / PROGRESS_ITERATIONS
+            over = over | (gone * PROGRESS_ITERATIONS <= LEAST_PROGRESS * before)
             if race:
                 over |= before - gone * (most - iteration) > best
             earlier = found.ssq.copy()
         if race and best < np.inf:
-            there, ends = found.converged & (found.ssq <= best * (1 + SAME)), before - promise
-            there[active[done]] |= before[done] <= best * (1 + SAME)
-            coming = ~done & (np.abs(ends - best) <= SAME * best) & _near(z + step, found.coordinates[there])
+            there, ends = found.converged & (found.ssq <= best * (1 + SAME_SSQ)), before - promise
+            there[active[done]] |= before[done] <= best * (1 + SAME_SSQ)
+            coming = ~done & (np.abs(ends - best) <= SAME_SSQ * best) & _near(z + step, found.coordinates[there])
             if np.sum(there) + np.sum(coming) >= race:
                 worse = ends > (1 - max(tolerance, 1e-9)) * best
                 over, arrived = over | worse, coming & worse
@@ -177,58 +190,58 @@ def minimise(
                 break
         stretch = _stretch(step, last[active], curvature) * plain[active]
         step *= np.maximum(stretch, 1.0)[:, None]
-        step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
+        step *= np.minimum(1.0, MAX_STEP / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
         trial = np.clip(z + step, bottom, top)
         hoped, expected = _expected(normal, gradient, np.stack([step, trial - z]))
         after, new_normal, new_gradient = _normal(*residuals(trial, active))
         good = after < before
         with np.errstate(all="ignore"):
             ratio = np.where(expected > 0, (before - after) / expected, 0.0)
-        tried = ~good & (stretch > 1)  # in vain, which says nothing of the step itself
-        stuck[active] = ~good & ~tried & (hoped <= STILL * before)
+        tried = ~good & (stretch > 1)  # a stretched step failed: the unstretched one may succeed, keep the damping
+        stuck[active] = ~good & ~tried & (hoped <= KINK * before)
         factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), np.where(tried, 1.0, raised[active]))
         damped[active] = np.clip(damped[active] * factor, 1e-12, None)
-        raised[active] = np.where(good | tried, 2.0, np.minimum(2 * raised[active], MOST_RAISED))
+        raised[active] = np.where(good | tried, 2.0, np.minimum(2 * raised[active], MAX_DAMPING_FACTOR))
         last[active], plain[active] = trial - z, good & (stretch <= 1)
         better = active[good]
         found.coordinates[better], found.ssq[better] = trial[good], after[good]
         found.iterations[active] = iteration
         normal[good], gradient[good] = new_normal[good], new_gradient[good]
-        if told is not None:
-            told(found)
+        if callback is not None:
+            callback(found)
     return found
 
 
 def _near(coordinates: Array, places: Array) -> Array:
-    """Which of some points lie at one of some places."""
+    """True for each of the points (m, p) within `MERGE_DISTANCE` of one of the points `places` (k, p)."""
     apart = np.max(np.abs(coordinates[:, None] - places), axis=2, initial=0.0)
-    return np.asarray(np.any(apart < NEAR, axis=1))
+    return np.asarray(np.any(apart < MERGE_DISTANCE, axis=1))
 
 
 def _stretch(step: Array, last: Array, scale: Array) -> Array:
-    """How much longer steps may be where they follow each other along one line, each the same share of the last.
+    """Factors (m,) by which steps may be lengthened where successive steps are parallel.
 
-    Far from a perfect fit steps shrink by a constant factor: their sum is one step, divided by one less that factor.
+    Where residuals are large, steps shrink by a constant factor q: their geometric series sums to step / (1 - q).
     """
     both, own, other = (np.einsum("mi,mi,mi->m", a, b, scale) for a, b in ((step, last), (step, step), (last, last)))
     with np.errstate(all="ignore"):
         share, straight = both / other, both / np.sqrt(own * other)
-    return np.where((straight > ALONG) & (share < 1), 1 / (1 - np.clip(share, 0.0, MOST_SHARE)), 1.0)
+    return np.where((straight > PARALLEL) & (share < 1), 1 / (1 - np.clip(share, 0.0, MAX_STEP_RATIO)), 1.0)
 
 
 def _normal(r: Array, jacobian: Array) -> tuple[Array, Array, Array]:
-    """Sums of squares, JᵀJ and −Jᵀr, r being data minus model and J the model's derivative.
+    """Sums of squares (m,), JᵀJ (m, p, p) and Jᵀr (m, p); r is data less model, J the derivatives of the model.
 
-    The sum is inf where a motion gave no numbers, or some near the end of floating point.
+    The sum is inf where the model could not be computed, or is too large for its products to be represented.
     """
     with np.errstate(all="ignore"):
         normal, gradient = np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
         ssq, largest = np.einsum("mn,mn->m", r, r), np.max(np.einsum("mii->mi", normal), axis=1, initial=0.0)
-        return np.where((ssq < LARGEST) & (largest < LARGEST), ssq, np.inf), normal, gradient
+        return np.where((ssq < MAX_SSQ) & (largest < MAX_SSQ), ssq, np.inf), normal, gradient
 
 
 def _steps(normal: Array, gradient: Array, free: Array, damping: Array, scale: Array) -> tuple[Array, Array]:
-    """How much the sum of squares would fall in the best step if the problem were linear; the step, damped."""
+    """Decrease of the sum of squares (m,) that the linearised problem predicts undamped; damped steps (m, p)."""
     diagonal = np.einsum("mii->mi", normal)
     extra = np.stack([
         np.broadcast_to(1e-12 * np.max(diagonal, axis=1, keepdims=True), diagonal.shape),
@@ -247,6 +260,6 @@ def _steps(normal: Array, gradient: Array, free: Array, damping: Array, scale: A
 
 
 def _expected(normal: Array, gradient: Array, steps: Array) -> Array:
-    """How much the sum of squares would fall in steps (k, m, p) if the problem were linear, (k, m)."""
+    """Decrease of the sum of squares, (k, m), that the linearised problem predicts for steps (k, m, p)."""
     fall = gradient - 0.5 * np.matmul(normal, steps[..., None])[..., 0]
     return np.asarray(2 * np.einsum("kmi,kmi->km", fall, steps))

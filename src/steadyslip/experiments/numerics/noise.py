@@ -1,4 +1,4 @@
-"""Residuals that remember each other: how much, and what that does to the errors of a fit.
+"""Autocorrelation of residuals and its effect on the errors of a fit.
 
 Residuals of real records are correlated from sample to sample (machine, drift, filters), which makes errors that
 take them for independent several times too small. Their autocovariance is described by an autoregressive process.
@@ -14,27 +14,27 @@ from scipy.linalg import matmul_toeplitz, solve_toeplitz
 from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly
 
-DETECTED = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise
-MOST_LAGS = 40
-TAIL = 1e-4  # of the variance: autocovariance is followed until it has fallen below
+SIGNIFICANT = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise
+MAX_ORDER = 40  # largest order of the autoregression; above about a tenth of the samples it is not determined
+TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
 
 
 @dataclass(frozen=True, eq=False)
 class Noise(ReadOnly):
-    """Autoregressive description of residuals.
+    """Autoregressive model of residuals.
 
     Attributes
     ----------
     lag1 : float
-        Autocorrelation from one sample to the next.
+        Autocorrelation at lag 1 (one sample).
     correlated : bool
-        Whether that is more than chance.
+        True if the residuals are taken as correlated.
     coefficients : ndarray
-        Of the autoregression, empty for white noise.
+        Coefficients of the autoregression, empty for white noise.
     innovation : float
-        Variance of what is new in each sample.
+        Variance of the white noise that drives the autoregression.
     covariance : ndarray
-        Autocovariance at lags 0, 1, ...
+        Autocovariance at lags 0, 1, ... samples.
     """
 
     lag1: float
@@ -45,12 +45,12 @@ class Noise(ReadOnly):
 
     @property
     def inflation(self) -> float:
-        """How many correlated samples are worth one independent one, for slow changes."""
+        """Number of correlated samples that carry as much information on slow changes as one independent sample."""
         total = self.covariance[0] + 2 * float(np.sum(self.covariance[1:]))
         return max(float(total / self.covariance[0]), 1e-3)
 
     def spread(self, rows: Array) -> Array:
-        """rows · C · rowsᵀ with C the covariance of all samples, for rows (p, n)."""
+        """Product rows · C · rowsᵀ, (p, p), for rows (p, n); C is the covariance matrix (n, n) of the samples."""
         if not len(self.coefficients):
             return np.asarray(self.covariance[0] * rows @ rows.T)
         column = np.zeros(rows.shape[1])
@@ -60,15 +60,15 @@ class Noise(ReadOnly):
 
 
 def white(residuals: Array, free: int = 0) -> Noise:
-    """Residuals taken as independent."""
+    """Noise model that takes the residuals (n,) as independent, after `free` parameters were fitted to them."""
     variance = float(np.sum(residuals**2) / max(len(residuals) - free, 1))
     return Noise(lag_one(residuals), False, np.empty(0), variance, np.array([variance]))
 
 
 def lasting(values: Array) -> float:
-    """Correlation of the noise of neighbouring samples on top of anything slow, 0 to .99.
+    """Lag-1 autocorrelation (0 to 0.99) of the noise in values (n,) that also vary slowly.
 
-    Told from differences over one and over two samples: noise whose correlation falls as ρ**lag has
+    It follows from differences over one and over two samples: noise whose correlation falls as ρ**lag has
     differences of variance 2σ²(1 - ρ) and 2σ²(1 - ρ²).
     """
     one, two = (float(np.median(np.abs(values[k:] - values[:-k]))) for k in (1, 2))
@@ -76,12 +76,12 @@ def lasting(values: Array) -> float:
 
 
 def lag_one(residuals: Array) -> float:
-    """Autocorrelation from one sample to the next."""
+    """Autocorrelation of the residuals (n,) at lag 1."""
     return float(autocorrelation(residuals, 1)[1])
 
 
 def autocorrelation(residuals: Array, most: int) -> Array:
-    """Autocorrelation at lags 0, 1, ... `most`; zero of residuals that are all the same."""
+    """Autocorrelation at lags 0, 1, ... `most`; zeros if all residuals are equal."""
     found = _products(residuals, most)
     return found / found[0] if found[0] > 0 else np.zeros(most + 1)
 
@@ -93,21 +93,21 @@ def _products(residuals: Array, most: int) -> Array:
 
 
 def describe(residuals: Array, free: int = 0, always: bool = False) -> Noise:
-    """Autoregression of residuals, its order by Akaike's criterion; white noise unless correlation stands out.
+    """Fit an autoregression to residuals, its order by Akaike's criterion; white noise if they are not correlated.
 
     Parameters
     ----------
     residuals : ndarray (n,)
     free : int
-        Parameters that were fitted to them.
+        Number of parameters that were fitted to the record.
     always : bool
-        Take them as correlated whether that stands out or not.
+        Take the residuals as correlated even if their lag-1 autocorrelation is not significant.
     """
     n = len(residuals)
     lag1 = lag_one(residuals)
-    if not always and abs(lag1) < DETECTED / np.sqrt(n):
+    if not always and abs(lag1) < SIGNIFICANT / np.sqrt(n):
         return white(residuals, free)
-    most = min(MOST_LAGS, n // 10)
+    most = min(MAX_ORDER, n // 10)
     gamma = _products(residuals, most) / max(n - free, 1)
     if not gamma[0] > 0:
         return white(residuals, free)
@@ -125,7 +125,7 @@ def describe(residuals: Array, free: int = 0, always: bool = False) -> Noise:
 
 
 def _covariance(gamma: Array, phi: Array, n: int) -> Array:
-    """Autocovariance of an autoregression, continued until it has died away."""
+    """Autocovariance of an autoregression with coefficients `phi`, continued until it has fallen below `TAIL`."""
     found = list(gamma[: len(phi) + 1])
     limit = TAIL * gamma[0]
     while len(found) < n and np.max(np.abs(found[-len(phi) :])) > limit:

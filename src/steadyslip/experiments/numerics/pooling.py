@@ -12,38 +12,40 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.numerics.sampling import walked
+from steadyslip.experiments.numerics.sampling import run_walkers
 
-LEAST = -16.0  # logarithm of a spread, in units of the prior: below, it is none
-WALKERS, BURN = 40, 250
-APART = 20  # steps between draws of a walker, about as many as they remember,
-FEWEST = 350  # steps, however few draws
+MIN_LOG_SPREAD = -16.0  # lower bound of ln(spread / prior scale): spreads below 1e-7 of the scale count as none
+WALKERS, BURN = 40, 250  # least number of walkers, and steps discarded at the start; chosen by trial, for time
+THINNING = 20  # steps between the draws that are kept of a walker, about its autocorrelation time
+MIN_STEPS = 350  # least number of steps after the discarded ones, for a usable autocorrelation time
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """What one experiment says.
+class ExperimentEstimate:
+    """Estimates of one experiment, with their covariance.
 
     Attributes
     ----------
-    seen : ndarray of int (k,)
-        Which of the p coordinates it determines.
+    indices : ndarray of int (k,)
+        Indices of the coordinates, of p, that the experiment determines.
     values : ndarray (k,)
+        Estimates of these coordinates.
     covariance : ndarray (k, k)
+        Covariance of the estimates.
     design : ndarray (q,)
-        1, and how far its conditions are from the mean.
+        1, then the differences of the experiment's conditions from their means over all experiments.
     """
 
-    seen: Array
+    indices: Array
     values: Array
     covariance: Array
     design: Array
 
     def slopes(self, size: int) -> Array:
-        """How what is seen follows from β, (k, p q)."""
-        found = np.zeros((len(self.seen), size, len(self.design)))
-        found[np.arange(len(self.seen)), self.seen] = self.design
-        return found.reshape(len(self.seen), -1)
+        """Derivatives of the expected estimates with respect to β, (k, p q)."""
+        found = np.zeros((len(self.indices), size, len(self.design)))
+        found[np.arange(len(self.indices)), self.indices] = self.design
+        return found.reshape(len(self.indices), -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +73,16 @@ class Pooled:
     chains: int = 1
 
 
-def log_evidence(told: list[Told], spread: Array) -> tuple[Array, Array, Array]:
-    """Logarithm of the probability of what was seen, for spreads (m, p), β's precision and best value."""
+def log_evidence(experiments: list[ExperimentEstimate], spread: Array) -> tuple[Array, Array, Array]:
+    """Log marginal likelihood (m,) for spreads (m, p); precision (m, p q, p q) and mean (m, p q) of β given them."""
     count, size = spread.shape
-    width = size * len(told[0].design)
+    width = size * len(experiments[0].design)
     precision, pull, rest = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count)
-    for many in {len(one.seen) for one in told} - {0}:  # side by side, as many as see as many coordinates
-        alike = [one for one in told if len(one.seen) == many]
-        seen = np.array([one.seen for one in alike])
+    for many in {len(one.indices) for one in experiments} - {
+        0
+    }:  # experiments that determine equally many coordinates, together
+        alike = [one for one in experiments if len(one.indices) == many]
+        seen = np.array([one.indices for one in alike])
         slopes = np.array([one.slopes(size) for one in alike])
         values = np.array([one.values for one in alike])
         variance = np.eye(many) * spread[:, seen][..., None] ** 2 + np.array([one.covariance for one in alike])
@@ -94,12 +98,12 @@ def log_evidence(told: list[Told], spread: Array) -> tuple[Array, Array, Array]:
     return -0.5 * rest, precision, best
 
 
-def pooled(told: list[Told], size: int, scale: Array, count: int, seed: int) -> Pooled:
-    """Draw from the posterior.
+def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count: int, seed: int) -> Pooled:
+    """Draw spreads, means and members of a population from their posterior, by affine-invariant MCMC.
 
     Parameters
     ----------
-    told : list of Told
+    experiments : list of ExperimentEstimate
     size : int
         Number of coordinates.
     scale : ndarray (p,)
@@ -116,50 +120,56 @@ def pooled(told: list[Told], size: int, scale: Array, count: int, seed: int) -> 
 
     def log_probability(u: Array) -> Array:
         found = np.full(len(u), -np.inf)
-        inside = np.all((u > LEAST) & (u < 4.0), axis=1)
+        inside = np.all((u > MIN_LOG_SPREAD) & (u < 4.0), axis=1)
         if np.any(inside):
             share = np.exp(u[inside])  # of the prior's scale; the last term is the change to logarithms
-            found[inside] = log_evidence(told, scale * share)[0] + np.sum(u[inside] - 0.5 * share**2, axis=1)
+            found[inside] = log_evidence(experiments, scale * share)[0] + np.sum(u[inside] - 0.5 * share**2, axis=1)
         return found
 
     generator = np.random.default_rng(seed)
     walkers = max(WALKERS, 2 * size + 2)
-    begin = np.log(_scatter(told, size, scale) / scale) + 0.5 * generator.standard_normal((walkers, size))
+    begin = np.log(_initial_spreads(experiments, size, scale) / scale) + 0.5 * generator.standard_normal(
+        (walkers, size)
+    )
     each = -(-count // walkers)
-    steps = max(APART * each, FEWEST)
-    sampler, time = walked(log_probability, np.clip(begin, LEAST + 1, 3.0), BURN + steps, seed, "a population")
+    steps = max(THINNING * each, MIN_STEPS)
+    sampler, time = run_walkers(
+        log_probability, np.clip(begin, MIN_LOG_SPREAD + 1, 3.0), BURN + steps, seed, "a population"
+    )
     kept = sampler.get_chain(discard=BURN)
     own = np.round(np.linspace(0, steps - 1, each)).astype(int)
     spread = scale * np.exp(kept[own].transpose(1, 0, 2).reshape(-1, size))
-    return _given(told, spread, time, walkers, generator)
+    return _conditional_draws(experiments, spread, time, walkers, generator)
 
 
-def _scatter(told: list[Told], size: int, scale: Array) -> Array:
-    """Rough spreads to begin with: of the estimates themselves."""
+def _initial_spreads(experiments: list[ExperimentEstimate], size: int, scale: Array) -> Array:
+    """Starting values of the spreads (p,): standard deviations of the estimates, else 0.3 of the prior scale."""
     found = np.array(0.3 * scale)
     for p in range(size):
-        values = [float(one.values[np.flatnonzero(one.seen == p)[0]]) for one in told if p in one.seen]
+        values = [float(one.values[np.flatnonzero(one.indices == p)[0]]) for one in experiments if p in one.indices]
         if len(values) > 1 and np.std(values) > 0:
             found[p] = np.std(values, ddof=1)
     return found
 
 
-def _given(told: list[Told], spread: Array, time: float, chains: int, generator: np.random.Generator) -> Pooled:
-    """Means and members for given spreads, exactly."""
+def _conditional_draws(
+    experiments: list[ExperimentEstimate], spread: Array, time: float, chains: int, generator: np.random.Generator
+) -> Pooled:
+    """Draw means and members from their exact distributions given the spreads (m, p)."""
     count, size = spread.shape
-    _, precision, best = log_evidence(told, spread)
+    _, precision, best = log_evidence(experiments, spread)
     root = np.linalg.cholesky(precision)
     noise = generator.standard_normal((count, precision.shape[1], 1))
     mean = best + np.linalg.solve(root.transpose(0, 2, 1), noise)[:, :, 0]
     mean = mean.reshape(count, size, -1)
-    members = np.empty((count, len(told), size))
-    for j, one in enumerate(told):  # a draw from the prior, moved by what it misses (Hoffman & Ribak 1991)
+    members = np.empty((count, len(experiments), size))
+    for j, one in enumerate(experiments):  # a draw from the prior, moved by what it misses (Hoffman & Ribak 1991)
         drawn = mean @ one.design + spread * generator.standard_normal((count, size))
-        seen = drawn[:, one.seen] + generator.multivariate_normal(
-            np.zeros(len(one.seen)), one.covariance, size=count, method="eigh"
+        seen = drawn[:, one.indices] + generator.multivariate_normal(
+            np.zeros(len(one.indices)), one.covariance, size=count, method="eigh"
         )
-        variance = one.covariance + np.eye(len(one.seen)) * spread[:, None, one.seen] ** 2
+        variance = one.covariance + np.eye(len(one.indices)) * spread[:, None, one.indices] ** 2
         weight = np.linalg.solve(variance, (one.values - seen)[:, :, None])[:, :, 0]
-        drawn[:, one.seen] += spread[:, one.seen] ** 2 * weight
+        drawn[:, one.indices] += spread[:, one.indices] ** 2 * weight
         members[:, j] = drawn
     return Pooled(mean, spread, members, time, chains)

@@ -1,4 +1,4 @@
-"""Walkers that sample a probability density, by emcee; the one place that knows the package."""
+"""Sample a probability density by MCMC with emcee; the only module that imports the package."""
 
 from __future__ import annotations
 
@@ -11,23 +11,27 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
 
-def walked(log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str) -> tuple[Any, float]:
-    """Let walkers go.
+def run_walkers(
+    log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str
+) -> tuple[Any, float]:
+    """Run the walkers of an affine-invariant MCMC sampler.
 
     Parameters
     ----------
     log_density : callable
         Points (m, p) to logarithms of the density (m,), up to a constant.
     begin : ndarray (walkers, p)
+        Starting points.
     steps : int
+        Steps of every walker.
     seed : int
     what : str
-        Needs the package, where it is missing.
+        Name of the task, for the error message where emcee is missing.
 
     Returns
     -------
     emcee.EnsembleSampler, float
-        With the chains, and the longest autocorrelation time in steps.
+        The sampler with its chains, and the longest autocorrelation time in steps.
 
     Raises
     ------

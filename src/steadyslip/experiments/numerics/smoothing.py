@@ -10,16 +10,15 @@ from scipy.interpolate import BSpline, make_interp_spline, make_smoothing_spline
 
 from steadyslip.core.arrays import Array
 
-MOST_KNOTS = 4000
-CLEAN = 1e-3  # of its range: noise of a column that is followed sample by sample
+MOST_KNOTS = 4000  # knots of a smoothing spline; its cross-validation takes about a second for so many
+LOW_NOISE = 1e-3  # noise, as a share of a column's range, below which `MOST_KNOTS` are used instead of fewer
 
 
 def smoothing_curve(time: Array, values: Array, noise: float, knots: int = MOST_KNOTS) -> Smooth:
-    """A smoothing cubic spline through samples, as smooth as cross-validation says; of means where samples are many.
+    """Cubic smoothing spline through samples, its smoothness by cross-validation.
 
-    Noise that remembers itself makes cross-validation follow it; means of what is shorter than anything wanted do not.
-
-    Cross-validation takes a second; whoever reads a record again gets the same curve at once.
+    More samples than `knots` are averaged in groups first: correlated noise would mislead cross-validation, and group
+    means are nearly independent. Results are cached.
     """
     columns = (np.asarray(column, dtype=float).tobytes() for column in (time, values))
     return _curve(*columns, noise, min(knots, MOST_KNOTS))
@@ -28,7 +27,7 @@ def smoothing_curve(time: Array, values: Array, noise: float, knots: int = MOST_
 @lru_cache(maxsize=16)
 def _curve(times: bytes, samples: bytes, noise: float, knots: int) -> Smooth:
     time, values = np.frombuffer(times), np.frombuffer(samples)
-    step = -(-len(time) // (knots if noise > CLEAN * float(np.ptp(values)) else MOST_KNOTS))
+    step = -(-len(time) // (knots if noise > LOW_NOISE * float(np.ptp(values)) else MOST_KNOTS))
     if step > 1:
         ends = np.arange(0, len(time), step)
         count = np.diff(np.append(ends, len(time)))
@@ -40,7 +39,7 @@ def _curve(times: bytes, samples: bytes, noise: float, knots: int) -> Smooth:
 
 
 class Smooth:
-    """A spline, in units of time and value of its own for the sake of rounding."""
+    """Spline of time (s), scaled internally to avoid rounding errors: (time - origin) / unit, value / size."""
 
     def __init__(self, spline: Any, origin: float = 0.0, unit: float = 1.0, size: float = 1.0) -> None:
         self.spline, self.origin, self.unit, self.size = spline, origin, unit, size
@@ -49,18 +48,18 @@ class Smooth:
         return np.asarray(self.spline((np.asarray(time) - self.origin) / self.unit)) * self.size
 
     def parts(self) -> list[Any]:
-        """Numbers that make the same curve again (`from_parts`): units, degree, knots and coefficients."""
+        """Origin, unit, size, degree, knots and coefficients, from which `from_parts` makes the curve again."""
         own = self.spline
         return [self.origin, self.unit, self.size, int(own.k), own.t.tolist(), own.c.tolist()]
 
     @classmethod
     def from_parts(cls, origin: float, unit: float, size: float, degree: int, knots: Any, coefficients: Any) -> Smooth:
-        """The curve of such numbers.
+        """Make a curve from the list that `parts` returns.
 
         Raises
         ------
         ValueError
-            If no curve has them.
+            If a number is not finite.
         """
         columns = [np.array(column, dtype=float) for column in (knots, coefficients)]
         if not all(

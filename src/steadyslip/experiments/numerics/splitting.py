@@ -1,4 +1,4 @@
-"""Cuts a measured column into ranges on which a straight line, or a level, fits to within its noise."""
+"""Split a measured column into ranges in which a straight line, or a constant, fits to within its noise."""
 
 from __future__ import annotations
 
@@ -6,22 +6,24 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 
-EVIDENCE = 60.0  # how much the squared misfit must fall, in units of the noise variance
+EVIDENCE = 60.0  # least decrease of the squared misfit by a split, in noise variances; chance gives far less
 MAD_TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
-FEWEST = 4  # samples between changes
-RESOLUTION = 1e-7  # of the whole range: noise of columns without any
-MOST = 500  # ranges
-SWEEPS = 4  # in which their ends are put right
-STAIRS = 0.2  # share of samples between which a column starts or stops to change: a staircase of its resolution
+FEWEST = 4  # least number of samples in a range
+RESOLUTION = 1e-7  # least noise assumed, as a share of the range of a column
+MAX_RANGES = 500  # largest number of ranges
+MAX_SWEEPS = 4  # largest number of passes that adjust the ends of the ranges
+STAIRCASE_SHARE = (
+    0.2  # a column that starts or stops changing at a larger share of samples is a staircase of its resolution
+)
 
 
 def spread(values: Array) -> float:
-    """Standard deviation from the median, which steps do not disturb."""
+    """Standard deviation estimated from the median absolute deviation, robust against outliers; 0 if empty."""
     return float(MAD_TO_SIGMA * np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
 def line(time: Array, values: Array) -> tuple[float, float]:
-    """Value at the first time, and slope, by least squares."""
+    """Value at the first time, and slope, of the least-squares line through samples (n,)."""
     t = time - time[0]
     mean = t.mean()
     size = float(np.sum((t - mean) ** 2))
@@ -30,46 +32,49 @@ def line(time: Array, values: Array) -> tuple[float, float]:
 
 
 def displacement_noise(time: Array, displacement: Array) -> float:
-    """Standard deviation of what a sample strays from the line through its neighbours, steps left out."""
+    """Noise of a displacement column, m: robust deviation of samples from the line through their neighbours."""
     share = (time[2:] - time[1:-1]) / (time[2:] - time[:-2])
-    strays = displacement[1:-1] - share * displacement[:-2] - (1 - share) * displacement[2:]
-    white = spread(strays / np.sqrt(1 + share**2 + (1 - share) ** 2))
-    return float(max(white, RESOLUTION * float(np.ptp(displacement)), 0.3 * _stair(displacement)))
+    deviations = displacement[1:-1] - share * displacement[:-2] - (1 - share) * displacement[2:]
+    white = spread(deviations / np.sqrt(1 + share**2 + (1 - share) ** 2))
+    return float(max(white, RESOLUTION * float(np.ptp(displacement)), 0.3 * _stair_height(displacement)))
 
 
 def level_noise(values: Array) -> float:
-    """The same of a column that is constant between steps."""
+    """Noise of a column that is constant between steps, in its units: from the differences between its samples."""
     white = spread(np.diff(values)) / np.sqrt(2.0)
-    return float(max(white, RESOLUTION * float(np.max(np.abs(values))), 0.3 * _stair(values)))
+    return float(max(white, RESOLUTION * float(np.max(np.abs(values))), 0.3 * _stair_height(values)))
 
 
-def _stair(values: Array) -> float:
-    """Height of the stairs of a column that its resolution makes one; zero if it is none."""
+def _stair_height(values: Array) -> float:
+    """Height of the stairs of a column that its resolution turns into a staircase; 0 for other columns."""
     moved = np.abs(np.diff(values)) > 0
-    if np.mean(moved[1:] != moved[:-1]) < STAIRS:
+    if np.mean(moved[1:] != moved[:-1]) < STAIRCASE_SHARE:
         return 0.0
     return float(np.quantile(np.abs(np.diff(values))[moved], 0.1))
 
 
 def split(time: Array, values: Array, noise: float, linear: bool) -> list[tuple[int, int]]:
-    """Ranges of samples on which a line (or a level) fits to within the noise: halved where that helps most."""
+    """Ranges of samples, first and one past the last, in which a line (or a constant) fits to within the noise.
+
+    Ranges are split in two, where that reduces the misfit most, as long as it is reduced by more than noise explains.
+    """
     waiting = [(0, len(time))]
     done: list[tuple[int, int]] = []
     while waiting:
         i, j = waiting.pop()
         cut, gain = _best_cut(time[i:j], values[i:j], linear)
-        if cut and gain > EVIDENCE * noise**2 and len(done) + len(waiting) < MOST:
+        if cut and gain > EVIDENCE * noise**2 and len(done) + len(waiting) < MAX_RANGES:
             waiting += [(i, i + cut), (i + cut, j)]
         else:
             done.append((i, j))
-    return _settled(sorted(done), time, values, EVIDENCE * noise**2, linear)
+    return _with_ends_adjusted(sorted(done), time, values, EVIDENCE * noise**2, linear)
 
 
-def _settled(
+def _with_ends_adjusted(
     ends: list[tuple[int, int]], time: Array, values: Array, least: float, linear: bool
 ) -> list[tuple[int, int]]:
-    """Ranges whose common ends lie where they fit best: halving put the first of them before it knew the others."""
-    for _ in range(SWEEPS):
+    """Ranges with common ends moved to where they fit best; the first splits were made without knowing later ones."""
+    for _ in range(MAX_SWEEPS):
         found = [ends[0]]
         for _, j in ends[1:]:
             i = found.pop()[0]
@@ -82,7 +87,7 @@ def _settled(
 
 
 def _best_cut(time: Array, values: Array, linear: bool) -> tuple[int, float]:
-    """Where to cut a range in two, and by how much the squared misfit falls."""
+    """Index at which to split a range in two, 0 for none, and the decrease of the squared misfit."""
     n = len(time)
     if n < 2 * FEWEST:
         return 0, 0.0
@@ -100,7 +105,7 @@ def _best_cut(time: Array, values: Array, linear: bool) -> tuple[int, float]:
 
 
 def _misfits(t: Array, y: Array, linear: bool) -> Array:
-    """Squared misfit of a line (or level) through the first 1, 2, ... points."""
+    """Squared misfit of a line (or constant) through the first 1, 2, ... points, (n,)."""
     count = np.arange(1, len(t) + 1)
     sy, syy = np.cumsum(y), np.cumsum(y * y)
     result = syy - sy * sy / count

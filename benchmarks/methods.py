@@ -34,7 +34,7 @@ def measured(
     for _ in range(repeat):
         call = Call(machine, tables, count, np.empty(0))
         begin = time.process_time()
-        call.go(10**12)
+        call.run_steps(10**12)
         best = min(best, time.process_time() - begin)
     names = machine.reduction.names
     return call.final[:, [Final.STATE + names.index(name) for name in (SPEED, "x")]], best / count

@@ -57,7 +57,7 @@ def ours_single(problem: Problem, tolerance: float, variants: np.ndarray) -> tup
     _ = machine.code.advance
     call = Call(machine, jobs.tables(machine, 0, 1, False, False), 1, np.empty(0))
     begin = time.process_time()
-    call.go(10**12)
+    call.run_steps(10**12)
     seconds = time.process_time() - begin
     names = dict(zip(machine.reduction.names, call.final[0, Final.STATE :], strict=True))
     return np.array([[names[SPEED], names["x"]]]), seconds
@@ -165,7 +165,7 @@ def bare_rate(problem: Problem) -> tuple[float, float]:
     for _ in range(5):
         call = Call(machine, jobs.tables(machine, 0, 2048, False, False), 2048, np.empty(0))
         begin = time.process_time()
-        call.go(10**12)
+        call.run_steps(10**12)
         quickest = min(quickest, time.process_time() - begin)
         total = float(call.final[:, 2:4].sum()) * evaluations
     return best / rounds / LANES * 1e9, quickest / total * 1e9

@@ -39,17 +39,17 @@ def test_what_links_carry_is_the_same_in_formulas_and_in_numbers(monkeypatch):
 
     def told():
         build._build_cached.cache_clear()
-        point._own_point.cache_clear()
+        point._cached_point.cache_clear()
         found = []
         for path in sorted(glob.glob("examples/machines/*.toml")):
             machine = ss.read_rig(path)
             seen = ss.steady_state(machine)
             found.append((ss.eigenvalues(machine), [seen.links[name] for name in sorted(seen.links)]))
-            assert (operating_point(machine).model.carried is not None) == (statics.LONGEST == 0)
+            assert (operating_point(machine).model.carried is not None) == (statics.MAX_TERMS == 0)
         return found
 
     formulas = told()
-    monkeypatch.setattr(statics, "LONGEST", 0)
+    monkeypatch.setattr(statics, "MAX_TERMS", 0)
     numbers = told()
     monkeypatch.undo()
     told()

@@ -142,5 +142,5 @@ def test_constructors_take_text_in_the_units_of_their_user():
 
 def test_a_law_that_waits_for_its_area_says_its_numbers():
     waiting = ss.laws.ConstantNormalStress(preload="3 kN")
-    assert repr(waiting) == "Constant(preload=3000.0)"
+    assert repr(waiting) == "ConstantNormalStress(preload=3000.0)"
     assert replace(waiting, preload="4 kN").preload == 4e3

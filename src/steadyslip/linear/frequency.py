@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.signal import find_peaks
 
 from steadyslip.linear.state_space import state_matrices
 from steadyslip.machine.machine import Machine
@@ -35,6 +33,9 @@ def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, 
 
     Looked for near the period of every mode, however little damped, and on a fine grid.
     """
+    from scipy.optimize import minimize_scalar  # slow to import
+    from scipy.signal import find_peaks
+
     blocks = state_matrices(rig, (output,), (input,)).blocks()
     values = np.linalg.eigvals(blocks[0])
     swinging = values[values.imag > 0]

@@ -79,7 +79,7 @@ def determinant(
 
     Raises
     ------
-    TooLong
+    TooManyTerms
         If a minor has more than `longest` terms.
     """
     names = sorted({n for row in matrix for entry in row for e in entry.values() for n in e.free_symbols}, key=str)
@@ -123,8 +123,8 @@ def machine_determinant(model: Model, rows: Rows) -> Polynomial:
 
     Raises
     ------
-    TooLong
-        If a minor has more than `LONGEST` terms.
+    TooManyTerms
+        If a minor has more than `MAX_TERMS` terms.
     """
     columns = {name: place for place, name in enumerate(rows)}
     blocks = [_Block(rows, columns, i, model) for i in range(len(model.contacts))]

@@ -4,7 +4,6 @@ pieces -> Protocol -> segments (one lane or many) -> kernels. A protocol drives 
 on laws or rigs.
 """
 
-from steadyslip.protocol.inputs import evaluate
 from steadyslip.protocol.load_point import (
     Creep,
     DisplacementStep,
@@ -16,7 +15,6 @@ from steadyslip.protocol.load_point import (
     VelocityStep,
 )
 from steadyslip.protocol.protocol import Piece, Protocol
-from steadyslip.protocol.segments import Segments, pack
 from steadyslip.protocol.stress import (
     CreepRamp,
     CreepStep,
@@ -42,6 +40,6 @@ __all__ = [
     "Creep", "CreepRamp", "CreepStep", "CreepTable", "DisplacementStep", "DisturbanceHarmonic", "DisturbancePulse",
     "DisturbanceRamp", "DisturbanceStep", "DisturbanceTable", "Hold", "InjectionHarmonic", "InjectionPulse",
     "InjectionRamp", "InjectionStep", "InjectionTable", "LoadPointTable", "NormalStressHarmonic", "NormalStressPulse",
-    "NormalStressRamp", "NormalStressStep", "NormalStressTable", "Piece", "Protocol", "Segments", "SlideHoldSlide",
-    "VelocityHarmonic", "VelocityRamp", "VelocityStep", "evaluate", "pack",
+    "NormalStressRamp", "NormalStressStep", "NormalStressTable", "Piece", "Protocol", "SlideHoldSlide",
+    "VelocityHarmonic", "VelocityRamp", "VelocityStep",
 ]  # fmt: skip

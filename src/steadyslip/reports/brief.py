@@ -42,7 +42,7 @@ _BY_UNIT = {
     "m/s": "velocity v speed peak_velocity lowest_velocity velocities slip_rate",
     "m": "slip x displacement",
     "Pa": "normal_stress shear_stress spring_stress stress_drop lowest_normal_stress highest_normal_stress normal "
-    "shear stress_ratio",
+    "shear stress_ratio pore_pressure",
     "Pa/m": "critical_stiffness stable_stiffness critical_axial_stiffness k B1",
     "Pa s/m": "f S",
     "kg/m^2": "m",

@@ -9,7 +9,7 @@ import steadyslip as ss
 from explored_edges import Edges
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
 from steadyslip.core.format import typeset
-from steadyslip.verdict.causes import why_all, why_none
+from steadyslip.verdict.causes import why_always_stable, why_never_stable
 from steadyslip.verdict.words import headline
 
 BRISTLES = ss.laws.LuGre(
@@ -60,7 +60,7 @@ def in_python(own):
     found = ss.analyze(own)
     why = found.reason
     if found.stable is not None:
-        why = why.removesuffix(why_all(found) or ":").removesuffix(why_none(found) or ":")
+        why = why.removesuffix(why_always_stable(found) or ":").removesuffix(why_never_stable(found) or ":")
     else:  # the hint of a contact in its own terms
         why = why.partition(";")[0]
     return [

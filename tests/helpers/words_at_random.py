@@ -16,7 +16,7 @@ from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.laws.friction.law import State
 from steadyslip.laws.friction.normal_memory import NoMemory
 from steadyslip.linear.state_space import jacobian
-from steadyslip.verdict.causes import why_none
+from steadyslip.verdict.causes import why_never_stable
 
 V0 = 1e-6
 
@@ -215,7 +215,7 @@ def _causes(rig, verdict, text):
     """Reasons, by taking away what they name."""
     if "with this mass" in text:
         light = rig.with_values({"mass": 0.0})
-        if not rig.mass or "a disturbance grows at every stiffness" in why_none(ss.analyze(light)):
+        if not rig.mass or "a disturbance grows at every stiffness" in why_never_stable(ss.analyze(light)):
             yield "with this mass: without it as well"
         if not ss.stable_stiffness(light).size or np.all(np.isnan(ss.stable_stiffness(light))):
             yield "with this mass: nor is it stable without"

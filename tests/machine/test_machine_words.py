@@ -16,7 +16,7 @@ from steadyslip.motion.status import remedy
 from steadyslip.nonlinear import commands
 from steadyslip.nonlinear.kicks.kicks import OF_MACHINES
 from steadyslip.nonlinear.kicks.threshold import Threshold
-from steadyslip.verdict.words import survived
+from steadyslip.verdict.words import threshold_words
 
 PAD = brake(rate_state(1.0, -0.1, 1.0, mu=0.3))
 
@@ -40,7 +40,7 @@ def test_an_edge_of_steady_sliding_names_the_contact():
 def test_every_kick_of_a_machine_can_be_told(kick, size):
     at = "disc" if kick == "normal-force" else "pad"
     one = Threshold(PAD, kick, 1, size, (0.2, 0.4), 0.3, "N", "contact lost", 25.0, survived=0.2, at=at, contact="disc")
-    text = survived(one)
+    text = threshold_words(one)
     assert f" at {at}" in text
     assert ("more leads to contact lost at disc" in text) == (size == 0.3)
     assert "nan" not in text

@@ -10,7 +10,7 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS
-from steadyslip.verdict.holding import holding
+from steadyslip.verdict.support import support_stiffness
 from steadyslip.verdict.words import facts
 
 PAPER = ss.read_rig(Path(__file__).parents[2] / "examples" / "inclined-spring.toml")
@@ -48,11 +48,11 @@ def test_what_a_gain_alone_holds_is_told_of_the_gain():
     """In JSON too: `critical_stiffness` is of a spring beside it."""
     press = replace(PLAIN, stiffness=None, drive=ss.machine.PID(1e-6, kp=2e9), area=0.01)
     data = ss.analyze(press).to_dict()
-    held, (edge,) = data["held_by"], ss.boundary(press, "drive.kp")
-    assert (held["parameter"], held["value"], held["critical_side"]) == ("drive.kp", 2e9, "above")
-    assert held["critical"] == pytest.approx(edge.value, rel=1e-9)
-    assert held["total"] == pytest.approx(0.01 * edge.value, rel=1e-9)
-    assert data["critical_stiffness"] == pytest.approx(held["critical"] - 2e9, rel=1e-9)
+    support, (edge,) = data["held_by"], ss.boundary(press, "drive.kp")
+    assert (support["parameter"], support["value"], support["critical_side"]) == ("drive.kp", 2e9, "above")
+    assert support["critical"] == pytest.approx(edge.value, rel=1e-9)
+    assert support["total"] == pytest.approx(0.01 * edge.value, rel=1e-9)
+    assert data["critical_stiffness"] == pytest.approx(support["critical"] - 2e9, rel=1e-9)
     assert "held_by" not in ss.analyze(PLAIN).to_dict()
 
 
@@ -228,10 +228,10 @@ def test_a_gain_that_is_all_the_stiffness_is_what_is_said_to_be_stable(drive, ma
     """The same edges as those of a spring beside the gain, the gain added; none is lost below the gain."""
     rig = ss.Slider(friction=PLAIN.friction, contact=CONTACTS[contact], drive=drive, mass=mass)
     found = ss.analyze(rig)
-    held = holding(found)
-    assert (held.name, held.own, held.beside) == ("gain kp", 4e9, 0.0)
-    small = [end for pair in holding(ss.analyze(rig.with_values({"kp": 1.0}))).stable for end in pair]
-    assert [end for pair in held.stable for end in pair] == pytest.approx(small, rel=1e-9)
+    support = support_stiffness(found)
+    assert (support.name, support.own, support.beside) == ("gain kp", 4e9, 0.0)
+    small = [end for pair in support_stiffness(ss.analyze(rig.with_values({"kp": 1.0}))).stable for end in pair]
+    assert [end for pair in support.stable for end in pair] == pytest.approx(small, rel=1e-9)
     beyond = [max(end - 4e9, 0.0) for end in small if end > 4e9]
     assert [end for pair in found.stable_stiffness for end in pair if end] == pytest.approx(beyond, rel=1e-8)
     assert "stiffness" not in found.reason.partition(":")[0]

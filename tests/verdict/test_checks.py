@@ -136,8 +136,8 @@ def test_a_wrong_count_of_growing_roots_leaves_no_verdict(monkeypatch):
     point = operating_point(held)
     assert all(one.passed for one in spectrum_checks(point, False, False))
     assert [one.passed for one in spectrum_checks(point, True, False)] == [True, False]
-    good = numbers._of_polynomial
-    monkeypatch.setattr(numbers, "_of_polynomial", lambda values: good(values) | {"stable": True})
+    good = numbers._without_delay
+    monkeypatch.setattr(numbers, "_without_delay", lambda values: good(values) | {"stable": True})
     analysis = ss.analyze(held)
     assert analysis.stable is None
     assert analysis.reason.startswith("not decided: growing roots")

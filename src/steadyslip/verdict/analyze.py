@@ -1,4 +1,4 @@
-"""Is steady sliding stable, what would make it, how far is the edge: the numbers of the verdict."""
+"""`analyze`: steady sliding of a rig, its stability, critical stiffness, margins and onset, as one `Analysis`."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
 
 
 def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | None:
-    """Kind of onset at the oscillatory edge in stiffness (or gain kp) nearest to the rig's own."""
+    """Onset at the oscillatory edge nearest to the rig's stiffness (or gain kp); None without such an edge."""
     name = parameter_along(rig, "slider.stiffness")
     for margin in distances:
         if margin.parameter == name:
@@ -172,12 +172,12 @@ def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold,
 
 
 def numbers_of(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
-    """Everything that follows from the characteristic polynomial, the stable set in k included."""
+    """Fields of `Analysis` that follow from the characteristic equation and from the stable set in stiffness."""
     return linear_numbers(values) | _stiffness_numbers(rig, values)
 
 
 def _stiffness_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
-    """The stable set in k and its edge nearest to the rig's own stiffness."""
+    """Fields of `Analysis` on stiffness: stable intervals (Pa/m) and the edge nearest to the rig's own stiffness."""
     try:
         found = set_of_one(values)
     except NotAvailable:  # a delay makes windows without end
@@ -200,7 +200,7 @@ def _stiffness_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
 def _warnings(
     rig: Slider, values: OperatingPoint, states: tuple[SteadySliding, ...], on_the_edge: bool
 ) -> tuple[str, ...]:
-    """What a reader must know beside the verdict."""
+    """Warnings: on an edge, several steady states, no memory in the friction law, friction that is not positive."""
     found = []
     if on_the_edge:
         found.append("the rig is on the edge of stability to within rounding; neither verdict should be relied on")

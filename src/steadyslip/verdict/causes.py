@@ -1,7 +1,7 @@
-"""Why sliding is stable at every stiffness, at none, or ill-posed: which condition of stability decides (theory 3).
+"""Sentences that explain stability at every stiffness, at none, or ill-posed equations (theory 3).
 
-With one memory variable the conditions are a3 >= 0, a2 > 0, a0 > 0 and D k > N, all but a2 and a3 linear in k; each
-sentence here is said only where its condition decides alone.
+With one memory variable the conditions of stability are a3 >= 0, a2 > 0, a0 > 0 and D k > N; a0 and D k > N are linear
+in the stiffness k, a2 and a3 do not contain it. A sentence is returned only where one condition alone decides.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ if TYPE_CHECKING:
 
 
 def _response(analysis: Findings) -> Response | None:
-    """Numbers of the closed form at the branch judged; None where there are several memory variables or none."""
+    """Coefficients of the closed form for `analysis.branch`; None unless the law has exactly one memory variable."""
     point = operating_point(analysis.rig, branch=analysis.branch)
     return response_numbers(point) if has_closed_form(point.model) else None
 
 
 @quietly
-def why_all(analysis: Findings) -> str:
-    """The plain cause of stability at every stiffness, where there is one."""
+def why_always_stable(analysis: Findings) -> str:
+    """Clause that explains stability at every stiffness; empty where no single condition explains it."""
     known = _response(analysis)
     if known is None or known.B3 != 0:
         return ""
     slope = known.S + known.mu * known.B1  # of the resistance in steady sliding, its normal stress included
     if slope < 0:
         return ""
-    parts = [word for word, there in (("dampings", _damped(analysis)), ("normal stress", known.B1 != 0)) if there]
+    parts = [word for word, is_in in (("dampings", _has_damping(analysis)), ("normal stress", known.B1 != 0)) if is_in]
     with_all = f" ({' and '.join(parts)} included)" if parts else ""
     return f": the resistance to steady sliding{with_all} {'rises' if slope > 0 else 'does not fall'} with velocity"
 
 
-def _damped(analysis: Findings) -> bool:
+def _has_damping(analysis: Findings) -> bool:
     rig = analysis.rig
     return bool(rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
 @quietly
-def why_none(analysis: Findings) -> str:
-    """Which condition of stability rules out every stiffness, where that can be told."""
+def why_never_stable(analysis: Findings) -> str:
+    """Clause that names the condition which no stiffness meets; empty where no single condition explains it."""
     known = _response(analysis)
     if known is None:
         return _why_none_in_general(analysis)
@@ -69,12 +69,15 @@ def why_none(analysis: Findings) -> str:
 
 
 def _reachable(slope: float, right: float, least: float) -> bool:
-    """Whether slope k > right for some k > least."""
+    """True if slope k > right for some k > least."""
     return slope > 0 or slope * least > right or (slope == 0 and right < 0)
 
 
 def _why_negative(known: Response, denominator: float) -> str:
-    """Which of its terms makes D negative: D = (f + f1 B1)(1 + f1 B2) + r (μ − f1)(B0 − m B2)."""
+    """Clause that names the term which makes D negative; empty unless D < 0.
+
+    D = (f + f1 B1)(1 + f1 B2) + r (μ − f1)(B0 − m B2) is the `denominator` of the critical stiffness.
+    """
     coupling, memory = 1 + known.f1 * known.B2, known.r * (known.mu - known.f1)
     direct = known.f + known.f1 * known.B1
     if denominator >= 0:
@@ -104,26 +107,26 @@ ILL_POSED = (
     "the equations are ill-posed: friction, directly or by way of the normal stress, falls at once by more than "
     "mass, direct effect and dampings provide, so any small lag grows at once"
 )
-"""What holds of every slider whose equations are ill-posed without a delay."""
+"""Reason given for a slider that is ill-posed without a delay, whatever the term that causes it."""
 
-LATE = (
+DELAY_IS_ILL_POSED = (
     "the equations are ill-posed: on a body without mass, what follows velocity late (by {delays}) outweighs what "
     "follows it at once, so that ever faster oscillations grow; give that body a mass, or make what acts late smaller "
     "than the damping that acts at once"
 )
-"""What is said where a delay makes the equations ill-posed."""
+"""Reason given for a rig that a delay makes ill-posed; {delays} are dotted parameter names."""
 
 
-def why_late(point: OperatingPoint) -> str:
-    """That delays make the equations of a single rig ill-posed; empty where they do not."""
+def why_delay_is_ill_posed(point: OperatingPoint) -> str:
+    """Sentence that names the delays which make a single rig ill-posed; empty where none does."""
     delays = outweighing_delays(point)
-    return LATE.format(delays=" and ".join(delays)) if delays else ""
+    return DELAY_IS_ILL_POSED.format(delays=" and ".join(delays)) if delays else ""
 
 
 @quietly
 def why_ill_posed(analysis: Findings) -> str:
-    """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
-    late = why_late(operating_point(analysis.rig, branch=analysis.branch))
+    """Sentence that explains why the equations are ill-posed: a delay, the effective mass, friction or the contact."""
+    late = why_delay_is_ill_posed(operating_point(analysis.rig, branch=analysis.branch))
     if late:
         return late
     known = _response(analysis)

@@ -1,9 +1,11 @@
-"""A second, independent question behind every number of a verdict, and what came of it.
+"""Checks of every number of a verdict by a second, independent computation.
 
-Steady sliding is asked whether the laws themselves, given its numbers, leave forces and memory at rest; eigenvalues
-whether the rig's own matrix is singular there, and their number of the argument of its determinant; edges whether small
-disturbances grow on one side and die on the other; the critical stiffness whether a root lies on the axis there. What
-fails is left out, and said in words that begin with ``not decided``.
+- Steady sliding: the laws themselves, evaluated at its numbers, leave forces in balance and memory at rest.
+- Eigenvalues: the rig's characteristic matrix is singular there; the argument principle finds as many that grow.
+- Edges: small disturbances grow on one side and decay on the other.
+- Critical stiffness: a root lies on the imaginary axis there.
+
+A number that fails is left out of the verdict; the text about it begins with ``not decided``.
 """
 
 from __future__ import annotations
@@ -33,27 +35,30 @@ from steadyslip.model.sliding import SteadyMachine
 
 Array = NDArray[np.float64]
 
-BALANCED = 1e-8
-"""Share of stresses, and of the rates of memory that are e-folds away, by which a balance may be missed."""
-BESIDE = (1e-7, 1e-5, 1e-9)
-"""Shares of an edge's value at which both of its sides are looked at, until they differ as the edge says."""
-ON_AXIS = 1e-6
-"""Share of its size by which a root may miss the axis at the critical stiffness."""
+BALANCE_TOLERANCE = 1e-8
+"""Allowed residual of steady sliding: of a stress relative to that stress, of a memory rate relative to its change
+with an e-fold of velocity, stress or memory. Chosen by trial: above rounding, below the effect of a wrong number."""
+SIDE_OFFSETS = (1e-7, 1e-5, 1e-9)
+"""Distances from an edge, relative to its value, at which both sides are checked, in this order, until they agree with
+the edge. Chosen by trial: too near, rounding decides; too far, another edge lies between."""
+AXIS_TOLERANCE = 1e-6
+"""Allowed distance of a root from the imaginary axis at the critical stiffness, relative to the size of the root.
+Chosen by trial, as `GOOD` is."""
 
-_DECIDING = ("steady sliding", "growing roots")  # without which there is no verdict
-_STEP = 1e-3  # of the logarithms of velocity, stress and memory, whose effect on its rates says how large these are
-_ZERO = 1e-9  # of the largest root: what a root of zero, which has no share of its own, may be by rounding
+_DECIDING = ("steady sliding", "growing roots")  # checks that must pass for a verdict
+_STEP = 1e-3  # change of ln velocity, ln stress and ln memory by which the typical size of a memory rate is found
+_ZERO = 1e-9  # size of a root relative to the largest below which it counts as zero (rounding)
 
 
 def verdict_checks(
     rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool, steady: SteadyMachine | None = None
 ) -> tuple[Check, ...]:
-    """What the verdict itself rests on: steady sliding (of a machine as it is told), eigenvalues and how many grow."""
+    """Checks of steady sliding, of the eigenvalues and of how many grow; `steady` are a machine's printed forces."""
     return (steady_check(rig, point, steady), *spectrum_checks(point, stable, on_edge))
 
 
 def undecided(checks: Sequence[Check]) -> str:
-    """Why there is no verdict; empty where there is one."""
+    """Text that names the failed checks without which there is no verdict; empty where these passed."""
     failed = [str(one) for one in checks if not one.passed and one.what in _DECIDING]
     return UNDECIDED + "; ".join(failed) if failed else ""
 
@@ -62,27 +67,27 @@ def undecided(checks: Sequence[Check]) -> str:
 
 
 def steady_check(rig: Rig, point: OperatingPoint, steady: SteadyMachine | None = None) -> Check:
-    """Whether the laws, given the numbers of steady sliding, leave forces and memory as they are, and bodies too."""
+    """Check that the laws, evaluated at steady sliding, give its stresses and constant memory, and bodies balance."""
     frictions = (
         [rig.contacts[contact.name].friction for contact in point.model.contacts]
         if isinstance(rig, Machine)
         else [rig.friction]  # type: ignore[attr-defined]
     )
     numbers = [float(one) for one in point.evaluate(_steady_numbers(point.model))]
-    missed = []
+    residuals = []
     for contact, law, sigma in zip(point.model.contacts, frictions, point.sigmas, strict=True):
         velocity, friction, normal, *memory = (numbers.pop(0) for _ in range(3 + len(contact.memory)))
-        missed.append(abs(normal - float(sigma)) / float(sigma))
-        missed += _missed_by_law(law, velocity, float(sigma), tuple(memory), friction)
-    missed += [] if steady is None else net_forces(rig, steady).values()
+        residuals.append(abs(normal - float(sigma)) / float(sigma))
+        residuals += _law_residuals(law, velocity, float(sigma), tuple(memory), friction)
+    residuals += [] if steady is None else net_forces(rig, steady).values()
     how = "forces and memory by the laws" + ("" if steady is None else ", forces on bodies added up")
-    return check("steady sliding", how, max(missed), BALANCED)
+    return check("steady sliding", how, max(residuals), BALANCE_TOLERANCE)
 
 
 def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
-    """Sum of the forces of links and contacts on every coordinate, as a share of the largest of them.
+    """Sum of forces of links and contacts on each coordinate, by name, relative to the largest force on it.
 
-    Left out are coordinates on which a controller acts: its force is not told, it is what is left.
+    Coordinates on which a controller acts are left out: `steady` does not contain its force.
     """
     mechanism = rig.mechanism()
     links = [one for one in mechanism.elements if one.name]
@@ -104,7 +109,7 @@ def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
 
 @question
 def _steady_numbers(model: Model) -> ArrayFunction:
-    """Of every contact velocity, friction stress, normal stress as the contact makes it, and memory."""
+    """Function that gives for each contact velocity, friction stress, normal stress by its contact law, and memory."""
     found = []
     for contact in model.contacts:
         found += [model.steady[contact.velocity], model.steady[contact.friction], contact.steady_stress]
@@ -112,12 +117,14 @@ def _steady_numbers(model: Model) -> ArrayFunction:
     return model.function(found)
 
 
-def _missed_by_law(
+def _law_residuals(
     law: FrictionLaw, velocity: float, sigma: float, memory: tuple[float, ...], friction: float
 ) -> Iterator[float]:
-    """Shares by which a law misses a friction stress, and by which its memory does not rest."""
+    """Relative residuals of a friction law in steady sliding: of its stress, then of the rate of each memory."""
     v, s = abs(velocity), sp.Float(sigma)
-    yield abs(float(law.strength(sp.Float(v), s, memory, friction)) - friction) / max(abs(friction), sigma * BALANCED)
+    yield abs(float(law.strength(sp.Float(v), s, memory, friction)) - friction) / max(
+        abs(friction), sigma * BALANCE_TOLERANCE
+    )
     trials = ((1, 1, 1), (1 + _STEP, 1, 1), (1, 1 + _STEP, 1), (1, 1, 1 + _STEP))
     rest, *others = (
         np.array([float(rate) for rate in law.rates(sp.Float(v * a), s * b, tuple(c * m for m in memory), friction)])
@@ -131,37 +138,38 @@ def _missed_by_law(
 # -- eigenvalues
 
 
-def shares_of_errors(point: OperatingPoint) -> tuple[Array, NDArray[np.bool_]]:
-    """Of every eigenvalue the error as a share of it, and whether it is told.
+def relative_errors(point: OperatingPoint) -> tuple[Array, NDArray[np.bool_]]:
+    """Relative error of each eigenvalue, and True where it is good enough for the verdict; both (n,).
 
-    One of several that meet is told with its error, which is larger; so is one of zero, which has no share of its own.
+    Eigenvalues that nearly coincide, or are zero, may have larger relative errors and still be reported, provided
+    that the whole spectrum is decided.
     """
     found = checked_spectrum(point)
     size = np.abs(found.values)
     zero = np.where(size <= found.errors, _ZERO * np.max(size, initial=0.0), 0.0)
     with np.errstate(all="ignore"):
         share = found.errors / np.maximum(size, zero)
-        if is_neutral(point):  # the coefficient that vanishes says so better than any matrix
+        if is_neutral(point):  # a vanishing static stiffness proves a zero root better than any matrix does
             share[size <= _ZERO * np.max(size, initial=0.0)] = 0.0
     return share, (share <= GOOD) | np.full(share.shape, found.decided)
 
 
 def spectrum_checks(point: OperatingPoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
-    """Of eigenvalues and of how many grow; none where the equations are ill-posed."""
+    """Checks of the eigenvalues and of how many grow; none where the equations are ill-posed."""
     if is_ill_posed(point):
         return ()
-    found, (share, good) = checked_spectrum(point), shares_of_errors(point)
+    found, (share, good) = checked_spectrum(point), relative_errors(point)
     worst = float(np.max(share, initial=0.0)) if len(share) else math.inf
     values = check("eigenvalues", "least singular value of the rig's own matrix", worst, max(GOOD, worst * all(good)))
     how, growing = "argument along the imaginary axis", found.growing
-    if growing < 0 and len(share) and not point.model.delays:  # sizes at which that leaves floating point
+    if growing < 0 and len(share) and not point.model.delays:  # the argument left the range of floating point
         how, growing = "conditions of Routh and Hurwitz", int(np.sum(found.values.real > 0))
     right = growing >= 0 and (on_edge or (growing == 0) == stable)
     return values, Check("growing roots", how, float(not right), 0.0, right)
 
 
 def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Check:
-    """Whether a root of the rig with its critical stiffness lies on the imaginary axis at its frequency (rad/s)."""
+    """Check that a root lies at i `beta` (rad/s) when the rig has the given critical `stiffness` (Pa/m)."""
     place = list(point.model.parameters).index("slider.stiffness")
     arguments = [stiffness if i == place else value for i, value in enumerate(point.arguments)]
     with np.errstate(all="ignore"):
@@ -169,60 +177,65 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
         s = s[np.isfinite(s)]
         size = beta or float(np.exp(np.mean(np.log(np.maximum(np.sort(np.abs(s))[1:], 1e-300))))) or 1.0
         missed = np.min(np.abs(s - 1j * beta), initial=np.inf) / size
-    return check("critical stiffness", "a root on the imaginary axis", float(missed), ON_AXIS)
+    return check("critical stiffness", "a root on the imaginary axis", float(missed), AXIS_TOLERANCE)
 
 
 # -- edges
 
 
 def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Of every edge whether both sides are as it says; and the margins without edges that are not."""
+    """Margins without the edges that fail their check, and one check per edge: roots on both sides of it."""
     edges = [(margin, edge) for margin in margins for edge in margin.edges]
     if not edges:
         return tuple(margins), ()
     shares = np.full(len(edges), np.inf)
-    for share in BESIDE:
+    for share in SIDE_OFFSETS:
         rest = np.flatnonzero(np.isinf(shares))
         if rest.size:
             sides = _sides(rig, [edges[i] for i in rest], share, branch)
             shares[rest] = [
-                share if _as_said(edges[i][1], *pair) else np.inf for i, pair in zip(rest, sides, strict=True)
+                share if _sides_agree(edges[i][1], *pair) else np.inf for i, pair in zip(rest, sides, strict=True)
             ]
     lost = np.flatnonzero(np.isinf(shares))
     touching = dict(zip(lost.tolist(), _touching(rig, [edges[i] for i in lost], branch), strict=True))
     checks = []
     for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
         where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
-        if touching.get(i, np.inf) <= ON_AXIS:
+        if touching.get(i, np.inf) <= AXIS_TOLERANCE:
             what, how = f"{edge.parameter} touches an edge at {where}", "a root on the imaginary axis, sides alike"
-            checks.append(check(what, how, touching[i], ON_AXIS))
+            checks.append(check(what, how, touching[i], AXIS_TOLERANCE))
         else:
-            checks.append(check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, max(BESIDE)))
+            checks.append(
+                check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, max(SIDE_OFFSETS))
+            )
     return without_edges(margins, [edges[i][1] for i in lost]), tuple(checks)
 
 
 def _touching(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], branch: int) -> Array:
-    """Of each edge by what share of its size the rightmost root misses the axis there; inf where sides differ."""
+    """Distance of the rightmost root from the imaginary axis at each edge, relative to its size, (n,).
+
+    inf where the two sides of the edge differ in status: only an edge with equal sides merely touches the axis.
+    """
     if not edges:
         return np.empty(0)
-    sides = np.array(_sides(rig, edges, max(BESIDE), branch))
+    sides = np.array(_sides(rig, edges, max(SIDE_OFFSETS), branch))
     alike = (sides[:, 0] == sides[:, 1]) & np.isin(sides[:, 0], (STABLE, UNSTABLE))
     with np.errstate(all="ignore"):
-        roots = spectrum(_beside(rig, edges, 0.0, branch)).reshape(2, len(edges), -1)[0]
+        roots = spectrum(_rigs_beside(rig, edges, 0.0, branch)).reshape(2, len(edges), -1)[0]
         real = np.where(np.isnan(roots.real), -np.inf, roots.real)
         least = np.take_along_axis(roots, np.argmax(real, axis=-1)[:, None], axis=-1)[:, 0]
         return np.where(alike, np.abs(least.real) / np.abs(least), np.inf)
 
 
 def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> list[list[int]]:
-    """Of each edge the status below and above, a share of its value away; one question for all."""
+    """Status below and above each edge, at `share` times its value from it; shape (n, 2)."""
     with np.errstate(all="ignore"):
-        found = _by_roots(_beside(rig, edges, share, branch)).reshape(2, len(edges))
+        found = _status_by_roots(_rigs_beside(rig, edges, share, branch)).reshape(2, len(edges))
     return [[int(one) for one in pair] for pair in found.T]
 
 
-def _beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> OperatingPoint:
-    """The rigs a share of the value of each edge below it, and those above, (2 n,)."""
+def _rigs_beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> OperatingPoint:
+    """Operating points `share` times the value of each of n edges below it, then those above, shape (2 n,)."""
     values = np.array([edge.value for _, edge in edges])
     sizes = np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
     beside = values + share * sizes * np.array([[-1.0], [1.0]])
@@ -236,16 +249,16 @@ def _beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, br
     return operating_point(rig, vary, present_zeros(rig), branch, scan=True)
 
 
-def _as_said(edge: Boundary, below: int, above: int) -> bool:
-    """Whether the sides of an edge are as it says."""
+def _sides_agree(edge: Boundary, below: int, above: int) -> bool:
+    """True if the status below and above an edge agrees with its field `stable`."""
     if UNKNOWN in (below, above):
         return False
     stable = {"above": (below != STABLE and above == STABLE), "below": (below == STABLE and above != STABLE)}
     return stable.get(edge.stable, {below, above} == {ABSENT, UNSTABLE})
 
 
-def _by_roots(point: OperatingPoint) -> NDArray[np.int64]:
-    """The status of rigs by their eigenvalues, (n,), where scans go by the conditions of Routh and Hurwitz."""
+def _status_by_roots(point: OperatingPoint) -> NDArray[np.int64]:
+    """Status of rigs from their eigenvalues, (n,); independent of the Routh-Hurwitz conditions that scans use."""
     if point.model.delays:
         grows = unstable_roots(point) != 0
     else:

@@ -1,4 +1,4 @@
-"""An Analysis as plain data."""
+"""Verdicts as JSON-ready data: dicts, lists, numbers, text and None, in SI units."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.areas import total
 from steadyslip.core.checks import as_data
-from steadyslip.verdict.holding import holding
+from steadyslip.verdict.support import support_stiffness
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -18,7 +18,7 @@ _LAST = ("boundaries", "warnings", "checked", "checks")
 
 
 def as_dict(analysis: Findings) -> dict[str, Any]:
-    """SI units per unit area; numbers that do not exist, and infinite ones, are None."""
+    """Verdict on a slider as JSON-ready dict, SI units per unit area; NaN and infinite numbers become None."""
     steady = analysis.steady
     common = common_numbers(analysis)
     data: dict[str, Any] = {
@@ -51,25 +51,28 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
 
 
 def _held_by(analysis: Findings) -> dict[str, Any]:
-    """Of a rig that a gain alone holds, that gain: what is said of a stiffness is then of a spring beside it."""
+    """Row ``held_by`` for a slider that a controller gain supports without a spring; empty otherwise.
+
+    The critical and stable stiffnesses of the verdict then refer to a spring added beside that gain.
+    """
     name = analysis.rig.gain_name()
-    held = None if name is None or analysis.steady is None else holding(analysis)
-    if held is None or held.name == "stiffness":
+    support = None if name is None or analysis.steady is None else support_stiffness(analysis)
+    if support is None or support.name == "stiffness":
         return {}
     return {
         "held_by": {
             "parameter": name,
-            "value": held.own,
-            "critical": held.critical,
-            "critical_side": held.side,
-            "stable": [[low, high] for low, high in held.stable],
+            "value": support.own,
+            "critical": support.critical,
+            "critical_side": support.side,
+            "stable": [[low, high] for low, high in support.stable],
         }
-        | total(held.critical, "Pa/m", analysis.rig.area)
+        | total(support.critical, "Pa/m", analysis.rig.area)
     }
 
 
 def common_numbers(found: Verdict) -> dict[str, Any]:
-    """What sliders and machines have alike."""
+    """Entries that the verdicts on sliders and on machines have in common, as a dict; the order is that of the JSON."""
     late = {
         "characteristic_terms": [{"delay": h, "coefficients": list(c)} for h, c in found.characteristic_terms],
         "unstable_roots": found.unstable_roots,
@@ -95,7 +98,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
 
 
 def onset_dict(onset: Onset) -> dict[str, Any]:
-    """Plain data of an onset; of a machine with the contact to which amplitudes refer."""
+    """Onset as JSON-ready dict; for a machine ``contact`` names the contact to which amplitudes refer."""
     own = {"contact": onset.contact} if onset.contact else {}
     return {
         "kind": onset.kind,
@@ -112,7 +115,7 @@ def onset_dict(onset: Onset) -> dict[str, Any]:
 
 
 def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
-    """One row an edge; distances are from the rig's own value; with an area, totals stand beside."""
+    """One dict per edge of a parameter; with an `area` (m²) totals are added to stresses (N beside Pa)."""
     return [
         {
             "parameter": edge.parameter,
@@ -146,7 +149,7 @@ def _forces(analysis: Findings, area: float) -> dict[str, Any]:
 
 
 def finite(data: Any) -> Any:
-    """Plain data with None for numbers that do not exist, and infinite ones."""
+    """Copy of nested dicts and lists in which NaN and infinite floats are None; tuples become lists."""
     if isinstance(data, dict):
         return {name: finite(one) for name, one in data.items()}
     if isinstance(data, (list, tuple)):

@@ -1,4 +1,4 @@
-"""What an analysis finds, as data: what words, causes and plain data are made of."""
+"""Results of an analysis as frozen data classes, from which texts and JSON are made."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Verdict(Displayed):
-    """What is said of sliders and machines alike: whether sliding is stable, what disturbances do, where edges are."""
+    """Fields that verdicts on sliders and on machines have in common: stability, eigenvalues, margins, checks."""
 
     rig: Rig
     stable: bool | None
@@ -45,7 +45,7 @@ class Verdict(Displayed):
 
     @property
     def boundaries(self) -> tuple[Boundary, ...]:
-        """Every edge found, parameter by parameter."""
+        """All edges of stability that were found, parameter by parameter."""
         return tuple(edge for margin in self.margins for edge in margin.edges)
 
 

@@ -1,4 +1,4 @@
-"""The verdict on a machine: numbers, words, plain data."""
+"""`analyze_machine`: the verdict on a machine, its text and its JSON-ready data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.sliding import SteadyMachine, steady_machine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
-from steadyslip.verdict.causes import why_late
+from steadyslip.verdict.causes import why_delay_is_ill_posed
 from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, finite, onset_dict
 from steadyslip.verdict.findings import MachineFindings
@@ -33,10 +33,10 @@ from steadyslip.verdict.words import (
     beyond,
     disturbance,
     headline,
-    lines_of,
     margin_table,
     onset_words,
-    survived,
+    threshold_words,
+    verdict_text,
 )
 
 if TYPE_CHECKING:
@@ -66,26 +66,25 @@ class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
         return linear_formula(self.rig, along)
 
     def __str__(self) -> str:
-        return lines_of(self, machine_facts(self), margin_table(self), machine_meaning(self))
+        return verdict_text(self, machine_facts(self), margin_table(self), machine_meaning(self))
 
     def __repr__(self) -> str:
         return f"<MachineAnalysis: {headline(self)}; print it for the whole verdict>"
 
 
 def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
-    """What is known of steady sliding, its disturbances and the leading mode: name and words."""
+    """Rows (label, text) on steady sliding, small disturbances, leading mode, onset and kicks of a machine."""
     rows = [("steady sliding", _sliding(found.steady)), ("a disturbance", disturbance(found))] if found.steady else []
     rows += [("the mode", found.mode.words())] if found.mode else []
     rows += [("onset", onset_words(found.onset))] if found.onset else []
-    return rows + [("a kick", survived(kick)) for kick in found.kicks]
+    return rows + [("a kick", threshold_words(kick)) for kick in found.kicks]
 
 
 def machine_meaning(found: MachineAnalysis) -> list[str]:
-    """What the verdict does not say."""
-    return [_MEANING] if found.stable and not found.on_edge else []
-
-
-_MEANING = "Stable means: small disturbances die out. A large enough kick may still start an oscillation."
+    """Lines on the limits of a verdict "stable"; empty for other verdicts."""
+    if not found.stable or found.on_edge:
+        return []
+    return ["Stable means: small disturbances die out. A large enough kick may still start an oscillation."]
 
 
 def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnalysis:
@@ -129,13 +128,13 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
 
 
 def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:
-    """What happens at the oscillatory edge that is nearest, of all parameters."""
+    """Onset at the nearest oscillatory edge of all parameters; None without one."""
     nearest = oscillatory_edge(distances)
     return None if nearest is None else onset_at(machine, nearest)
 
 
 def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
-    """Those that are not survived, from words such as ``force at table``."""
+    """Thresholds of kicks given as text such as ``force at table``."""
     if not kinds:
         return ()
     from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
@@ -158,13 +157,13 @@ PHRASES = {
     "stable": "it is stable",
     **BEYOND,
 }
-"""What is said of machines; pages say it in the same words."""
+"""Phrases of which reasons of machines are made; the keys are used by pages too."""
 
 
 def _reason(found: MachineAnalysis) -> str:
-    """What grows, or how near the nearest edge is, in one sentence."""
+    """Sentence that explains a machine's verdict: what grows, and the nearest edge of all parameters."""
     if found.growth_rate == math.inf:
-        return why_late(operating_point(found.rig)) or PHRASES["are ill-posed"]
+        return why_delay_is_ill_posed(operating_point(found.rig)) or PHRASES["are ill-posed"]
     if found.on_edge:
         return PHRASES["on edge"]
     first = next((one for one in found.margins if one.edge is not None), None)
@@ -175,7 +174,7 @@ def _reason(found: MachineAnalysis) -> str:
 
 
 def _nearest(found: MachineAnalysis, margin: Margin) -> str:
-    """The nearest edge of all in words."""
+    """Clause on the nearest edge of a parameter: side, value and what happens beyond it."""
     edge = margin.edge
     if edge is None:
         return ""
@@ -197,7 +196,7 @@ def _sliding(steady: SteadyMachine | None) -> str:
 
 
 def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
-    """What a reader must know beside the verdict."""
+    """Warnings: contacts whose friction is not positive, and contacts whose friction law has no memory."""
     pulled = [name for name, one in steady.contacts.items() if one.friction <= 0]
     found = tuple(
         f"the friction coefficient of contact {name} is not positive in steady sliding; check level and velocity"
@@ -216,7 +215,7 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
 
 
 def as_dict(found: MachineAnalysis) -> dict[str, Any]:
-    """SI units, forces; numbers that do not exist, and infinite ones, are None."""
+    """Verdict on a machine as JSON-ready dict, SI units with forces in N; NaN and infinite numbers become None."""
     data: dict[str, Any] = common_numbers(found) | {
         "steady": _steady(found.steady), "mode": _mode(found.mode),
         "onset": None if found.onset is None else onset_dict(found.onset),

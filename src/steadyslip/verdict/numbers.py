@@ -1,4 +1,4 @@
-"""What follows from a characteristic polynomial, as the fields of a verdict."""
+"""Fields of a verdict that follow from the characteristic equation: eigenvalues, Routh array, period, damping."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
-from steadyslip.verdict.checks import shares_of_errors
+from steadyslip.verdict.checks import relative_errors
 
 
-def _of_polynomial(values: OperatingPoint) -> dict[str, Any]:
+def _without_delay(values: OperatingPoint) -> dict[str, Any]:
+    """Fields of a rig whose characteristic equation is a polynomial."""
     c = characteristic(values)
     bad = bool(ill_posed(c))
     while len(c) > 2 and c[-1] == 0:
@@ -30,8 +31,8 @@ def _of_polynomial(values: OperatingPoint) -> dict[str, Any]:
     }
 
 
-def _of_sum(values: OperatingPoint) -> dict[str, Any]:
-    """With delays: no polynomial, but a sum of some."""
+def _with_delays(values: OperatingPoint) -> dict[str, Any]:
+    """Fields of a rig with delays, whose characteristic equation is a sum of polynomials times exp(−s delay)."""
     c, h = quasipolynomial(values)
     count = int(unstable_roots(values))
     return {
@@ -45,14 +46,14 @@ def _of_sum(values: OperatingPoint) -> dict[str, Any]:
 
 
 def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
-    """Everything that follows from the characteristic polynomial; without eigenvalues that fail their check."""
+    """Fields of a verdict by name, from the characteristic equation; eigenvalues that fail their check are left out."""
     require_range(values)
-    numbers = _of_sum(values) if values.model.delays else _of_polynomial(values)
+    numbers = _with_delays(values) if values.model.delays else _without_delay(values)
     bad = bool(is_ill_posed(values))
     if not bad:
-        found, good = checked_spectrum(values), shares_of_errors(values)[1]
-        if found.refined and found.complete:  # with many digits
-            numbers["stable"] = bool(found.growing == 0 and np.all(found.values != 0))  # one of zero is neutral
+        found, good = checked_spectrum(values), relative_errors(values)[1]
+        if found.refined and found.complete:  # eigenvalues computed with many digits overrule the polynomial
+            numbers["stable"] = bool(found.growing == 0 and np.all(found.values != 0))  # eigenvalue 0: neutral
         leading = bool(good[:1].all() and good.size)
         numbers["eigenvalues"] = tuple(complex(s) for s in found.values[good]) if leading else ()
     eigenvalues = numbers["eigenvalues"]

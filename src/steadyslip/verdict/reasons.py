@@ -1,4 +1,4 @@
-"""Why a rig is stable, unstable or on the edge, in one sentence; pages fill the same phrases."""
+"""The reason of a verdict on a slider, in one sentence; browser pages fill the phrases of `REASONS` themselves."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from steadyslip.core.format import format_quantity
-from steadyslip.verdict.causes import ILL_POSED, why_all, why_ill_posed, why_none
-from steadyslip.verdict.holding import gain_words, holding
+from steadyslip.verdict.causes import ILL_POSED, why_always_stable, why_ill_posed, why_never_stable
+from steadyslip.verdict.support import gain_words, support_stiffness
 
 if TYPE_CHECKING:
     from steadyslip.machine.slider import Slider
     from steadyslip.verdict.findings import Findings
 
-NEXT_TO_IT = 1e-6  # change of a parameter that only its weak effect sets apart from the edge that the rig is on
+# Relative distance below which an edge counts as the one that the rig is on. Rounding of the growth rate moves an edge
+# further in a parameter of weak effect, so this is wider than rounding; chosen by trial, wider would merge two edges.
+NEXT_TO_IT = 1e-6
 
 ON_EDGE = "neither verdict should be relied on: the least change of a number decides"
-"""What holds on every edge, of machines too."""
+"""Reason given for a slider or machine on an edge of stability."""
 
 REASONS = {
     "are ill-posed": ILL_POSED,
@@ -35,47 +37,51 @@ REASONS = {
     "one edge": ", {side} which sliding is stable",
     "several": ", the nearest edge of the stable set",
 }
-"""Of sliders; `page_reasons` hands them to pages, which fill them with numbers of their own."""
+"""Phrases of which reasons of sliders are made; the keys are used by pages too (`page_reasons`)."""
 
 
 def reason(analysis: Findings) -> str:
-    """Why, in one sentence."""
+    """Sentence that explains a slider's verdict, with its stiffness over the critical one where there is one."""
     if analysis.growth_rate == math.inf:
         return why_ill_posed(analysis)
-    held = holding(analysis)
-    own = held.own + held.beside
+    support = support_stiffness(analysis)
+    own = support.own + support.beside
     if analysis.on_edge and own == 0 and 0 in analysis.eigenvalues:
         return REASONS["free"]
-    ratio = math.nan if held.critical is None else own / (held.critical + held.beside)
+    ratio = math.nan if support.critical is None else own / (support.critical + support.beside)
     if analysis.on_edge and not abs(ratio - 1) <= NEXT_TO_IT:  # on another edge than that of the stiffness
         return ON_EDGE
-    if held.critical is None:
-        if not held.stable:
-            return REASONS["never"].format(name=held.name) + why_none(analysis)
-        return REASONS["beside"] if held.beside else REASONS["always"].format(name=held.name) + why_all(analysis)
-    which = "together" if held.beside and held.own else "stiffness" if held.name == "stiffness" else "gain"
+    if support.critical is None:
+        if not support.stable:
+            return REASONS["never"].format(name=support.name) + why_never_stable(analysis)
+        return (
+            REASONS["beside"]
+            if support.beside
+            else REASONS["always"].format(name=support.name) + why_always_stable(analysis)
+        )
+    which = "together" if support.beside and support.own else "stiffness" if support.name == "stiffness" else "gain"
     text = REASONS[which].format(
-        name=held.gain,
+        name=support.gain,
         own=in_stiffness(analysis, own),
         ratio=REASONS["at it"] if analysis.on_edge else REASONS["times"].format(many=_many(ratio)),
-        critical=in_stiffness(analysis, held.critical + held.beside),
+        critical=in_stiffness(analysis, support.critical + support.beside),
     )
-    alone = held.stable == ((held.critical, math.inf) if held.side == "above" else (0.0, held.critical),)
-    text += REASONS["one edge"].format(side=held.side) if alone else REASONS["several"]
+    alone = support.stable == ((support.critical, math.inf) if support.side == "above" else (0.0, support.critical),)
+    text += REASONS["one edge"].format(side=support.side) if alone else REASONS["several"]
     return f"{text}; {ON_EDGE}" if analysis.on_edge else text
 
 
 def page_reasons(rig: Slider) -> dict[str, str]:
-    """The phrases, and the name of the gain that acts as a stiffness."""
+    """Phrases for a browser page: `REASONS`, and under ``name`` the controller gain that acts as a stiffness."""
     return REASONS | {"name": gain_words(rig.gain_name())}
 
 
 def _many(ratio: float) -> str:
-    """A ratio, with as many digits as tell it from one."""
+    """Format a ratio with 3 to 8 digits, enough to show that it differs from one."""
     apart = np.floor(np.log10(abs(ratio - 1) or 1.0))
     return format_quantity(ratio, "1", int(np.clip(1 - apart, 3, 8)))
 
 
 def in_stiffness(analysis: Findings, value: float) -> str:
-    """A stiffness (Pa/m), or that of the whole area where the rig has one, as in its file."""
+    """Format a stiffness given in Pa/m; as N/m of the whole contact where the rig has an area."""
     return format_quantity(value, "Pa/m", area=analysis.rig.area)

@@ -1,4 +1,4 @@
-"""How sure a verdict is where the numbers of a rig are known to within tolerances only."""
+"""`tolerate`: verdicts on rigs sampled within the tolerances of their parameters."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
-POWER = 12  # of 2: how many rigs inside the tolerances are looked at
-ALONE = 65  # values of a parameter that varies alone
+# Numbers of samples, chosen by trial: computing time against resolution of shares (1/4096) and of ranges (1/64).
+LOG2_RIGS = 12  # 2**12 = 4096 rigs with all parameters varied at once; Sobol points need a power of two
+VALUES_ALONE = 65  # values of a parameter that is varied alone, both ends included
 
 
 @dataclass(frozen=True)
 class Alone(Displayed):
-    """What one parameter does within its tolerance, the others as they are.
+    """Safety factor, growth rate and stability over the tolerance of one parameter, the others unchanged.
 
     Attributes
     ----------
@@ -41,7 +42,7 @@ class Alone(Displayed):
     low, high : float
         Its range, SI units.
     safety : tuple of float
-        Least and largest value over its edge of what edges are told of, a slider's stiffness; NaN where there is none.
+        Least and largest safety factor: value over edge of the parameter `Tolerated.along`; NaN without edge.
     growth : tuple of float
         Least and largest growth rate of small disturbances, 1/s.
     stable : bool or None
@@ -60,7 +61,7 @@ class Alone(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class Tolerated(ReadOnly):
-    """The verdicts on rigs within tolerances.
+    """Verdicts on m rigs whose parameters lie within tolerances.
 
     Attributes
     ----------
@@ -68,18 +69,18 @@ class Tolerated(ReadOnly):
     alone : tuple of Alone
         Each parameter by itself, the one that matters most first.
     stable : ndarray of bool (m,)
-        Of rigs spread evenly over all ranges at once.
+        True for rigs, spread evenly over all ranges at once, that slide steadily and stably.
     exists : ndarray of bool (m,)
-        Whether they slide steadily at all.
+        True for rigs that slide steadily.
     growth : ndarray (m,)
         Growth rate of small disturbances, 1/s: of the leading eigenvalue.
     along : str
-        The parameter whose edge is told, ``slider.stiffness`` for a slider; empty where none is, as of a machine
-        unless one is named.
+        The parameter of `edge` and `safety`: ``slider.stiffness`` for a slider unless another is named; empty for a
+        machine unless one is named.
     edge : ndarray (m,)
-        The nearest edge of stability in it, SI units; NaN where there is none.
+        Nearest edge of stability in the parameter `along`, SI units; NaN where there is none.
     safety : ndarray (m,)
-        Its value over that.
+        Value of the parameter `along` over its nearest edge.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -107,12 +108,12 @@ class Tolerated(ReadOnly):
         edge, over = (
             ("critical stiffness", "stiffness over critical") if own else (f"edge in {self.along}", "over its edge")
         )
-        told = [(edge, self.edge, self.unit), (over, self.safety, "1")] if self.along else []
+        ranges = [(edge, self.edge, self.unit), (over, self.safety, "1")] if self.along else []
         if not self.along or not np.any(np.isfinite(self.edge)):
-            told.append(("growth rate", self.growth, "1/s"))
-        for words, values, unit in told:
-            if (known := _ends(values)) is not None:
-                lines.append(f"{words:<{wide}}{format_range(*known, unit, self.area)}")
+            ranges.append(("growth rate", self.growth, "1/s"))
+        for label, values, unit in ranges:
+            if (ends := _finite_range(values)) is not None:
+                lines.append(f"{label:<{wide}}{format_range(*ends, unit, self.area)}")
         for one in self.alone:
             if not np.isnan(one.safety[0]):
                 beside = f", {one.safety[0]:.4g} to {one.safety[1]:.4g} times {'critical' if own else 'its edge'}"
@@ -125,32 +126,32 @@ class Tolerated(ReadOnly):
 
     @property
     def unit(self) -> str:
-        """Of the edge."""
+        """Unit of `edge`; ``1`` where no parameter is named."""
         return self.rig.parameters()[self.along].role.unit if self.along else "1"
 
     @property
     def area(self) -> float | None:
-        """Over which the edge is a stress, for whoever speaks of the whole of it."""
+        """Contact area (m²) by which `edge` is multiplied for a total; None where there is none."""
         return self.rig.area_of(self.along) if self.along else None
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw what each parameter does alone; see `steadyslip.figures.tolerances`."""
+        """Draw the safety factor or growth rate over each tolerance; see `steadyslip.figures.tolerances`."""
         return draw(self, ax=ax)
 
 
 @checked()
 def tolerate(rig: Slider | Machine, tolerances: Mapping[str, Any], *, along: str | None = None) -> Tolerated:
-    """The verdicts on all rigs whose parameters lie within tolerances.
+    """Verdicts on rigs whose parameters lie within tolerances, all varied at once and each alone.
 
     Parameters
     ----------
     rig : Slider or Machine
     tolerances : mapping of str to float or str
-        By dotted name how far a value may be off to either side: a number in SI units, text with a unit, or a share of
-        the value such as ``"5 %"``.
+        By dotted name the largest deviation to either side: a number in SI units, text with a unit, or a share of the
+        value such as ``"5 %"``.
     along : str, optional
-        The parameter whose edge is told, one that enters the equations linearly, by its dotted name; the stiffness of a
-        slider unless given. Of a machine growth rates are told instead unless one is given.
+        Dotted name of the parameter whose edge and safety factor are computed; it must enter the equations linearly.
+        By default a slider's stiffness; for a machine growth rates only.
 
     Returns
     -------
@@ -159,26 +160,26 @@ def tolerate(rig: Slider | Machine, tolerances: Mapping[str, Any], *, along: str
     Raises
     ------
     ParameterError
-        If a name or a tolerance is not allowed, or leads out of what the rig can have.
+        If a name or a tolerance is not allowed, or leads out of the domain of a parameter.
     NotAvailable
-        If what is named by `along` does not enter linearly.
+        If the parameter `along` does not enter linearly.
     """
     name = "" if along is None and isinstance(rig, Machine) else name_along(rig, along)
     ranges = _ranges(rig, tolerances)
     from scipy.stats import qmc
 
-    even = qmc.Sobol(len(ranges), scramble=True, rng=np.random.default_rng(0)).random_base2(POWER)
+    even = qmc.Sobol(len(ranges), scramble=True, rng=np.random.default_rng(0)).random_base2(LOG2_RIGS)
     varied = {name: low + (high - low) * even[:, i] for i, (name, (low, high)) in enumerate(ranges.items())}
-    every = _judged(rig, varied, name)
+    every = _outcomes(rig, varied, name)
     alone = [_alone(rig, one, low, high, name) for one, (low, high) in ranges.items()]
     alone.sort(key=lambda one: (one.stable is not None, -_spread(one)))
     return Tolerated(rig, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety)
 
 
-def _ends(values: Array) -> tuple[float, float] | None:
-    """Least and largest of what is finite; None where nothing is."""
-    known = values[np.isfinite(values)]
-    return (float(known.min()), float(known.max())) if len(known) else None
+def _finite_range(values: Array) -> tuple[float, float] | None:
+    """Least and largest of the finite values; None where there is none."""
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else None
 
 
 def _spread(one: Alone) -> float:
@@ -187,15 +188,15 @@ def _spread(one: Alone) -> float:
 
 
 def _alone(rig: Slider | Machine, name: str, low: float, high: float, along: str) -> Alone:
-    found, nothing = _judged(rig, {name: np.linspace(low, high, ALONE)}, along), (float("nan"),) * 2
+    found, nothing = _outcomes(rig, {name: np.linspace(low, high, VALUES_ALONE)}, along), (float("nan"),) * 2
     whole = bool(found.stable[0]) if np.all(found.stable == found.stable[0]) else None
-    safety, growth = _ends(found.safety) or nothing, _ends(found.growth) or nothing
+    safety, growth = _finite_range(found.safety) or nothing, _finite_range(found.growth) or nothing
     return Alone(name, low, high, rig.parameters()[name].role.unit, safety, growth, whole, rig.area_of(name))
 
 
 @dataclass(frozen=True)
-class _Judged:
-    """Whether rigs slide steadily, whether that is stable, growth rates, an edge and the value over it; (m,)."""
+class _Outcomes:
+    """Verdicts on m rigs as arrays (m,): steady sliding exists, is stable, growth rate (1/s), edge, safety factor."""
 
     exists: Array
     stable: Array
@@ -204,14 +205,14 @@ class _Judged:
     safety: Array
 
 
-def _judged(rig: Slider | Machine, varied: Mapping[str, Array], along: str) -> _Judged:
+def _outcomes(rig: Slider | Machine, varied: Mapping[str, Array], along: str) -> _Outcomes:
     found = status(operating_point(rig, varied, present_zeros(rig)))
     growth = np.asarray(growth_rate(rig, varied), dtype=float)
     edge = safety = np.full(len(growth), np.nan)
     if along:
         edge = np.asarray(edge_along(rig, along, varied)[0], dtype=float)
         safety = np.asarray(safety_factor(rig, varied, along=along), dtype=float)
-    return _Judged((found != ABSENT) & (found != UNKNOWN), found == STABLE, growth, edge, safety)
+    return _Outcomes((found != ABSENT) & (found != UNKNOWN), found == STABLE, growth, edge, safety)
 
 
 def _ranges(rig: Slider | Machine, tolerances: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
@@ -221,7 +222,7 @@ def _ranges(rig: Slider | Machine, tolerances: Mapping[str, Any]) -> dict[str, t
     for given, tolerance in tolerances.items():
         try:
             name = resolve(given, known)
-            half, value = _half(known[name], tolerance, rig.area_of(name)), float(known[name].value or 0.0)
+            half, value = _half_width(known[name], tolerance, rig.area_of(name)), float(known[name].value or 0.0)
             for end in (value - half, value + half):
                 rig.with_values({name: end})
             found[name] = (value - half, value + half)
@@ -234,8 +235,8 @@ def _ranges(rig: Slider | Machine, tolerances: Mapping[str, Any]) -> dict[str, t
     return found
 
 
-def _half(one: Address, tolerance: Any, area: float | None) -> float:
-    """How far a value may be off."""
+def _half_width(one: Address, tolerance: Any, area: float | None) -> float:
+    """Largest deviation of a parameter to either side, SI units, from a number, text with a unit or a percentage."""
     if isinstance(tolerance, str) and tolerance.rstrip().endswith("%"):
         share = Parameter("1", positive, "tolerance in percent").checked(tolerance.rstrip()[:-1].strip())
         return 0.01 * share * abs(float(one.value or 0.0))

@@ -1,4 +1,4 @@
-"""An Analysis in words that a person can act on, or read aloud to a colleague."""
+"""Text of verdicts: headline, facts, table of nearest edges, warnings."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED, in_words
-from steadyslip.core.errors import InternalError
 from steadyslip.core.format import format_quantity
 from steadyslip.machine.slider import Slider
-from steadyslip.verdict.holding import gain_words, holding
 from steadyslip.verdict.reasons import NEXT_TO_IT, in_stiffness
+from steadyslip.verdict.support import gain_words, support_stiffness
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -20,8 +19,9 @@ if TYPE_CHECKING:
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings, Verdict
 
-REMOTE = 100  # times a value, beyond which an edge is of little use
-MOST_WINDOWS = 4  # of stable stiffnesses that are told in words
+# Chosen by trial: length of the text against completeness.
+REMOTE = 100  # edges further than this factor from a value are listed apart
+MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text
 
 _ONSETS = {
     "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
@@ -42,18 +42,18 @@ BEYOND = {
 
 
 def beyond(edge: Boundary) -> str:
-    """What happens where sliding is not stable any more; of a machine at which contact."""
+    """Clause on what happens beyond an edge, such as ``it locks up``; for a machine with the contact's name."""
     words = BEYOND.get(edge.kind, edge.kind)
     return f"{edge.contact} {words.removeprefix('it ')}" if edge.contact and words.startswith("it ") else words
 
 
 def verdict(analysis: Findings) -> str:
-    """The whole verdict as text, at most some 100 columns wide."""
-    return lines_of(analysis, facts(analysis), margin_table(analysis), meaning(analysis))
+    """Whole verdict on a slider as text, about 100 columns wide."""
+    return verdict_text(analysis, facts(analysis), margin_table(analysis), meaning(analysis))
 
 
-def lines_of(analysis: Verdict, known: list[tuple[str, str]], edges: list[str], meant: list[str]) -> str:
-    """Headline, reason, facts, edges, what is meant and warnings, one below the other."""
+def verdict_text(analysis: Verdict, known: list[tuple[str, str]], edges: list[str], meant: list[str]) -> str:
+    """Join headline, reason, facts (label, text), edges, checks, remarks and warnings into one text."""
     lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
     for name, text in known:
         lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
@@ -66,7 +66,7 @@ def lines_of(analysis: Verdict, known: list[tuple[str, str]], edges: list[str], 
 
 
 def meaning(analysis: Findings) -> list[str]:
-    """What the verdict does not say."""
+    """Lines on the limits of the verdict: large kicks if stable, growth without bound if unstable."""
     if analysis.stable is None or analysis.on_edge:
         return []
     if analysis.stable:
@@ -84,7 +84,7 @@ def meaning(analysis: Findings) -> list[str]:
 
 
 def _limited(rig: Slider) -> bool:
-    """Whether mass or damping keeps velocity finite."""
+    """True if mass or damping keeps velocity finite."""
     return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
@@ -95,11 +95,11 @@ HEADLINES = {
     "none": ("No steady sliding", " {speed}"),
     "undecided": ("Not decided", ": steady sliding {speed}"),
 }
-"""The first line of a verdict: what stands out, and the rest; pages have it in the same words."""
+"""First line of a verdict: the part in capitals, and the rest; pages use the same words."""
 
 
 def headline(analysis: Verdict, capitals: bool = True) -> str:
-    """The first line: stable, unstable, on the edge, or no steady sliding."""
+    """First line of a verdict: stable, unstable, on the edge, not decided, or no steady sliding; with the speed."""
     drive = analysis.rig.parameters()["drive.velocity"]
     speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
     if analysis.stable is None:
@@ -111,7 +111,7 @@ def headline(analysis: Verdict, capitals: bool = True) -> str:
 
 
 def is_undecided(analysis: Verdict) -> bool:
-    """Whether the verdict failed its own check."""
+    """True if there is no verdict because one of its checks failed."""
     return analysis.reason.startswith(UNDECIDED)
 
 
@@ -125,7 +125,7 @@ def _stress(analysis: Findings, value: float) -> str:
 
 
 def facts(analysis: Findings) -> list[tuple[str, str]]:
-    """What is known of steady sliding, its disturbances, its edge and kicks: name and words."""
+    """Rows (label, text) on steady sliding, small disturbances, stable stiffnesses, onset and kicks of a slider."""
     steady = analysis.steady
     if steady is None:
         return []
@@ -148,11 +148,11 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
         )
     if analysis.onset is not None:
         rows.append(("onset", onset_words(analysis.onset)))
-    return rows + [("a kick", survived(kick)) for kick in analysis.kicks]
+    return rows + [("a kick", threshold_words(kick)) for kick in analysis.kicks]
 
 
 def onset_words(onset: Onset) -> str:
-    """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
+    """Sentence on the kind of onset; for a subcritical one with the size of the unstable oscillation at this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
     if not isinstance(onset.rig, Slider):
         text = text.replace("edge in stiffness", f"edge in {onset.along}")
@@ -179,8 +179,8 @@ _KICKS = {
 }
 
 
-def survived(kick: Threshold) -> str:
-    """A threshold in a few words."""
+def threshold_words(kick: Threshold) -> str:
+    """Clause on a threshold: the kick survived, and what a larger one leads to."""
     name, what = _KICKS[kick.kick]
     at = f" at {kick.at}" if kick.at else ""
     if kick.size == 0:
@@ -205,7 +205,7 @@ def survived(kick: Threshold) -> str:
 
 
 def disturbance(analysis: Verdict) -> str:
-    """What becomes of a small disturbance."""
+    """Clause on a small disturbance: time to double or halve, period and damping ratio."""
     if analysis.growth_rate == math.inf:
         return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
     if analysis.growth_rate is None:
@@ -216,7 +216,7 @@ def disturbance(analysis: Verdict) -> str:
         text = f"doubles in {format_quantity(analysis.time_to_double, 's')}"
     elif analysis.time_to_halve is not None:
         text = f"halves in {format_quantity(analysis.time_to_halve, 's')}"
-    else:  # a root that is lost beside the others, though its sign is not
+    else:  # the sign of the leading root is known, its size is lost in rounding
         return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
     leading = analysis.eigenvalues[0]
     if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
@@ -226,47 +226,47 @@ def disturbance(analysis: Verdict) -> str:
 
 
 def _stable_set(analysis: Findings) -> str:
-    held = holding(analysis)
+    support = support_stiffness(analysis)
     parts = []
-    for low, high in held.stable:
+    for low, high in support.stable:
         if low == 0 and high == math.inf:
-            parts.append(f"every {held.words}{' above zero' if analysis.on_edge else ''}")
+            parts.append(f"every {support.words}{' above zero' if analysis.on_edge else ''}")
         elif high == math.inf:
-            parts.append(f"{held.words} above {in_stiffness(analysis, low)}")
+            parts.append(f"{support.words} above {in_stiffness(analysis, low)}")
         elif low == 0:
-            parts.append(f"{held.words} below {in_stiffness(analysis, high)}")
+            parts.append(f"{support.words} below {in_stiffness(analysis, high)}")
         else:
-            parts.append(f"{held.words} from {in_stiffness(analysis, low)} to {in_stiffness(analysis, high)}")
-    if len(parts) > MOST_WINDOWS:  # those around the rig's own stiffness, or the lowest
-        at = next((i for i, (low, high) in enumerate(held.stable) if low < held.own < high), 0)
+            parts.append(f"{support.words} from {in_stiffness(analysis, low)} to {in_stiffness(analysis, high)}")
+    if len(parts) > MOST_WINDOWS:  # list those around the rig's own stiffness, or the lowest
+        at = next((i for i, (low, high) in enumerate(support.stable) if low < support.own < high), 0)
         first = max(0, min(at - MOST_WINDOWS // 2, len(parts) - MOST_WINDOWS))
         more = f"{len(parts) - MOST_WINDOWS} windows more, see stable_stiffness"
         parts = [*parts[first : first + MOST_WINDOWS], more]
     if not parts and analysis.characteristic_terms and analysis.stable:
-        return f"windows of {held.words} too many to be listed"
-    return ", or ".join(parts) or f"no {held.words}"
+        return f"windows of {support.words} too many to be listed"
+    return ", or ".join(parts) or f"no {support.words}"
 
 
 def edge_rows(analysis: Verdict) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
-    """Of every parameter with an edge: name, value, edge, change and what happens beyond; names of those without."""
-    rows = [_margin_row(analysis, margin) for margin in analysis.margins if margin.edge is not None]
+    """Rows (name, value, edge, change, what happens beyond) of parameters with an edge; names of those without."""
+    rows = [_margin_row(analysis, margin, margin.edge) for margin in analysis.margins if margin.edge is not None]
     return rows, [margin.parameter for margin in analysis.margins if margin.edge is None]
 
 
 def margin_table(analysis: Verdict) -> list[str]:
-    """The nearest edge of each parameter, the others unchanged."""
+    """Lines of the table of nearest edges, one parameter varied at a time; those beyond a factor `REMOTE` last."""
     if not analysis.margins:
         return []
     rows, without = edge_rows(analysis)
     lines = ["", "Nearest edge in each parameter, the others unchanged, and what happens beyond it"]
     rows = [(name, value, f"-> {edge}", change, words) for name, value, edge, change, words in rows]
     widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
-    told = ["  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows]
+    table = ["  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows]
     remote = [_is_remote(one) for one in analysis.margins if one.edge is not None]
-    lines += [line for line, far in zip(told, remote, strict=True) if not far]
+    lines += [line for line, far in zip(table, remote, strict=True) if not far]
     if any(remote):
         lines += [f"  further off than a factor of {REMOTE}:"]
-        lines += [line for line, far in zip(told, remote, strict=True) if far]
+        lines += [line for line, far in zip(table, remote, strict=True) if far]
     if without:
         lines += textwrap.wrap(
             f"no edge within range: {', '.join(without)}", 98, initial_indent="  ", subsequent_indent="    "
@@ -275,17 +275,15 @@ def margin_table(analysis: Verdict) -> list[str]:
 
 
 def _is_remote(margin: Margin) -> bool:
-    """Whether an edge is so many times the value, or the other way, that it is of little use."""
+    """True if the nearest edge is more than a factor `REMOTE` from the value; never for angles and zero values."""
     edge = margin.edge
     if edge is None or margin.unit == "rad" or not margin.value or not edge.value:
         return False
     return not 1 / REMOTE < abs(edge.value / margin.value) < REMOTE
 
 
-def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str]:
-    edge = margin.edge
-    if edge is None:
-        raise InternalError("edge is not None")
+def _margin_row(analysis: Verdict, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:
+    """Row of the table of nearest edges: name, value, edge, change and what happens beyond."""
     if margin.unit == "rad":
         change = f"{math.degrees(margin.absolute):+.4g} deg"
     elif not margin.value:

@@ -1,4 +1,4 @@
-"""What holds the block: a spring, a controller's gain, or both; and for which values of it sliding is stable."""
+"""Stiffness that supports the block (spring, position controller, or both) and the values of it that are stable."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
 
 
-class Holding(NamedTuple):
-    """Per unit area (Pa/m), along the sliding direction.
+class SupportStiffness(NamedTuple):
+    """Stiffness that supports the block of a slider, per unit area (Pa/m), along the sliding direction.
 
     Attributes
     ----------
     name : str
         ``stiffness`` or, where no spring is beside the controller, the gain, such as ``gain kp``.
     own : float
+        The rig's value of it.
     beside : float
-        Gain of a controller that acts with the spring.
+        Gain of a controller that acts in parallel with the spring; 0 without one.
     critical : float or None
         Edge of the stable set nearest to `own`.
     side : str or None
-        ``above`` or ``below``: where, next to that edge, sliding is stable.
+        ``above`` or ``below``: the side of that edge on which sliding is stable.
     stable : tuple of (float, float)
-        All stable values as open intervals, `beside` as it is.
+        All stable values as open intervals, with `beside` unchanged.
     gain : str
-        What `beside` is called.
+        Name of the controller gain, such as ``gain kp``.
     """
 
     name: str
@@ -44,28 +45,28 @@ class Holding(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What the stable values are values of."""
+        """Name of the varied stiffness for a sentence, such as ``stiffness beside the gain kp``."""
         return f"{self.name} beside the {self.gain}" if self.beside else self.name
 
 
-def holding(analysis: Findings) -> Holding:
-    """What holds the block of a rig that slides."""
+def support_stiffness(analysis: Findings) -> SupportStiffness:
+    """Stiffness that supports the block of a slider: the controller's gain if the spring is zero, else the spring."""
     rig = analysis.rig
     point = operating_point(rig, branch=analysis.branch)
     own, gain = float(point.named()["slider.stiffness"]), float(rig.drive.proportional())
     name = rig.gain_name()
-    called = gain_words(name)
+    label = gain_words(name)
     found = linear_set(point, name) if name and gain and not own else None
     if found is None:
         edge = analysis.critical_stiffness, analysis.critical_side
-        return Holding("stiffness", own, gain, *edge, analysis.stable_stiffness, called)
+        return SupportStiffness("stiffness", own, gain, *edge, analysis.stable_stiffness, label)
     stable = tuple((float(low), float(high)) for low, high in found.intervals if not math.isnan(low))
     ends = [(end, side) for pair in stable for end, side in zip(pair, ("above", "below"), strict=True)]
-    some = [(end, side) for end, side in ends if 0 < end < np.inf]
-    critical, side = min(some, key=lambda one: abs(one[0] - gain), default=(None, None))
-    return Holding(called, gain, 0.0, critical, side, stable, called)
+    edges = [(end, side) for end, side in ends if 0 < end < np.inf]
+    critical, side = min(edges, key=lambda edge: abs(edge[0] - gain), default=(None, None))
+    return SupportStiffness(label, gain, 0.0, critical, side, stable, label)
 
 
 def gain_words(name: str | None) -> str:
-    """What the gain of a drive is called, by the parameter that it is."""
+    """Name of a drive's gain for a sentence: ``gain kp`` for ``drive.kp``, ``gain`` for None."""
     return "gain" if name is None else f"gain {name.rpartition('.')[2]}"

@@ -103,7 +103,7 @@ def test_a_motion_that_a_simpler_model_can_follow_is_not_given_up_in_a_richer_on
         plan = make_plan(rig, record)
         part = plan.comparison().parts[0]
         values = part.forward.values(np.array([[rig.value(name) for name in part.forward.names]]))
-        settings = part.forward._settings(part.table(np.zeros((1, len(part.time_places)))), values, 1)
+        settings = part.forward._settings(part.table(np.zeros((1, len(part.time_indices)))), values, 1)
         most.append(settings[0, Setting.MOST_STEPS])
     assert most[1] > 1.03 * most[0]
 

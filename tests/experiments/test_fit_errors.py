@@ -11,7 +11,7 @@ from scipy.stats import binom
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting.fit import finished
+from steadyslip.experiments.fitting.fit import fit_with_errors
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe
@@ -38,7 +38,7 @@ def test_intervals_cover_as_often_as_they_say():
     inside = np.zeros((count, 2, len(space)))
     for i in range(count):
         own = replace(plan, records=(replace(record, friction=data[i]),))
-        fit = finished(own, own.comparison(), found.coordinates[i], search, "auto", (space.low, space.high))
+        fit = fit_with_errors(own, own.comparison(), found.coordinates[i], search, "auto", (space.low, space.high))
         for k, level in enumerate((0.68, 0.95)):
             ends = np.array([fit.interval(n, level) for n in fit.names])
             values = np.array([rig.value(u.parameter) for u in space.unknowns])

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting.comparison import lost
+from steadyslip.experiments.fitting.comparison import scaled_by_loss
 from steadyslip.experiments.numerics.noise import lag_one
 
 # -- truth
@@ -148,7 +148,7 @@ def test_one_wild_sample_is_named_and_a_loss_bears_it():
 @pytest.mark.parametrize("loss", ["soft-l1", "huber", "cauchy"])
 def test_losses_are_what_scipy_calls_them(loss):
     r = np.concatenate([-np.geomspace(1e-3, 30, 40), np.geomspace(1e-3, 30, 40)])
-    transformed, slope = lost(loss, r, 2.0)
+    transformed, slope = scaled_by_loss(loss, r, 2.0)
     word = loss.replace("-", "_")
     costs = [
         2 * least_squares(lambda x, v=v: np.array([x[0] + v]), [0.0], loss=word, f_scale=2.0, max_nfev=1).cost
@@ -157,7 +157,10 @@ def test_losses_are_what_scipy_calls_them(loss):
     np.testing.assert_allclose(transformed**2, costs, rtol=1e-9)
     step = 1e-6
     np.testing.assert_allclose(
-        slope, (lost(loss, r + step, 2.0)[0] - lost(loss, r - step, 2.0)[0]) / (2 * step), rtol=1e-5, atol=1e-8
+        slope,
+        (scaled_by_loss(loss, r + step, 2.0)[0] - scaled_by_loss(loss, r - step, 2.0)[0]) / (2 * step),
+        rtol=1e-5,
+        atol=1e-8,
     )
 
 

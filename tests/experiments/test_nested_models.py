@@ -11,7 +11,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting import search
-from steadyslip.experiments.fitting.nested import simpler
+from steadyslip.experiments.fitting.nested import nested_models
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.search import first_computable, sort_states, with_states_sorted
 from steadyslip.experiments.fitting.starts import features_of, starting_points
@@ -76,7 +76,7 @@ def test_what_is_simpler_is_told_by_the_records():
     record = made(lab.STEP)
 
     def further(rig, **options):
-        return [{*model.idle, *model.scales} for model in simpler(make_plan(rig, record, **options))]
+        return [{*model.idle, *model.scales} for model in nested_models(make_plan(rig, record, **options))]
 
     assert further(ss.lab_rig()) == []
     assert further(two()) == [{"friction.states.2.b", "friction.states.2.d_c"}]
@@ -93,10 +93,10 @@ def test_a_simpler_model_says_the_same_where_it_lies_in_the_richer_one(rig, opti
     record = made(lab.PRESSED)
     plan = make_plan(rig, record, **options)
     space, richer = plan.space(), plan.comparison()
-    for model in simpler(plan):
+    for model in nested_models(plan):
         own = model.plan.comparison()
         z = np.clip(starting_points(own.parts, features_of(own.parts), own.space, 2), own.space.low, own.space.high)[-1]
-        inside = model.within(space, z, space.low, space.high)
+        inside = model.points_in(space, z, space.low, space.high)
         np.testing.assert_allclose(richer.misfit(inside), own.misfit(z[None])[0], rtol=1e-4)
 
 
@@ -104,7 +104,7 @@ def test_times_of_later_steps_are_no_simpler_model():
     record = made(lab.PRESSED)
     plan = make_plan(ss.lab_rig(), record)
     assert "step.2.at" in [one.name for one in plan.space().unknowns]
-    assert list(simpler(plan)) == []
+    assert list(nested_models(plan)) == []
 
 
 def test_a_sample_before_a_step_of_the_stress_shows_none_of_it():

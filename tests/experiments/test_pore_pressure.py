@@ -124,7 +124,10 @@ def test_a_rig_with_pores_takes_records_without_their_pressure(drive):
         make_plan(one, made, FREE[:4], drive=drive).comparison().parts[0] for one in (rig(), lab.rig(alpha=ALPHA))
     )
     values = np.array([[0.011, 0.0145, 12e-6, ALPHA, 0.62]])
-    seen = [part.plain.run(part.inputs.table(np.array([[140.41]])), values, values)[0, 0] for part in (wet, dry)]
+    seen = [
+        part.without_derivatives.run(part.inputs.table(np.array([[140.41]])), values, values)[0, 0]
+        for part in (wet, dry)
+    ]
     np.testing.assert_allclose(seen[0], seen[1], rtol=0, atol=1e-7)
 
 

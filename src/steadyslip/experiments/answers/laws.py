@@ -16,7 +16,7 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
-from steadyslip.experiments.fitting.fit import fit, started_from
+from steadyslip.experiments.fitting.fit import fit, refit_from
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.measured.record import Record
@@ -196,7 +196,7 @@ def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, *
             fitted(label, FIRST * effort)
         if not fits:
             raise NotAvailable(f"none of the laws can follow these records from any start: {'; '.join(refused)}")
-        fits |= {label: started_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
+        fits |= {label: refit_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
         for label in [label for label in _near(fits) if fits[label].search.cut]:
             fitted(label, effort)
         predicted = {label: cross_validate(fits[label]).rms for label in _near(fits)}

@@ -1,4 +1,4 @@
-"""Records that a plan cannot be fitted to, refused in words before anything is searched."""
+"""Checks of the records of a fit, made before the search; they raise errors that say what to change."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from steadyslip.protocol.protocol import LOAD_POINT
 
 
 def check_friction(records: Iterable[Record]) -> None:
-    """Refuse measured friction that never changes, which is another column than that of friction."""
+    """Raise ParameterError for records whose friction is constant: the column is probably not that of friction."""
     problems = [
         Problem("record", f"{record.source}: friction is {record.friction[0]:.6g} in all samples; is it its column?")
         for record in records
@@ -27,7 +27,7 @@ def check_friction(records: Iterable[Record]) -> None:
 
 
 def check_records(plan: Plan) -> None:
-    """Refuse records that do not begin, or are not driven, as a fit with this plan asks for."""
+    """Raise ParameterError for records whose start, drive or length does not suit the options of the plan."""
     problems = []
     drives = plan.protocol is not None and any(piece.channel == LOAD_POINT for piece in plan.protocol.pieces)
     given = float(plan.rig.drive.velocity)
@@ -68,7 +68,7 @@ def check_records(plan: Plan) -> None:
 
 
 def check_changes(plan: Plan) -> None:
-    """Refuse records in which nothing changes: from steady sliding on, the model shows one number in them."""
+    """Raise ParameterError if no record has a change of loading: undisturbed steady sliding gives constant friction."""
     asked = [name for name in plan.free if name not in plan.rig.of_kind("friction level")]
     if not (asked and plan.follows and plan.initial == "steady"):
         return

@@ -1,4 +1,4 @@
-"""Commanded loading as tables for the kernels, for any times and durations of its changes."""
+"""Input tables of the kernels for commanded loading whose changes have free times and durations."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from steadyslip.core.errors import InternalError
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.loading import Change, Course, Loading, resting_rate
 
-STRAIGHT = 5e-4  # of the range of a curve: what straight lines may miss of it
-MOST_CUTS = 30  # of one interval between samples
-BRIEFEST = 1e-9  # of the record: a ramp shorter than that is a step
-NORMAL, PORES = 2, 3  # columns of the inputs
-SLID = 1e-3  # of the record: how long the steady sliding before a first rest is run through; any time would do
+STRAIGHT_TOLERANCE = 5e-4  # largest deviation of straight lines from a curve, as a share of its range; chosen by trial
+MAX_PIECES = 30  # largest number of pieces into which an interval between samples is cut
+MIN_RAMP = 1e-9  # shortest ramp, as a share of the record: shorter ones are computed as steps of this length
+NORMAL, PORES = 2, 3  # columns of the inputs: normal stress and pore pressure
+SLIDING_SHARE = 1e-3  # duration of the steady sliding before a first rest, as a share of the record; any would do
 
 
 class CommandedInputs:
-    """The loading of one record, to be run through with any of the times that it leaves open.
+    """Input tables for the loading found in one record, for any values of its free times.
 
     Parameters
     ----------
     loading : Loading
+        Changes of load-point velocity, normal stress and pore pressure found in the record.
     time : ndarray (n,)
-        Of the samples, s.
+        Times of the samples, s.
     pressed : bool
-        Whether its normal stress drives the model.
+        True if the normal stress of the record drives the model.
     pores : bool
-        Whether the contact has pores into which the pressure around drains; if not, it acts at once.
+        True if the contact has pores into which the pressure drains; otherwise pore pressure columns_and_signs at once.
     lag : bool
-        Whether all changes may come later (or earlier) than the columns have them, by one free time.
+        True to shift all changes by one free time.
     """
 
     def __init__(self, loading: Loading, time: Array, pressed: bool, pores: bool = False, lag: bool = False) -> None:
@@ -44,14 +45,18 @@ class CommandedInputs:
             if loading.pore is not None:
                 self.courses["pore"] = loading.pore
         self.inputs = 4 if pores else 3
-        self.acts = {"load": (0, 1.0), "stress": (NORMAL, 1.0), "pore": (PORES, 1.0) if pores else (NORMAL, -1.0)}
+        self.columns_and_signs = {
+            "load": (0, 1.0),
+            "stress": (NORMAL, 1.0),
+            "pore": (PORES, 1.0) if pores else (NORMAL, -1.0),
+        }
         self.changes = [one for one in loading.changes if one[0] in self.courses]
         self.base = {name: float(course.at(time[:1])[0]) for name, course in self.courses.items()} | {"load": 0.0}
         self.times = time - time[0]
         self.nodes = self._nodes()
 
     def _nodes(self) -> Array:
-        """Times that no step of the model passes, besides changes: ends; samples along curves and changing ramps."""
+        """Fixed nodes of the input table, s: both ends; samples along curves and along ramps of free duration."""
         if any(course.curve is not None for course in self.courses.values()):
             return np.union1d(self.time, self._cuts())
         held = np.zeros(len(self.time), dtype=bool)
@@ -62,7 +67,7 @@ class CommandedInputs:
         return np.asarray(self.time[held])
 
     def _cuts(self) -> Array:
-        """Further times, where samples are too far apart for a curve to be straight between them."""
+        """Further nodes, s, between samples where a curve deviates too much from straight lines."""
         found = [np.empty(0)]
         spacing = np.diff(self.time)
         for course in self.courses.values():
@@ -73,15 +78,15 @@ class CommandedInputs:
             for share in (0.25, 0.5, 0.75):
                 straight = ends[:-1] + share * np.diff(ends)
                 misses = np.maximum(misses, np.abs(course.curve(self.time[:-1] + share * spacing) - straight))
-            least = STRAIGHT * max(float(np.ptp(ends)), 1e-300)
-            pieces = np.minimum(np.ceil(np.sqrt(misses / least)), MOST_CUTS).astype(int)
+            least = STRAIGHT_TOLERANCE * max(float(np.ptp(ends)), 1e-300)
+            pieces = np.minimum(np.ceil(np.sqrt(misses / least)), MAX_PIECES).astype(int)
             for i in np.flatnonzero(pieces > 1):
                 found.append(np.linspace(self.time[i], self.time[i + 1], pieces[i] + 1)[1:-1])
         return np.concatenate(found)
 
     @cached_property
     def free(self) -> list[tuple[int, str]]:
-        """What the free times are: the place of a change, and ``at`` or ``duration``; then ``lag`` and ``hold``."""
+        """Free times in order: index of the change with ``at`` or ``duration``; then -1 with ``lag`` and ``hold``."""
         found = []
         for i, (_, _, change) in enumerate(self.changes):
             found += [(i, "at")] if change.free else []
@@ -90,13 +95,13 @@ class CommandedInputs:
         return found + ([(-1, "hold")] if self.resting is not None else [])
 
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
-        """The table for free times (jobs, free), s; see `MeasuredInputs.table`."""
+        """Input table for values of the free times (jobs, free), s; see `MeasuredInputs.table`."""
         if not self.free:
-            return self._once
+            return self._fixed_table
         return self._table(times, first, directions)
 
     @cached_property
-    def _once(self) -> InputTable:
+    def _fixed_table(self) -> InputTable:
         return self._table(np.empty((1, 0)), 0, 0)
 
     def _table(self, times: Array, first: int, directions: int) -> InputTable:
@@ -114,11 +119,11 @@ class CommandedInputs:
         inside = (events > low) & (events < high)
         before = np.empty((jobs, 0))
         if self.resting is not None:  # steady sliding, then a hold that ends where the record begins
-            before = low - times[:, -1:] - np.array([[SLID * (high - low), 0.0]])
+            before = low - times[:, -1:] - np.array([[SLIDING_SHARE * (high - low), 0.0]])
         nodes = np.hstack([np.clip(events, low, high), before, np.tile(self.nodes, (jobs, 1))])
-        order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
+        order = np.argsort(nodes, axis=1, kind="stable")  # a step sorts before a sample at the same time
         moving = nodes[:, : nodes.shape[1] - len(self.nodes)]
-        curves = {channel: self._along(channel, moving, order) for channel in self._curves}
+        curves = {channel: self._curve_values(channel, moving, order) for channel in self._curves}
         nodes = np.take_along_axis(nodes, order, axis=1)
         count = events.shape[1] + before.shape[1]
         rows = np.zeros((jobs, nodes.shape[1] - 1, 3 + 2 * self.inputs))
@@ -146,11 +151,11 @@ class CommandedInputs:
 
     @cached_property
     def _curves(self) -> dict[str, Array]:
-        """The smooth curves at all nodes whose time is fixed."""
+        """Values of the smooth curves at the fixed nodes, by channel."""
         return {name: course.curve(self.nodes) for name, course in self.courses.items() if course.curve is not None}
 
-    def _along(self, channel: str, moving: Array, order: Array) -> Array:
-        """A smooth curve at all nodes in order, those whose times move first to begin with."""
+    def _curve_values(self, channel: str, moving: Array, order: Array) -> Array:
+        """Values of a smooth curve at all nodes, sorted by `order`: free times (jobs, k), then the fixed nodes."""
         curve = self.courses[channel].curve
         if curve is None:
             raise InternalError(f"the {channel} has no curve")
@@ -159,7 +164,7 @@ class CommandedInputs:
         return np.take_along_axis(np.hstack([own, fixed]), order, axis=1)
 
     def _fill(self, rows: Array, nodes: Array, begins: Array, lengths: Array, curves: dict[str, Array]) -> None:
-        """Values and slopes of the inputs on every row."""
+        """Set the values and slopes of the inputs on every row of the table."""
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
         for channel, course in self.courses.items():
             before = np.full(middle.shape, course.first - self.base[channel])
@@ -170,7 +175,7 @@ class CommandedInputs:
                 begin, length = begins[:, i : i + 1], lengths[:, i : i + 1]
                 height = change.after - change.before
                 if change.duration > 0:
-                    length = np.maximum(length, BRIEFEST * np.ptp(self.time))
+                    length = np.maximum(length, MIN_RAMP * np.ptp(self.time))
                     before += height * np.clip((nodes[:, :-1] - begin) / length, 0.0, 1.0)
                     after += height * np.clip((nodes[:, 1:] - begin) / length, 0.0, 1.0)
                 else:
@@ -182,13 +187,13 @@ class CommandedInputs:
             if channel in curves:
                 before, after = before + curves[channel][:, :-1], after + curves[channel][:, 1:]
             spacing = nodes[:, 1:] - nodes[:, :-1]
-            column, sign = self.acts[channel]
+            column, sign = self.columns_and_signs[channel]
             slope = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
             rows[:, :, 3 + column] += sign * before
             rows[:, :, 3 + self.inputs + column] += sign * slope
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
-        """How inputs at given times change with the times of a ramp."""
+        """Derivatives of the inputs at fixed times in the free times of ramps, (jobs, directions, rows, inputs)."""
         if not any(change.duration > 0 for _, _, change in self.changes):
             return np.zeros((1, 0, 0, self.inputs))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
@@ -198,16 +203,16 @@ class CommandedInputs:
                 channel, _, change = self.changes[i]
                 if not change.duration > 0:
                     continue
-                begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], BRIEFEST * np.ptp(self.time))
+                begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], MIN_RAMP * np.ptp(self.time))
                 share = (middle - begin) / length
                 slope = -(change.after - change.before) / length * (share if what == "duration" else 1.0)
-                column, sign = self.acts[channel]
+                column, sign = self.columns_and_signs[channel]
                 rates[:, first + k, :, column] += np.where((share > 0) & (share < 1), sign * slope, 0.0)
         return rates
 
 
-def windows(changes: list[tuple[str, int, Change]]) -> list[tuple[float, float, float]]:
-    """For each free time in turn: value to begin with, least and largest, s."""
+def time_windows(changes: list[tuple[str, int, Change]]) -> list[tuple[float, float, float]]:
+    """Starting value, least and largest value, s, of each free time of the changes."""
     found = []
     for _, _, change in changes:
         if change.free:

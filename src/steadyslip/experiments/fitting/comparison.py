@@ -1,4 +1,4 @@
-"""Records against the model: residuals and their derivatives in the free parameters, for many trials at once."""
+"""Residuals of the records and their derivatives in the free parameters, for many parameter sets at once."""
 
 from __future__ import annotations
 
@@ -20,29 +20,31 @@ from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
-RECENT = 6  # points of which is remembered what the model said,
-REMEMBERED = 200_000  # while they are few: of so many samples together
+CACHED_POINTS = 6  # number of points whose model results are cached
+MAX_CACHED_SAMPLES = 200_000  # results with more samples in all are not cached, to save memory
 
 
 @dataclass(frozen=True, eq=False)
 class RecordPart:
-    """One record and what it is compared with.
+    """One record with the model that it is compared with.
 
     Attributes
     ----------
     record : Record
     rig : Slider
-        As the record drives it: its own initial rate and normal stress.
+        Rig with the initial velocity and normal stress of the record.
     forward : Forward
+        Compiled model.
     inputs : CommandedInputs, MeasuredInputs or ProtocolInputs
+        Source of the input tables.
     data : ndarray (n,)
-        What was observed.
+        Observed friction coefficient.
     weights : ndarray (n,)
         One over the standard deviation of each sample, up to a common factor.
-    rig_places, time_places, begin_places, trend_places : tuple of int
-        Where the parameters of the rig, free times, where it begins and the trend lie among the unknowns.
+    rig_indices, time_indices, begin_indices, trend_indices : tuple of int
+        Indices among the unknowns of the rig's parameters, free times, initial state and trend coefficients.
     trend : ndarray (terms, n)
-        What multiplies the coefficients of the trend.
+        Factors of the trend coefficients.
     """
 
     record: Record
@@ -51,35 +53,36 @@ class RecordPart:
     inputs: CommandedInputs | MeasuredInputs | ProtocolInputs
     data: Array
     weights: Array
-    rig_places: tuple[int, ...]
-    time_places: tuple[int, ...]
-    begin_places: tuple[int, ...]
-    trend_places: tuple[int, ...]
+    rig_indices: tuple[int, ...]
+    time_indices: tuple[int, ...]
+    begin_indices: tuple[int, ...]
+    trend_indices: tuple[int, ...]
     trend: Array
 
     def table(self, values: Array, sensitive: bool = True) -> InputTable:
-        first = len(self.rig_places)
-        directions = first + len(self.time_places) if sensitive else 0
-        return self.inputs.table(values[:, list(self.time_places)], first, directions)
+        first = len(self.rig_indices)
+        directions = first + len(self.time_indices) if sensitive else 0
+        return self.inputs.table(values[:, list(self.time_indices)], first, directions)
 
     @cached_property
-    def plain(self) -> Forward:
-        """The same without derivatives, several times as fast."""
+    def without_derivatives(self) -> Forward:
+        """The model without derivatives, which runs several times as fast."""
         own = self.forward
         return Forward(own.rig, own.names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort)
 
 
 class Comparison:
-    """All records of a fit together.
+    """All records of a fit with their models.
 
     Parameters
     ----------
     parts : sequence of RecordPart
     space : Space
+        Unknowns of the fit.
     loss : str
-        ``linear`` (least squares) or a loss that outliers weigh less in.
+        ``linear`` (least squares), or a loss that gives outliers less weight.
     width : float
-        Residual at which that begins.
+        Residual from which outliers have less weight.
     """
 
     def __init__(self, parts: tuple[RecordPart, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
@@ -89,78 +92,77 @@ class Comparison:
         self.size = int(ends[-1])
         self.data = np.concatenate([part.data for part in parts])
         self.weights = np.concatenate([part.weights for part in parts])
-        self._recent: deque[tuple[bytes, Array, Array]] = deque(maxlen=RECENT)
+        self._recent: deque[tuple[bytes, Array, Array]] = deque(maxlen=CACHED_POINTS)
 
     def model(self, coordinates: Array) -> tuple[Array, Array]:
-        """What the model says, (m, n), and its derivatives, (m, p, n); not weighted.
+        """Model friction (m, n) and derivatives (m, p, n) at coordinates (m, p), not weighted; read-only arrays.
 
-        What is asked of one point shortly after a few are tried, such as errors at a minimum, costs no run. Nobody may
-        write to the answer.
+        The results of recent points are cached: errors at a minimum that was just found cost no run.
         """
         if len(coordinates) == 1:
             for point, own, slopes in self._recent:
                 if point == coordinates.tobytes():
                     return own[None], slopes[None]
-        seen, jacobian = (read_only(array) for array in self._run(coordinates))
-        if len(coordinates) * self.size <= REMEMBERED:
-            rows = zip(coordinates, seen, jacobian, strict=True)
+        predicted, jacobian = (read_only(array) for array in self._run(coordinates))
+        if len(coordinates) * self.size <= MAX_CACHED_SAMPLES:
+            rows = zip(coordinates, predicted, jacobian, strict=True)
             self._recent.extend((z.tobytes(), own, slopes) for z, own, slopes in rows)
-        return seen, jacobian
+        return predicted, jacobian
 
     def _run(self, coordinates: Array) -> tuple[Array, Array]:
         count = len(coordinates)
         values, slopes = self.space.values(coordinates), self.space.slopes(coordinates)
-        seen = np.zeros((count, self.size))
+        predicted = np.zeros((count, self.size))
         jacobian = np.zeros((count, len(self.space), self.size))
         for part, where in zip(self.parts, self.slices, strict=True):
-            places = list(part.rig_places)
-            begin = list(part.begin_places)
+            places = list(part.rig_indices)
+            begin = list(part.begin_indices)
             found = part.forward.run(part.table(values), values[:, places], slopes[:, places], values[:, begin])
-            seen[:, where] = found[:, 0]
+            predicted[:, where] = found[:, 0]
             jacobian[:, places, where] = found[:, 1 : 1 + len(places)]
-            for k, place in enumerate((*part.time_places, *begin), start=1 + len(places)):
+            for k, place in enumerate((*part.time_indices, *begin), start=1 + len(places)):
                 jacobian[:, place, where] = found[:, k] * slopes[:, place, None]
-            for row, place in zip(part.trend, part.trend_places, strict=True):
-                seen[:, where] += values[:, place, None] * row
+            for row, place in zip(part.trend, part.trend_indices, strict=True):
+                predicted[:, where] += values[:, place, None] * row
                 jacobian[:, place, where] = slopes[:, place, None] * row
-        return seen, jacobian
+        return predicted, jacobian
 
     def residuals(self, coordinates: Array, data: Array | None = None) -> tuple[Array, Array]:
-        """Weighted residuals (data less model) and derivatives of the model, as the loss has them.
+        """Weighted residuals (m, n), data less model, and derivatives (m, p, n) of the model, both scaled by the loss.
 
         Parameters
         ----------
         coordinates : ndarray (m, p)
         data : ndarray (m, n) or (n,), optional
-            Other data than the records' own.
+            Data that replace those of the records.
         """
-        seen, jacobian = self.model(coordinates)
-        r = (self.data if data is None else data) - seen
+        predicted, jacobian = self.model(coordinates)
+        r = (self.data if data is None else data) - predicted
         if np.any(self.weights != 1.0):
             r, jacobian = r * self.weights, jacobian * self.weights
         if self.loss != "linear":
-            r, slope = lost(self.loss, r, self.width)
+            r, slope = scaled_by_loss(self.loss, r, self.width)
             jacobian = jacobian * slope[:, None, :]
         return r, jacobian
 
     def misfit(self, coordinates: Array) -> Array:
-        """Sums of squares, as the loss has them, (m,); no derivatives are computed."""
+        """Sums of squares (m,) of the residuals scaled by the loss, computed without derivatives."""
         values = self.space.values(coordinates)
         total = np.zeros(len(coordinates))
         for part in self.parts:
-            own = values[:, list(part.rig_places)]
-            begin = values[:, list(part.begin_places)]
-            seen = part.plain.run(part.table(values, sensitive=False), own, own, begin)[:, 0]
-            seen += values[:, list(part.trend_places)] @ part.trend
-            r = (part.data - seen) * part.weights
+            own = values[:, list(part.rig_indices)]
+            begin = values[:, list(part.begin_indices)]
+            predicted = part.without_derivatives.run(part.table(values, sensitive=False), own, own, begin)[:, 0]
+            predicted += values[:, list(part.trend_indices)] @ part.trend
+            r = (part.data - predicted) * part.weights
             if self.loss != "linear":
-                r, _ = lost(self.loss, r, self.width)
+                r, _ = scaled_by_loss(self.loss, r, self.width)
             total += np.einsum("mn,mn->m", r, r)
         return np.where(np.isfinite(total), total, np.inf)
 
 
-def lost(loss: str, r: Array, width: float) -> tuple[Array, Array]:
-    """Residuals whose squares are the loss, and how fast they change with the residual itself."""
+def scaled_by_loss(loss: str, r: Array, width: float) -> tuple[Array, Array]:
+    """Scaled residuals whose squares are the loss, and their derivatives with respect to the residuals `r`."""
     z = np.maximum((r / width) ** 2, 1e-20)
     with np.errstate(all="ignore"):
         if loss == "soft-l1":
@@ -175,7 +177,7 @@ def lost(loss: str, r: Array, width: float) -> tuple[Array, Array]:
 
 
 def jump_unknowns(record: int | None, sharp: Sharp) -> list[Unknown]:
-    """When, between two samples, the normal stress or a measured rate jumped."""
+    """Unknown times, s, of jumps of the normal stress or of a measured velocity, each between two samples."""
     label = "" if record is None else f"@{record + 1}"
     return [
         Unknown(f"jump.{k}{label}", f"jump.{k}", "s", record, False, late - early, early, late)
@@ -184,7 +186,7 @@ def jump_unknowns(record: int | None, sharp: Sharp) -> list[Unknown]:
 
 
 def step_unknowns(record: int | None, loading: Loading, pressed: bool) -> list[Unknown]:
-    """When each commanded change begins and, of a ramp, how long it takes, where the columns leave that open."""
+    """Unknown times and durations, s, of commanded changes that the measured columns do not determine."""
     label = "" if record is None else f"@{record + 1}"
     changes = [one for one in loading.changes if pressed or one[0] == "load"]
     found = []
@@ -198,45 +200,50 @@ def step_unknowns(record: int | None, loading: Loading, pressed: bool) -> list[U
     return found
 
 
-LAGGING = 0.02  # of a record: the largest lag between its channels
-LEAST_HOLD, LONGEST_HOLD = 1e-3, 1e5  # of a record, before it, where it begins at rest
+MAX_LAG = 0.02  # largest lag between the channels, as a share of the record; larger ones are visible
+MIN_HOLD, MAX_HOLD = 1e-3, 1e5  # bounds of the rest before a record that begins at rest, as shares of it
 
 
 def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool) -> list[Unknown]:
-    """By how much friction comes later than what drives it; how long a record that begins at rest had rested, s."""
+    """Unknown lag, s, of friction behind its loading; unknown duration, s, of the rest before a record at rest."""
     label = "" if record is None else f"@{record + 1}"
     found = []
     if lag:
-        reach = LAGGING * span
+        reach = MAX_LAG * span
         found.append(Unknown(f"lag{label}", "lag", "s", record, False, 0.1 * reach, -reach, reach))
     if resting_rate(loading) is not None:
         found.append(
-            Unknown(f"start.hold{label}", "start.hold", "s", record, True, 1.0, LEAST_HOLD * span, LONGEST_HOLD * span)
+            Unknown(f"start.hold{label}", "start.hold", "s", record, True, 1.0, MIN_HOLD * span, MAX_HOLD * span)
         )
     return found
 
 
-FARTHEST = 30.0  # natural sizes that a motion may begin away from steady sliding
+MAX_INITIAL = 30.0  # bound of the initial distance from steady sliding, in natural sizes (e-folds of a state)
 
 
 def initial_unknowns(record: int | None, sizes: dict[str, float]) -> list[Unknown]:
-    """How far from steady sliding the motion begins: friction that the spring pulls with, and each memory of it."""
+    """Unknown initial differences from steady sliding, of friction and of each state, within natural sizes."""
     label = "" if record is None else f"@{record + 1}"
     return [
-        Unknown(f"initial.{n}{label}", f"initial.{n}", "1", record, False, size, -FARTHEST * size, FARTHEST * size)
+        Unknown(
+            f"initial.{n}{label}", f"initial.{n}", "1", record, False, size, -MAX_INITIAL * size, MAX_INITIAL * size
+        )
         for n, size in sizes.items()
     ]
 
 
 def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown]:
-    """Coefficients of a polynomial in the share of the record that has passed."""
+    """Unknown coefficients of the trend, a polynomial in the elapsed share of the record, and unknown offset."""
     names = (["offset"] if offset else []) + [f"trend.{k}" for k in range(1, order + 1)]
     label = "" if record is None else f"@{record + 1}"
     return [Unknown(f"{n}{label}", n, "1", record, False, 0.1, -np.inf, np.inf) for n in names]
 
 
 def trend_rows(record: Record, order: int, offset: bool, axis: str, moved: Array | None = None) -> Array:
-    """Powers of the share of displacement (or time) that has passed; `moved` is the commanded one, where known."""
+    """Factors (terms, n) of the trend coefficients: powers of the elapsed share of the displacement, or of the time.
+
+    `moved` is the commanded displacement (m), where known; it replaces the measured one.
+    """
     driven = record.displacement if moved is None else moved
     along: Any = record.time if axis == "time" or driven is None else driven
     share = (along - along[0]) / (along[-1] - along[0])

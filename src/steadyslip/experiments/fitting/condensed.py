@@ -1,9 +1,9 @@
-"""All samples of a fit in fewer numbers, where the model is smooth between them.
+"""Condensed least squares: the sum of squares of all samples from the model at few of them.
 
-Between the changes of the loading friction is a smooth curve: a polynomial through a few samples gives it at all
-others. The sum of squares over all samples is then one over those few, with other data and weights, and a constant;
-nothing is lost of the noise that many samples average out, and the model is run through far fewer of them. Around the
-changes, whose times are free, all samples stay.
+Between changes of the loading, model friction is a smooth curve: a polynomial through a few samples gives it at all
+others. The sum of squares over all samples then equals one over these few, with transformed data and weights, plus a
+constant. The noise is averaged as before, and the model is computed at far fewer samples. Around the changes, whose
+times are free, all samples are kept. The constants were chosen by trial; they trade accuracy against time.
 """
 
 from __future__ import annotations
@@ -20,84 +20,86 @@ from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading
 
-NODES = 7  # of one polynomial
-MISSED = 1e-3  # error of the interpolation: of the scatter for the model, of the largest for derivatives
-WORTHWHILE = 0.5  # share of the samples that may be left
-REFERENCES = 3  # motions from which nodes are chosen
-MARGIN = 2  # samples kept on both sides of where a change may lie
+NODES = 7  # nodes of each polynomial (degree 6)
+INTERPOLATION_ERROR = (
+    1e-3  # largest interpolation error: of the residuals' scatter (model), of the largest value (derivatives)
+)
+MAX_KEPT_SHARE = 0.5  # samples are condensed if at most this share of them remains
+MAX_REFERENCES = 3  # number of motions from which the nodes are chosen
+MARGIN = 2  # samples kept on both sides of the window of a change
 
 
 class Condensed:
-    """A comparison on few of its samples that has, near given coordinates, the sum of squares of all.
+    """Comparison on few samples with the sum of squares of all, near given coordinates.
 
     Parameters
     ----------
     plan : Plan
-        Of least squares, following a loading that was found.
+        Plan with linear loss and commanded (or smoothed) loading.
     whole : Comparison
-        Of that plan.
-    seen, slopes : ndarray (m, n), (m, p, n)
-        Model and derivatives where it is wanted, the best first; without weights.
+        Comparison of that plan on all samples.
+    predicted, slopes : ndarray (m, n), (m, p, n)
+        Model friction and derivatives at the reference coordinates, the best first; not weighted.
     """
 
-    def __init__(self, plan: Plan, whole: Comparison, seen: Array, slopes: Array) -> None:
+    def __init__(self, plan: Plan, whole: Comparison, predicted: Array, slopes: Array) -> None:
         self.space = whole.space
-        scatter = float(np.std((whole.data - seen[0]) * whole.weights))
+        scatter = float(np.std((whole.data - predicted[0]) * whole.weights))
         largest = np.max(np.abs(slopes), axis=(0, 2), initial=0.0)
-        curves = [seen / max(MISSED * scatter, 1e-300)]
-        curves += [slopes[:, k] / (MISSED * size) for k, size in enumerate(largest) if size > 0]
+        curves = [predicted / max(INTERPOLATION_ERROR * scatter, 1e-300)]
+        curves += [slopes[:, k] / (INTERPOLATION_ERROR * size) for k, size in enumerate(largest) if size > 0]
         stacked = np.concatenate(curves)
         self.pieces = [
-            _Nodes(record.time, stacked[:, where], list(_held(record.time, loading, plan.pressed)))
+            _Interpolation(record.time, stacked[:, where], list(_kept_ranges(record.time, loading, plan.pressed)))
             for record, where, loading in zip(plan.records, whole.slices, plan.loading, strict=True)
         ]
         self.size = sum(len(piece.rows) for piece in self.pieces)
         records = tuple(r.taken(p.rows, "thinned") for r, p in zip(plan.records, self.pieces, strict=True))
         effort = whole.parts[0].forward.effort
-        longer = replace(effort, patience=effort.patience * whole.size // self.size)  # motions are as long as before
+        longer = replace(effort, patience=effort.patience * whole.size // self.size)  # same steps over fewer rows
         self.few = replace(plan, records=records, weights=None).comparison(longer)
         self.data, constant = [], 0.0
         for piece, where in zip(self.pieces, whole.slices, strict=True):
             piece.weigh(whole.weights[where])
-            data, rest = piece.condensed(whole.data[where], whole.weights[where], seen[0, where][piece.rows])
+            data, rest = piece.condensed(whole.data[where], whole.weights[where], predicted[0, where][piece.rows])
             self.data.append(data)
             constant += rest
         self.constant = float(np.sqrt(max(constant, 0.0)))
 
     def residuals(self, coordinates: Array) -> tuple[Array, Array]:
-        """Residuals and derivatives of the model, as `Comparison.residuals`; their squares are those of all samples."""
-        seen, slopes = self.few.model(coordinates)
-        r = np.empty((len(seen), self.size + 1))
-        rows = np.zeros((len(seen), len(self.space), self.size + 1))
+        """Residuals and derivatives like those of `Comparison.residuals`, with the sum of squares of all samples."""
+        predicted, slopes = self.few.model(coordinates)
+        r = np.empty((len(predicted), self.size + 1))
+        rows = np.zeros((len(predicted), len(self.space), self.size + 1))
         for piece, where, data in zip(self.pieces, self.few.slices, self.data, strict=True):
-            r[:, where] = data - piece.weighed(seen[:, where])
+            r[:, where] = data - piece.weighed(predicted[:, where])
             rows[:, :, where] = piece.weighed(slopes[:, :, where])
         r[:, -1] = self.constant
         return r, rows
 
 
 def condensed(plan: Plan, whole: Comparison, coordinates: Array) -> Comparison | Condensed:
-    """The same in fewer numbers near coordinates (m, p), the best first, where that is possible and worthwhile."""
+    """Condensed comparison near coordinates (m, p), the best first; `whole` itself where condensing does not pay."""
     if not len(coordinates) or not _possible(plan):
         return whole
-    return condensed_along(plan, whole, *whole.model(coordinates[:REFERENCES]))
+    return condensed_along(plan, whole, *whole.model(coordinates[:MAX_REFERENCES]))
 
 
-def condensed_along(plan: Plan, whole: Comparison, seen: Array, slopes: Array) -> Comparison | Condensed:
-    """The same near what `whole.model` says: friction (m, n) and its slopes (m, p, n), the best first."""
-    usable = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(slopes), axis=(1, 2))
+def condensed_along(plan: Plan, whole: Comparison, predicted: Array, slopes: Array) -> Comparison | Condensed:
+    """Condensed comparison near model friction (m, n) with derivatives (m, p, n), as `whole.model` returns them."""
+    usable = np.all(np.isfinite(predicted), axis=1) & np.all(np.isfinite(slopes), axis=(1, 2))
     if not np.any(usable) or not _possible(plan):
         return whole
-    found = Condensed(plan, whole, seen[usable][:REFERENCES], slopes[usable][:REFERENCES])
-    return found if found.size < WORTHWHILE * whole.size else whole
+    found = Condensed(plan, whole, predicted[usable][:MAX_REFERENCES], slopes[usable][:MAX_REFERENCES])
+    return found if found.size < MAX_KEPT_SHARE * whole.size else whole
 
 
 def _possible(plan: Plan) -> bool:
     return plan.follows and plan.loss == "linear"
 
 
-def _held(time: Array, loading: Loading, pressed: bool) -> Iterator[tuple[int, int]]:
-    """Ranges of samples within which the model may have a kink, first and last of each."""
+def _kept_ranges(time: Array, loading: Loading, pressed: bool) -> Iterator[tuple[int, int]]:
+    """First and last sample of each range in which the model may have a kink; all samples in it are kept."""
     for channel, _, change in loading.changes:
         if channel != "load" and not pressed:
             continue
@@ -109,7 +111,7 @@ def _held(time: Array, loading: Loading, pressed: bool) -> Iterator[tuple[int, i
 
 @dataclass(eq=False)
 class _Element:
-    """Neighbouring samples, first and last, and the polynomial through some of them: (samples, nodes)."""
+    """Range of samples, first to last, with weights (samples, nodes) of the polynomial through its nodes."""
 
     first: int
     last: int
@@ -117,8 +119,8 @@ class _Element:
     weights: Array
 
 
-class _Nodes:
-    """The samples of one record that are kept, and how the others follow from them."""
+class _Interpolation:
+    """Kept samples of one record, and the interpolation of the others from them."""
 
     def __init__(self, time: Array, curves: Array, held: list[tuple[int, int]]) -> None:
         keep = np.zeros(len(time), dtype=bool)
@@ -138,35 +140,37 @@ class _Nodes:
         self.upper = np.zeros((NODES, len(self.rows)))
 
     def _divide(self, time: Array, curves: Array, first: int, last: int) -> None:
-        """Elements between two samples, halved until polynomials give the curves."""
+        """Add elements between two samples, halved until polynomials interpolate the curves accurately enough."""
         waiting = [(first, last)]
         while waiting:
             i, j = waiting.pop()
             if j - i < 2 * NODES:
                 nodes = np.arange(i, j + 1)
-                for k in range(0, len(nodes) - 1, NODES - 1):  # nothing is saved, but the band stays narrow
+                for k in range(
+                    0, len(nodes) - 1, NODES - 1
+                ):  # all samples are kept, in groups that keep the band narrow
                     part = nodes[k : k + NODES]
                     self.elements.append(_Element(int(part[0]), int(part[-1]), part, np.eye(len(part))))
                 continue
             share = 0.5 - 0.5 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
             nodes = i + np.round((j - i) * share).astype(int)
             weights = _lagrange(time[nodes], time[i : j + 1])
-            missed = curves[:, i : j + 1] - curves[:, nodes] @ weights.T
-            if np.max(np.abs(missed)) <= 1.0:
+            errors = curves[:, i : j + 1] - curves[:, nodes] @ weights.T
+            if np.max(np.abs(errors)) <= 1.0:
                 self.elements.append(_Element(i, j, nodes, weights))
             else:
                 waiting += [(i, (i + j) // 2), ((i + j) // 2, j)]
 
-    def _spread(self, values: Array) -> Array:
-        """Values at all samples from those at the kept ones."""
+    def _interpolate(self, values: Array) -> Array:
+        """Interpolate values at the kept samples to all samples."""
         found = np.zeros(len(self.kept))
         found[self.rows] = values
         for one in self.elements:
             found[one.first : one.last + 1] = one.weights @ values[self.place[one.nodes]]
         return found
 
-    def _gathered(self, values: Array) -> Array:
-        """The transpose of that."""
+    def _transpose(self, values: Array) -> Array:
+        """Transpose of `_interpolate`: values at all samples to sums at the kept ones."""
         found = np.zeros(len(self.rows))
         own = self.kept.copy()
         for one in self.elements:
@@ -177,7 +181,7 @@ class _Nodes:
         return found
 
     def weigh(self, weights: Array) -> None:
-        """Find the upper triangle that weighs kept samples as all together weigh."""
+        """Compute the banded Cholesky factor that gives kept samples the weight of all samples."""
         squares, own = weights**2, self.kept.copy()
         band = np.zeros((NODES, len(self.rows)))
         for one in self.elements:
@@ -192,28 +196,28 @@ class _Nodes:
         self.upper = np.asarray(cholesky_banded(band))
 
     def weighed(self, values: Array) -> Array:
-        """The upper triangle times values at the kept samples (..., kept)."""
+        """Product of the Cholesky factor (upper triangle) with values at the kept samples (..., kept)."""
         found = self.upper[-1] * values
         for k in range(1, NODES):
             found[..., :-k] += self.upper[NODES - 1 - k, k:] * values[..., k:]
         return np.asarray(found)
 
-    def condensed(self, data: Array, weights: Array, seen: Array) -> tuple[Array, float]:
-        """Data for the kept samples, and the sum of squares that no model of them can take away.
+    def condensed(self, data: Array, weights: Array, predicted: Array) -> tuple[Array, float]:
+        """Transformed data at the kept samples, and the constant part of the sum of squares.
 
-        Reckoned from what a model says, `seen`, at the kept samples, for the sake of rounding.
+        Computed as a difference from model friction `predicted` at the kept samples, which reduces rounding errors.
         """
-        rest = weights * (data - self._spread(seen))
-        gathered = self._gathered(weights * rest)
-        lower = np.zeros_like(self.upper)  # the transpose, in the band storage of lower triangles
+        rest = weights * (data - self._interpolate(predicted))
+        gathered = self._transpose(weights * rest)
+        lower = np.zeros_like(self.upper)  # the transposed factor, in the banded storage of lower triangles
         for k in range(NODES):
             lower[k, : lower.shape[1] - k] = self.upper[NODES - 1 - k, k:]
         own = np.asarray(solve_banded((NODES - 1, 0), lower, gathered))
-        return self.weighed(seen) + own, float(rest @ rest - own @ own)
+        return self.weighed(predicted) + own, float(rest @ rest - own @ own)
 
 
 def _lagrange(nodes: Array, at: Array) -> Array:
-    """Weights (m, k) of values at nodes in the polynomial through them, at given places; barycentric."""
+    """Weights (m, k) that interpolate values at k nodes to m points; barycentric Lagrange interpolation."""
     differences = (nodes[:, None] - nodes[None, :]) / (nodes[-1] - nodes[0])
     np.fill_diagonal(differences, 1.0)
     bary = 1.0 / np.prod(differences, axis=1)

@@ -1,4 +1,8 @@
-"""How much work a fit may be, counted in steps of the model, so that it ends at the same point on every machine."""
+"""Limits on the work of a fit, counted in integration steps: it ends at the same point on every machine.
+
+The limits were chosen by trial so that nearly all fits converge within them; larger ones cost time in fits whose model
+cannot follow the record.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +13,24 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.kernels.experiment import LANES
 
-MOST_STEPS = 40  # per row of the table and lane, on average, before a motion is given up
-LEAST_WORK = 6e7  # that the search of one model may be, however short its records,
-RUNS = 1000.0  # and what so many runs through all samples are, a step each
-MODELS = 5.0  # searches of models, the simpler ones inside it included, that one fit may be
+MAX_STEPS_PER_ROW = 40  # integration steps per row of the input table, on average, before a motion is given up
+MIN_WORK = 6e7  # units of work (see `Budget`) that the search of one model may use, however short its records
+PASSES = 1000.0  # further work, in passes over all samples with one step each, for the search of one model
+MODELS = 5.0  # work of one fit, nested models included, as a multiple of that of one search
 
 
 class Budget:
-    """Work that may be done, and how much of it has been.
+    """Budget of work, and the work that is spent.
 
-    A unit of work is one step of eight motions side by side, of the slowest of them, times the numbers that each
-    carries along: itself and its derivatives.
+    Eight motions are integrated side by side, one per SIMD lane. One unit of work is one step of the slowest of them,
+    for each number that a motion carries: its state and the derivatives of it.
 
     Parameters
     ----------
     total : float
+        Units of work that may be spent.
     scale : float
-        Of the search of one model, as a multiple of what nearly always suffices.
+        Work of the search of one model, as a multiple of the default.
     """
 
     def __init__(self, total: float = np.inf, scale: float = 1.0) -> None:
@@ -33,31 +38,31 @@ class Budget:
 
     @classmethod
     def of_fit(cls, samples: int, unknowns: int, scale: float = 1.0) -> Budget:
-        """That of a fit to so many samples."""
+        """Budget of a fit with a number of samples and unknowns."""
         return cls(MODELS * scale * work_of_search(samples, unknowns), scale)
 
     def spend(self, steps: Array, carried: int) -> None:
-        """Count the steps of motions, (jobs,), that carried so many numbers each."""
+        """Add the work of motions that took `steps`, (jobs,), and carried a number of values each."""
         groups = np.zeros(-(-len(steps) // LANES) * LANES)
         groups[: len(steps)] = steps
         self.spent += float(np.sum(np.max(groups.reshape(-1, LANES), axis=1, initial=0.0))) * carried
 
     def part(self, work: float) -> Allowance:
-        """So much of it from now on, if there is as much."""
+        """Allowance of `work` units from now on, or of the rest of the budget if that is less."""
         return Allowance(self, min(self.spent + work, self.total))
 
 
 @dataclass(eq=False)
 class Allowance:
-    """Asked whether it is used up.
+    """Part of a budget; calling it returns True once it is spent.
 
     Attributes
     ----------
     budget : Budget
     end : float
-        Work that will have been done then.
+        Value of ``budget.spent`` at which the allowance is spent.
     was_met : bool
-        Whether it ever said so: something was left undone.
+        True once a call has returned True, that is, a computation was ended early.
     """
 
     budget: Budget
@@ -72,26 +77,26 @@ class Allowance:
 
 @dataclass(frozen=True, eq=False)
 class Effort:
-    """What running a model may cost.
+    """Limits on the integration of a model.
 
     Attributes
     ----------
     threads : int or None
-        All cores if None.
+        Number of threads; all cores if None.
     patience : int
-        Steps per row of the table and lane, on average, before a motion is given up.
+        Steps per row of the input table, on average, before a motion is given up.
     growth : float
-        The same as a multiple of the steps of the slowest motion that came to its end so far.
+        Steps before a motion is given up, as a multiple of those of the slowest motion that was completed.
     budget : Budget
-        Of the fit to which the runs belong.
+        Budget of the fit to which the runs belong.
     """
 
     threads: int | None = None
-    patience: int = MOST_STEPS
+    patience: int = MAX_STEPS_PER_ROW
     growth: float = np.inf
     budget: Budget = field(default_factory=Budget)
 
 
 def work_of_search(samples: int, unknowns: int) -> float:
-    """Work that the search of one model may be."""
-    return LEAST_WORK + RUNS * samples * (1 + unknowns)
+    """Units of work that the search of one model may use."""
+    return MIN_WORK + PASSES * samples * (1 + unknowns)

@@ -1,4 +1,4 @@
-"""Fits a rig to records: nobody has to guess, and what the records cannot tell is said."""
+"""Fit a rig to records, with starting values from the records and errors of the estimates."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe, white
 from steadyslip.machine.slider import Slider
 
-WIDTHS = 6  # of a loss, tried one after the other as long as each is narrower
-NARROWER = 0.8  # than so much of the one before
-BETTER = 1e-6  # reduction of the sum of squares, as a share, that makes another minimum of it
+MAX_WIDTHS = 6  # widths of a robust loss that are tried at most
+LEAST_NARROWING = 0.8  # a new width is used if it is below this share of the last; chosen by trial, to save searches
+MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a minimum; a search is within 1e-7 of it
 
 
-@checked()  # the others are declared as settings, for files too
+@checked()  # the options are checked as `FitSettings`, which files use too
 def fit(
     rig: Slider,
     records: Record | Sequence[Record],
@@ -145,28 +145,28 @@ def fit(
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
     if plan.loss == "linear" or plan.width is not None:
         found = find_minimum(plan, starts, allowed, progress)
-    else:  # outliers widen the scatter about a fit that they have pulled; less so each time
+    else:  # outliers shift the first fit and widen its scatter; the width shrinks as their weight does
         found = find_minimum(replace(plan, loss="linear"), starts, allowed, progress)
         last = np.inf
-        for _ in range(WIDTHS):
-            plan = with_width(plan, _scatter(found))
-            if (plan.width or 0.0) > NARROWER * last:
+        for _ in range(MAX_WIDTHS):
+            plan = with_width(plan, _weighted_residuals(found))
+            if (plan.width or 0.0) > LEAST_NARROWING * last:
                 break
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
-    return finished(plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+    return fit_with_errors(plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
 
 
-def _scatter(found: SearchResult) -> Array:
-    """Weighted residuals as they are, whatever the loss."""
+def _weighted_residuals(found: SearchResult) -> Array:
+    """Weighted residuals (n,) at the minimum, not scaled by the loss."""
     one = found.comparison
     return np.asarray((one.data - one.model(found.coordinates[None])[0][0]) * one.weights)
 
 
-def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
-    """The fit, or a better one of the same model that the values of fits of other models lead to.
+def refit_from(result: Fit, others: Sequence[Fit]) -> Fit:
+    """Fit of the same model started from the values of other fits, if that is better; else the given fit.
 
-    Parameters they have in common take the others' values, the rest keep their own.
+    Parameters that another fit has too start from its value, the rest from their own.
     """
     plan, space = result.plan, result.space
     own = np.array([result.values[name] for name in result.names])
@@ -181,34 +181,34 @@ def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
         lambda x, _: comparison.residuals(x), z, *result.bounds, most=MAX_ITERATIONS, stop=budget.part(np.inf)
     )
     ends = first_computable(comparison, ends.sorted())
-    if not ends.ssq[0] < result.ssq * (1 - BETTER):
+    if not ends.ssq[0] < result.ssq * (1 - MIN_GAIN):
         return result
     found, _ = with_states_sorted(comparison, ends)
     errors = "correlated" if result.correlated else "independent"
     search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
-    return finished(plan, comparison, found, search, errors, result.bounds)
+    return fit_with_errors(plan, comparison, found, search, errors, result.bounds)
 
 
-def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
-    """What the uncertainty of rates and normal stresses, read off the records, adds to that of the data."""
+def _level_uncertainty(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
+    """Covariance (p, p) of Jᵀr that comes from the uncertain levels of velocity and normal stress in the records."""
     found = np.zeros((len(z), len(z)))
-    seen: Array | None = None
+    predicted: Array | None = None
     for i, loading in enumerate(plan.loading if plan.follows else ()):
         for moved in shifted(loading, plan.pressed):
-            if seen is None:
-                seen = comparison.model(z[None])[0][0]
+            if predicted is None:
+                predicted = comparison.model(z[None])[0][0]
             others = tuple(moved if k == i else own for k, own in enumerate(plan.loading))
             model = replace(plan, loading=others).comparison().model(z[None])[0][0]
-            push = rows @ ((model - seen) * comparison.weights)
+            push = rows @ ((model - predicted) * comparison.weights)
             if np.all(np.isfinite(push)):
                 found += np.outer(push, push)
     return found
 
 
-def finished(
+def fit_with_errors(
     plan: Plan, comparison: Comparison, z: Array, search: SearchSummary, errors: str, bounds: tuple[Array, Array]
 ) -> Fit:
-    """Errors and everything else that belongs to a minimum."""
+    """Fit with errors, noise and combinations not determined, from the coordinates of a minimum."""
     from steadyslip import __version__
 
     r, jacobian = comparison.residuals(z[None])
@@ -222,9 +222,9 @@ def finished(
         noise = white(own, share) if errors == "independent" else describe(own, share, errors == "correlated")
         noises.append(noise)
         spread += noise.spread(rows[:, where])
-    spread += _from_levels(plan, comparison, z, rows)
+    spread += _level_uncertainty(plan, comparison, z, rows)
     known = prior_information(comparison.space)
     scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
-    covariance, lost = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
+    covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
     ssq = float(residuals @ residuals)
-    return Fit(plan, z, ssq, search, tuple(noises), covariance, lost, bounds, __version__)
+    return Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)

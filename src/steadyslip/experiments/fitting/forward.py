@@ -1,4 +1,4 @@
-"""The compiled model of an experiment: parameters in, what the record should show and its derivatives out."""
+"""Compiled model of an experiment: friction coefficient at the samples and its derivatives in the parameters."""
 
 from __future__ import annotations
 
@@ -19,29 +19,31 @@ from steadyslip.model.scales import scale_rows
 from steadyslip.motion.engine import run_many
 from steadyslip.motion.jobs import automatic_method
 
-LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
-LOOK = 0.3  # of the work of a step: to look up what is observed at a sample
-SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
-RICHER = 0.025  # more patience for each parameter: what a simpler model can follow, a richer one can
-LEAST_STEPS = 100  # that a motion is given
-_STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
+SENSITIVITY_RTOL = 1e-4  # relative error allowed in derivatives: they steer the search, and do not enter its result
+SAMPLE_WORK = 0.3  # work of interpolating friction at one sample, in integration steps
+SIZES = (6, 8, 12)  # numbers of directions for which kernels are compiled: few kernels serve all fits
+STEPS_PER_DIRECTION = (
+    0.025  # relative increase of the allowed steps per direction: a richer model must follow what nested ones do
+)
+MIN_STEPS = 100  # steps that every motion may take
+_STEP = 1e-6  # relative step of the central difference, error about 1e-10, used where k follows from other parameters
 
 
 @dataclass(frozen=True, eq=False)
 class InputTable:
-    """Inputs of an experiment, as the kernels take them.
+    """Input table of an experiment in the layout of the kernels.
 
     Attributes
     ----------
     segments : ndarray (jobs or 1, k, 9 or more)
-        Start, end, jump of the load point, values and slopes of load-point velocity, disturbance and added normal
-        stress.
+        Rows of start (s), end (s), jump of the load point (m), then values and slopes of load-point velocity (m/s),
+        disturbance and added normal stress (Pa).
     times : ndarray (samples,)
-        When friction is observed, on the clock of the rows.
+        Times at which friction is observed, s, with the zero of the rows.
     node_rates : ndarray (jobs or 1, directions or 0, k)
-        How the start of each row moves in each direction.
+        Derivative of the start of each row in each direction.
     input_rates : ndarray (jobs or 1, directions or 0, k, 3)
-        How the inputs at given times change in it.
+        Derivatives of the inputs at fixed times in each direction.
     """
 
     segments: Array
@@ -49,8 +51,8 @@ class InputTable:
     node_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     input_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0, 3)))
 
-    def part(self, rows: Array | slice) -> InputTable:
-        """That of some jobs."""
+    def for_jobs(self, rows: Array | slice) -> InputTable:
+        """Table of selected jobs."""
 
         def own(array: Array) -> Array:
             return array if len(array) == 1 else np.ascontiguousarray(array[rows])
@@ -58,7 +60,7 @@ class InputTable:
         return InputTable(own(self.segments), self.times, own(self.node_rates), own(self.input_rates))
 
     def with_inputs(self, count: int) -> InputTable:
-        """Table for a kernel with so many inputs; those that it does not have are zero."""
+        """Table for a kernel with `count` inputs; missing ones are zero."""
         known = (self.segments.shape[2] - 3) // 2
         if known == count:
             return self
@@ -69,16 +71,17 @@ class InputTable:
         )
         return InputTable(np.concatenate([head, values, slopes], axis=2), self.times, self.node_rates, rates)
 
-    def along(self, part: slice, size: int) -> InputTable:
-        """That of some directions, filled up to as many as a kernel has."""
+    def for_directions(self, part: slice, size: int) -> InputTable:
+        """Table of selected directions, padded with zeros to the `size` directions of a kernel."""
         rates = [
-            _padded(array[:, part], size) if array.shape[1] else array for array in (self.node_rates, self.input_rates)
+            _padded_directions(array[:, part], size) if array.shape[1] else array
+            for array in (self.node_rates, self.input_rates)
         ]
         return InputTable(self.segments, self.times, *rates)
 
 
-def _padded(array: Array, size: int) -> Array:
-    """Further directions in which nothing changes, up to a number of them."""
+def _padded_directions(array: Array, size: int) -> Array:
+    """Array padded with zeros along the direction axis (1) to `size`."""
     if array.shape[1] == size:
         return np.ascontiguousarray(array)
     missing = np.zeros((array.shape[0], size - array.shape[1], *array.shape[2:]))
@@ -87,28 +90,28 @@ def _padded(array: Array, size: int) -> Array:
 
 @lru_cache(maxsize=64)
 def _point_of(rig: Slider, names: tuple[str, ...]) -> OperatingPoint:
-    """Where a rig is, some of its parameters as arrays."""
+    """Operating point of a rig with the named parameters as arrays of length 1; cached."""
     return operating_point(rig, {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names})
 
 
 class Forward:
-    """Runs an experiment for many sets of parameters at once.
+    """Compiled model that is run for many sets of parameters at once.
 
     Parameters
     ----------
     rig : Slider
     names : sequence of str
-        Full dotted names of the parameters that vary.
+        Full dotted names of the free parameters.
     rtol : float
-        Error allowed per step.
+        Relative error allowed per step.
     shifts : int
-        How many free times of the table there are besides.
+        Number of free times of the input table.
     unsettled : sequence of str
-        Which of `ExperimentProgram.unsettled` are free as well: their directions come last.
+        Initial values, of `ExperimentProgram.unsettled`, that are free; their directions come last.
     sensitive : bool
-        Whether derivatives are wanted.
+        True to compute derivatives.
     effort : Effort, optional
-        What running may cost.
+        Limits on the integration.
     """
 
     def __init__(
@@ -117,7 +120,7 @@ class Forward:
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.unsettled = rig, tuple(names), rtol, shifts, tuple(unsettled)
         self.effort = effort or Effort()
-        self.slowest = np.inf  # steps of a motion that came to its end
+        self.slowest = np.inf  # most steps of a completed motion; inf before the first run
         self._base = _point_of(rig, self.names)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
@@ -126,7 +129,7 @@ class Forward:
         self.program = experiment_program(self.model, self.size, automatic_method(reduction), not unsettled)
 
     def values(self, parameters: Array) -> OperatingPoint:
-        """The model's parameters for rows of the free ones, (jobs, names)."""
+        """Operating points for values of the free parameters, (jobs, names)."""
         varied = {name: parameters[:, i] for i, name in enumerate(self.names)}
         if self.rig.axial_stiffness is not None:  # k follows from other parameters
             return operating_point(self.rig, varied)
@@ -134,8 +137,8 @@ class Forward:
         return self._base.with_arguments(named.values(), (len(parameters),))
 
     @cached_property
-    def _entries(self) -> Array:
-        """Which parameters of the model, and where it begins, each direction changes: (directions, all)."""
+    def _unit_directions(self) -> Array:
+        """Matrix (directions, parameters and initial values) of 1 where a direction is one of them, else 0."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
         begins = {name: len(order) + i for i, name in enumerate(self.program.unsettled)}
         found = np.zeros((-(-self.directions // max(self.size, 1)) * self.size, len(order) + len(begins)))
@@ -148,9 +151,9 @@ class Forward:
                 found[i, order[name]] = 1.0
         return found
 
-    def _chain(self, parameters: Array, units: Array) -> Array:
-        """How the model's parameters and where it begins change with the free ones; zero in directions to spare."""
-        chain = np.tile(self._entries, (len(parameters), 1, 1))
+    def _chain_rule(self, parameters: Array, units: Array) -> Array:
+        """Derivatives (jobs, directions, parameters and initial values) in the free ones; zero in unused directions."""
+        chain = np.tile(self._unit_directions, (len(parameters), 1, 1))
         if not self.directions:
             return chain
         if self.rig.axial_stiffness is not None and "slider.stiffness" not in self.names:
@@ -172,17 +175,17 @@ class Forward:
         return slope
 
     def run(self, table: InputTable, parameters: Array, units: Array, begin: Array | None = None) -> Array:
-        """The friction coefficient that would be observed.
+        """Compute the friction coefficient at the samples, and its derivatives.
 
         Parameters
         ----------
         table : InputTable
-            Its shifts as many as given to the constructor.
+            Table with as many free times as `shifts`.
         parameters : ndarray (jobs, names)
         units : ndarray (jobs, names)
-            Change of each parameter that its derivative refers to.
-        begin : ndarray (jobs, unsettled), optional
-            How far from steady sliding the motion begins.
+                Change of each parameter per unit of the coordinate in which derivatives are taken.
+            begin : ndarray (jobs, unsettled), optional
+                Initial differences from steady sliding.
 
         Returns
         -------
@@ -192,32 +195,32 @@ class Forward:
         """
         table = table.with_inputs(len(self.program.reduction.channels))
         values = self.values(parameters)
-        chain = self._chain(parameters, units)
+        chain = self._chain_rule(parameters, units)
         away = np.zeros((len(parameters), len(self.program.unsettled)))
         if begin is not None:
             away[:, [list(self.program.unsettled).index(name) for name in self.unsettled]] = begin
         if self.directions <= self.size:
-            own = table.along(slice(self.directions), self.size) if self.directions else table
+            own = table.for_directions(slice(self.directions), self.size) if self.directions else table
             return self._run(own, values, chain, away)[:, : 1 + self.directions]
         parts = [slice(k, k + self.size) for k in range(0, self.directions, self.size)]
-        found = [self._run(table.along(part, self.size), values, chain[:, part], away) for part in parts]
+        found = [self._run(table.for_directions(part, self.size), values, chain[:, part], away) for part in parts]
         return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
 
     def _run(self, table: InputTable, values: OperatingPoint, chain: Array, away: Array) -> Array:
-        """One pass, with as many directions as the kernel has."""
+        """Run the kernel once, with all directions that it has."""
         jobs, sigma = len(chain), values.stresses
         constants, start = self.program.arrays(values, chain, away)
         settings = self._settings(table, values, jobs)
-        good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
-        seen = np.full((jobs, 1 + chain.shape[1], len(table.times)), np.nan)
+        valid = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
+        predicted = np.full((jobs, 1 + chain.shape[1], len(table.times)), np.nan)
         steps = self.steps = np.zeros((jobs, 2))
-        if not np.all(good):
-            constants, start, settings, table = constants[good], start[good], settings[good], table.part(good)
-        found, taken = (seen, steps) if np.all(good) else (seen[good], steps[good])
+        if not np.all(valid):
+            constants, start, settings, table = constants[valid], start[valid], settings[valid], table.for_jobs(valid)
+        found, taken = (predicted, steps) if np.all(valid) else (predicted[valid], steps[valid])
 
         def work(first: int, last: int, _: threading.Event | None = None) -> None:
             part = slice(first, last)
-            own = table.part(part)
+            own = table.for_jobs(part)
             self.program.through_table(
                 constants[part], start[part], settings[part], own.segments, own.times, own.node_rates,
                 own.input_rates, found[part], taken[part],
@@ -226,28 +229,28 @@ class Forward:
         if len(found) <= LANES:
             work(0, len(found))
         elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
-            raise KeyboardInterrupt  # half of the runs would pass for runs that failed
-        self.effort.budget.spend(np.sum(taken, axis=1) + LOOK * len(table.times), 1 + chain.shape[1])
+            raise KeyboardInterrupt  # the runs that are missing must not count as failed ones
+        self.effort.budget.spend(np.sum(taken, axis=1) + SAMPLE_WORK * len(table.times), 1 + chain.shape[1])
         if self.effort.growth < np.inf:
             ended = np.sum(taken[np.isfinite(found[:, 0, -1])], axis=1)
             if len(ended):
                 known = self.slowest if self.slowest < np.inf else 0.0
                 self.slowest = max(known, float(np.max(ended)))
-        if found is not seen:
-            seen[good] = found
-        return seen
+        if found is not predicted:
+            predicted[valid] = found
+        return predicted
 
     def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
-        """Rows of settings, absolute tolerances of state and sensitivities last."""
+        """Settings of the kernel for each job, ending with the absolute tolerances of states and sensitivities."""
         scales, unknown = scale_rows(values, self.program.reduction)
         size = scales.shape[1]
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
-        richer = 1 + RICHER * (len(self.names) + self.shifts + len(self.unsettled))
+        richer = 1 + STEPS_PER_DIRECTION * (len(self.names) + self.shifts + len(self.unsettled))
         most = int(self.effort.patience * richer * len(table.times)) + 1000
-        settings[:, Setting.MOST_STEPS] = min(most, max(self.effort.growth * self.slowest, LEAST_STEPS))
+        settings[:, Setting.MOST_STEPS] = min(most, max(self.effort.growth * self.slowest, MIN_STEPS))
         settings[:, Setting.FIRST_STEP] = np.inf
         settings[:, Setting.ATOL : Setting.ATOL + size] = self.rtol * scales
-        settings[:, Setting.ATOL + size :] = np.tile(LOOSE * scales, self.size)
+        settings[:, Setting.ATOL + size :] = np.tile(SENSITIVITY_RTOL * scales, self.size)
         return settings

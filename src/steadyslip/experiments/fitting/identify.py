@@ -1,4 +1,4 @@
-"""What a record cannot tell: directions in parameter space along which the fit hardly changes."""
+"""Combinations of parameters that the records do not determine: directions along which the fit hardly changes."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.unknowns import Space
 
-UNDETERMINED = 0.5  # standard deviation along a direction, in e-folds or natural sizes
-MENTIONED = 0.15  # weight in a direction from which on a parameter is named
-FELT = 0.1  # the same, of its change along one standard deviation
-NOTHING = 1e-13  # share of the largest information that is rounding
-UNFELT = 1e-10  # share of the largest derivatives that is the rounding of a motion of many steps
+UNDETERMINED = 0.5  # standard deviation, in e-folds or natural sizes, above which a direction is not determined
+MIN_WEIGHT = 0.15  # least weight of a parameter named in a combination; smaller ones only lengthen the message
+MIN_CHANGE = 0.1  # a parameter is also named if one standard deviation along the direction changes it by this much
+EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled information below this share of the largest are rounding errors
+DERIVATIVE_ROUNDING = 1e-10  # derivatives below this share of the largest are rounding errors of the integration
 
 
 @dataclass(frozen=True)
 class Combination:
-    """A change of parameters that the records do not notice.
+    """Combined change of parameters that the records do not determine.
 
     Attributes
     ----------
     weights : dict of str to float
-        Parameters that change and by how much relative to each other, in e-folds (positive parameters) or natural
-        sizes (0.01 of b, 0.2 of α); the largest is 1.
+        Relative change of each parameter, in e-folds (positive parameters) or natural sizes (0.01 of b, 0.2 of α);
+        the largest is 1.
     deviation : float
-        Standard deviation along it, in the same units; inf if nothing at all is known.
+        Standard deviation along the direction, in e-folds or natural sizes; inf if the records give no bound.
     """
 
     weights: dict[str, float]
@@ -40,59 +40,59 @@ class Combination:
 
 
 def combinations(information: Array, spread: Array, space: Space) -> tuple[Array, tuple[Combination, ...]]:
-    """Covariance of the coordinates, and the directions that have none.
+    """Covariance of the coordinates, and the combinations of parameters that are not determined.
 
     Parameters
     ----------
     information : ndarray (p, p)
-        JᵀJ in coordinates.
+        JᵀJ, with the derivatives J in coordinates.
     spread : ndarray (p, p)
-        Jᵀ C J with the covariance of the data.
+        JᵀCJ, with the covariance C of the data.
     space : Space
 
     Returns
     -------
     covariance : ndarray (p, p)
-        Infinite where a parameter is not determined.
+        inf on the diagonal where a parameter is not determined.
     found : tuple of Combination
     """
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    blind = size <= UNFELT * max(float(size.max(initial=0.0)), 1e-300)
-    scale = np.where(blind, 1.0, size)
+    insensitive = size <= DERIVATIVE_ROUNDING * max(float(size.max(initial=0.0)), 1e-300)
+    scale = np.where(insensitive, 1.0, size)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    known = values > NOTHING * max(float(values.max(initial=0.0)), 1e-300)
+    known = values > EIGENVALUE_ROUNDING * max(float(values.max(initial=0.0)), 1e-300)
     inverse = vectors[:, known] / values[known] @ vectors[:, known].T / np.outer(scale, scale)
     covariance = inverse @ spread @ inverse
-    found, lost = [], np.zeros(len(space), dtype=bool)
+    found, undetermined = [], np.zeros(len(space), dtype=bool)
     for i in np.flatnonzero(~known):
         direction = vectors[:, i] / scale
-        found.append(_named(direction, np.inf, space))
-        lost |= np.abs(direction) > 1e-3 * np.max(np.abs(direction))
-    usable = np.flatnonzero(~lost)
+        found.append(_combination(direction, np.inf, space))
+        undetermined |= np.abs(direction) > 1e-3 * np.max(np.abs(direction))
+    usable = np.flatnonzero(~undetermined)
     if len(usable):
         deviations, axes = np.linalg.eigh(covariance[np.ix_(usable, usable)])
         for variance, axis in sorted(zip(deviations, axes.T, strict=True), key=lambda pair: -pair[0]):
             if variance > UNDETERMINED**2:
                 full = np.zeros(len(space))
                 full[usable] = axis
-                found.append(_named(full, float(np.sqrt(variance)), space))
-    lost |= np.diag(covariance) > UNDETERMINED**2
-    covariance[lost, :] = covariance[:, lost] = 0.0
-    covariance[lost, lost] = np.inf
+                found.append(_combination(full, float(np.sqrt(variance)), space))
+    undetermined |= np.diag(covariance) > UNDETERMINED**2
+    covariance[undetermined, :] = covariance[:, undetermined] = 0.0
+    covariance[undetermined, undetermined] = np.inf
     return covariance, tuple(found)
 
 
-def _named(direction: Array, deviation: float, space: Space) -> Combination:
+def _combination(direction: Array, deviation: float, space: Space) -> Combination:
     weights = direction / direction[np.argmax(np.abs(direction))]
-    least = min(MENTIONED, max(FELT / deviation, 0.01))
+    least = min(MIN_WEIGHT, max(MIN_CHANGE / deviation, 0.01))
     order = [i for i in np.argsort(-np.abs(weights)) if abs(weights[i]) >= least]
     return Combination({space.unknowns[i].name: float(weights[i]) for i in order}, deviation)
 
 
 def prior_information(space: Space) -> Array:
-    """What is known of times between two samples beforehand: they lie between them, evenly likely."""
+    """Prior information (p, p) on times between two samples: inverse variances of uniform distributions."""
     known = np.zeros((len(space), len(space)))
     for i, one in enumerate(space.unknowns):
         if one.parameter.startswith(("jump.", "step.")):
-            known[i, i] = 12.0  # one over the variance of a number between 0 and 1, which is the coordinate's unit
+            known[i, i] = 12.0  # 1 / variance of a uniform distribution of width 1, the width in coordinates
     return known

@@ -1,4 +1,4 @@
-"""What drives an experiment, as tables for the kernels: measured histories exactly at samples, or a protocol."""
+"""Input tables of the kernels for loading as measured at the samples, or for a protocol."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.records import parameters, with_values
-from steadyslip.experiments.fitting.commanded import STRAIGHT
+from steadyslip.experiments.fitting.commanded import STRAIGHT_TOLERANCE
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
 from steadyslip.experiments.measured.record import Record
@@ -20,39 +20,39 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import inputs_at
 from steadyslip.protocol.segments import Segments, pack
 
-LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
-PER_PERIOD = 300  # rows per period of a sine wave, on which it becomes straight: 6e-5 of its amplitude
-MOST_JUMPS = 20
-_SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
+LEAST_RATE = 0.05  # least change of ln(velocity) that counts as a step; smaller ones are within measuring errors
+PER_PERIOD = 300  # rows per period of a sine wave; straight lines deviate from it by 6e-5 of its amplitude
+MOST_JUMPS = 20  # largest number of jumps whose times are fitted
+_SHIFT = 1e-3  # step of the central difference in free times, s; any would do, as the table is linear in them
 
 
 @dataclass(frozen=True)
 class Sharp:
-    """Changes that happen at once, between two samples of a record.
+    """Sudden changes between two samples of a record.
 
     Attributes
     ----------
     jumps : tuple of (float, float)
-        Times of the samples between which the normal stress, or a measured rate, jumped.
+        Times, s, of the samples before and after each jump of the normal stress or of a measured velocity.
     kinks : tuple of (float, float, float)
-        Times of the samples between which the displacement has a kink, and of the kink itself.
+        Times, s, of the samples before and after each kink of the displacement, and of the kink itself.
     """
 
     jumps: tuple[tuple[float, float], ...] = ()
     kinks: tuple[tuple[float, float, float], ...] = ()
 
     def rows(self, time: Array) -> Array:
-        """Samples around all of them, which a thinned record must keep."""
+        """Indices of the samples around all changes, which a thinned record must keep."""
         places = [int(np.searchsorted(time, change[0])) for change in (*self.jumps, *self.kinks)]
         around = [np.arange(i - 3, i + 5) for i in places]
         return np.unique(np.clip(np.concatenate([np.empty(0, dtype=int), *around]), 0, len(time) - 1))
 
 
 def sharp_changes(record: Record) -> Sharp:
-    """Find the changes of a record that straight lines between samples would smear.
+    """Find sudden changes of a record, which straight lines between samples would smear.
 
-    A change counts if it stands out of those before and after it. When exactly a displacement bends follows from the
-    lines on both sides; when a stress jumps does not, and is left to the fit.
+    A change counts if it is much larger than those before and after it. The time of a kink of the displacement follows
+    from the lines on both sides; the time of a jump does not, and is fitted.
     """
     jumps: set[int] = set()
     if record.normal is not None:
@@ -70,19 +70,19 @@ def sharp_changes(record: Record) -> Sharp:
 
 
 def _jumps(time: Array, values: Array, least: float) -> Array:
-    """Places where a change from one sample to the next stands alone; `least` is a share of the values."""
+    """Indices of samples before isolated jumps larger than a share `least` of the largest value."""
     size, spacing = np.abs(np.diff(values)), np.diff(time)
     if len(size) < 5:
         return np.empty(0, dtype=int)
     usual = 1.4826 * float(np.median(size))
     padded = np.pad(size / spacing, 2)
-    rates = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)  # of the two on both sides
+    rates = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)  # of two intervals on each side
     alone = size > 8 * rates * spacing
     return np.flatnonzero(alone & (size > least * float(np.max(np.abs(values)))) & (size > 20 * usual))
 
 
 def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
-    """Intervals within which two straight lines meet, and where."""
+    """Index of the interval and time, s, of each kink: where the straight lines on both sides meet."""
     slopes = np.diff(displacement) / np.diff(time)
     if len(slopes) < 7:
         return []
@@ -98,7 +98,7 @@ def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
 
 
 def _through(time: Array, values: Array, jumping: set[float]) -> Any:
-    """A smooth curve through samples: local cubics; straight where something jumps."""
+    """Piecewise cubic curve through samples, with zero slope next to jumps; `jumping` has their first times."""
     from scipy.interpolate import CubicHermiteSpline
 
     slopes = np.gradient(values, time)
@@ -109,10 +109,9 @@ def _through(time: Array, values: Array, jumping: set[float]) -> Any:
 
 
 def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Array]:
-    """Intervals on which a straight line would miss a smooth curve, and times that cut them finely enough.
+    """Intervals on which a straight line deviates from a smooth curve, and times, s, that divide them finely enough.
 
-    The curve has to stand out of the noise: a sample is missed by the cubic through its neighbours by less than the
-    straight line misses the curve.
+    Deviations count only above the noise, which is estimated by predicting samples from their neighbours.
     """
     if len(time) < 8:
         return np.empty(0, dtype=int), np.empty(0)
@@ -121,7 +120,7 @@ def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Arr
     misses = np.abs(_through(time, values, jumping)(middle) - 0.5 * (values[1:] + values[:-1]))
     even, odd = np.arange(0, len(time), 2), np.arange(1, len(time) - 1, 2)
     noise = float(np.median(np.abs(_through(time[even], values[even], set())(time[odd]) - values[odd])))
-    least = max(STRAIGHT * float(np.ptp(values)), 3 * noise)
+    least = max(STRAIGHT_TOLERANCE * float(np.ptp(values)), 3 * noise)
     for first in jumping:
         i = int(np.searchsorted(time, first))
         misses[max(i - 3, 0) : i + 4] = 0.0
@@ -134,16 +133,17 @@ def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Arr
 
 
 class MeasuredInputs:
-    """A record's own load point and normal stress between its samples, and what happens at once.
+    """Input tables for load point and normal stress as measured, with straight lines between the samples.
 
-    The load point moves along straight lines, the normal stress too unless it is clearly curved.
+    The normal stress follows a smooth curve where it is clearly curved. Jumps and kinks lie between samples.
 
     Parameters
     ----------
     record : Record
     sharp : Sharp
+        Sudden changes of the record.
     pressed : ndarray (n,), optional
-        Change of the normal stress at the samples, Pa.
+        Change of the normal stress since the first sample, Pa, where it drives the model.
     """
 
     def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None) -> None:
@@ -177,7 +177,7 @@ class MeasuredInputs:
         spacing = np.diff(record.time)
         if record.displacement is not None:
             rows[:, 3] = (np.diff(record.displacement) / spacing)[old]
-        if record.integrated and record.velocity is not None:  # the rate itself is the straight line
+        if record.integrated and record.velocity is not None:  # the velocity was measured: it varies linearly
             slope = (np.diff(record.velocity) / spacing)[old]
             rows[:, 3] = record.velocity[old] + slope * (rows[:, 0] - (record.time[old] - self.origin))
             rows[:, 6] = slope
@@ -189,11 +189,11 @@ class MeasuredInputs:
             rows[:, 5], rows[:, 8] = before, (after - before) / (rows[:, 1] - rows[:, 0])
 
     def _cut(self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None) -> None:
-        """Two rows in place of one interval: levels where something jumps, two slopes where the displacement bends."""
+        """Set the two rows of a divided interval: constant values before and after a jump, two velocities at a kink."""
         if not jumps:
             early, late = rows[row - 1, 1] - rows[row - 1, 0], rows[row, 1] - rows[row, 0]
             if record.displacement is None:
-                raise InternalError("record.displacement is not None")
+                raise InternalError("a kink was found in a record without displacement")
             rate = (record.displacement[i] - record.displacement[i - 2]) / (record.time[i] - record.time[i - 2])
             gone = record.displacement[i + 1] - record.displacement[i]
             rows[row - 1, 3], rows[row, 3] = rate, (gone - rate * early) / late
@@ -206,16 +206,16 @@ class MeasuredInputs:
             rows[row - 1 : row + 1, 6] = 0.0
 
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
-        """The table for the times of the jumps.
+        """Input table for given times of the jumps.
 
         Parameters
         ----------
         times : ndarray (jobs, jumps)
-            On the record's clock, s.
+            Times of the jumps, s, on the record's clock.
         first : int
-            Direction of the first of them.
+            Index of the direction of the first jump.
         directions : int
-            How many directions there are; none are wanted if zero.
+            Number of directions of derivatives; 0 for a table without derivatives.
         """
         if not len(self.moving):
             return InputTable(self.rows, self.times)
@@ -230,16 +230,16 @@ class MeasuredInputs:
 
 
 class ProtocolInputs:
-    """Tables of a protocol at a record's samples, for any values of its free times.
+    """Input tables for a protocol at the samples of a record, for any values of its free times.
 
     Parameters
     ----------
     protocol : Protocol
-        Its times are on the record's clock.
+        Protocol with times on the record's clock.
     velocity : float
-        Of the drive, m/s.
+        Velocity of the drive, m/s.
     time : ndarray
-        Of the samples, s.
+        Times of the samples, s.
     free : sequence of str
         Names of free times, ``protocol.pieces.1.at``.
     pressed : ndarray (n,), optional
@@ -248,7 +248,7 @@ class ProtocolInputs:
     Attributes
     ----------
     plain : dict of str to float
-        Parameters of the protocol as it has them, by their dotted names.
+        Parameters of the protocol as given, by dotted name.
     """
 
     def __init__(
@@ -259,7 +259,7 @@ class ProtocolInputs:
         self.plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
 
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
-        """Tables for the free times (jobs, free); see `MeasuredInputs.table`."""
+        """Input table for values of the free times (jobs, free), s; see `MeasuredInputs.table`."""
         if not self.free:
             return self._once
         segments = self._packed(times)
@@ -285,7 +285,7 @@ class ProtocolInputs:
         extra = _wave_nodes(segments, first, last)
         fixed = np.concatenate([[first, last] if self.pressed is None else self.time, extra])
         nodes = np.hstack([np.clip(starts, first, last), np.tile(fixed, (jobs, 1))])
-        order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
+        order = np.argsort(nodes, axis=1, kind="stable")  # a step sorts before a sample at the same time
         ends = np.take_along_axis(nodes, order, axis=1)
         begins = order < starts.shape[1]
         own = np.maximum.accumulate(np.where(begins, order, 0), axis=1)[:, :-1]
@@ -319,12 +319,12 @@ def _of(array: Array, own: Array, jobs: int) -> Array:
 
 
 def _at(segments: Segments, own: Array, times: Array, jobs: int) -> Array:
-    """Inputs of the segments `own` at given times, (jobs, rows, 3)."""
+    """Inputs of the segments `own` (jobs, rows) at given times, (jobs, rows, 3)."""
     return inputs_at(segments, np.arange(jobs)[:, None], own, times)
 
 
 def _wave_nodes(segments: Segments, first: float, last: float) -> Array:
-    """Further rows, so that sine waves are nearly straight on each."""
+    """Times of further rows, s, so that sine waves are nearly straight on each; empty without waves."""
     fastest = float(segments.angular_frequency.max(initial=0.0, where=segments.amplitude != 0))
     if not fastest:
         return np.empty(0)

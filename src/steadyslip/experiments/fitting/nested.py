@@ -1,8 +1,8 @@
-"""Simpler models inside a richer one: a fit of the richer must not end above what they reach.
+"""Nested models: a fit of the richer model must not end with a larger sum of squares than they reach.
 
-A parameter whose record says at which value it does nothing (`Parameter.idle`) makes the model without it part of the
-model with it. Where such a model is anywhere near as good it is fitted too, exactly as anyone would fit it alone, and
-where it ends the richer one starts.
+A parameter that declares a value at which it has no effect (`Parameter.idle`) makes the model without it a special
+case of the model with it. Where such a nested model comes near the best fit it is fitted too, exactly as a fit of its
+own would be, and the richer model starts from its minimum.
 """
 
 from __future__ import annotations
@@ -17,28 +17,29 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.machine.slider import Slider
 
-SPREAD = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of its other scales from which a member that was idle starts
+SCALE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of a similar scale at which an undetermined scale starts
 
 
 @dataclass(frozen=True)
-class Simpler:
-    """A simpler model, and what the richer one has besides.
+class NestedModel:
+    """Nested model, with the parameters that only the richer model has.
 
     Attributes
     ----------
     plan : Plan
+        Plan of the nested model.
     idle : dict of str to float
-        Values at which further parameters do nothing, by name.
+        Further parameters of the richer model, by name, with the values at which they have no effect.
     scales : tuple of str
-        Further parameters that say nothing while the others are idle, such as the slip distance of a state.
+        Further parameters that have no effect while those are idle, such as the slip distance of a state.
     """
 
     plan: Plan
     idle: dict[str, float]
     scales: tuple[str, ...]
 
-    def held(self, space: Space) -> tuple[Array, Array]:
-        """Which coordinates of the richer model (p,) the simpler one does not have, and where those do nothing."""
+    def missing(self, space: Space) -> tuple[Array, Array]:
+        """Mask (p,) of the richer model's coordinates that the nested one lacks, and their idle values (p,)."""
         held, at = np.zeros(len(space), dtype=bool), np.zeros(len(space))
         for i, one in enumerate(space.unknowns):
             held[i] = one.parameter in self.idle or one.parameter in self.scales
@@ -46,28 +47,28 @@ class Simpler:
                 at[i] = float(one.coordinate(self.idle[one.parameter]))
         return held, at
 
-    def within(self, space: Space, coordinates: Array, low: Array, high: Array) -> Array:
-        """Where coordinates of the simpler model lie in the richer one, (m, p): several places for open scales."""
+    def points_in(self, space: Space, coordinates: Array, low: Array, high: Array) -> Array:
+        """Points (m, p) of the richer model for coordinates of the nested one; m values of undetermined scales."""
         known = dict(zip([one.name for one in self.plan.space().unknowns], coordinates, strict=True))
-        _, at = self.held(space)
+        _, at = self.missing(space)
         own = np.array([known.get(one.name, at[i]) for i, one in enumerate(space.unknowns)])
-        found = np.tile(own, (len(SPREAD) if self.scales else 1, 1))
+        found = np.tile(own, (len(SCALE_FACTORS) if self.scales else 1, 1))
         for i, one in enumerate(space.unknowns):
             if one.parameter in self.scales:
                 alike = [k for k, other in enumerate(space.unknowns) if other.kind == one.kind and k != i]
-                found[:, i] = np.clip(own[alike[0] if alike else i] + np.log(SPREAD), low[i], high[i])
+                found[:, i] = np.clip(own[alike[0] if alike else i] + np.log(SCALE_FACTORS), low[i], high[i])
         return found
 
 
-def simpler(plan: Plan) -> Iterator[Simpler]:
-    """The models that lack the last order of a trend, its own beginning, the last of a list, or a part of a law."""
+def nested_models(plan: Plan) -> Iterator[NestedModel]:
+    """Nested models: without the last trend term, free initial state, offset, last state of a law, or part of it."""
     if plan.trend:
-        yield Simpler(replace(plan, trend=plan.trend - 1), {f"trend.{plan.trend}": 0.0}, ())
+        yield NestedModel(replace(plan, trend=plan.trend - 1), {f"trend.{plan.trend}": 0.0}, ())
     if plan.initial == "free":
         away = [one.parameter for one in plan.space().unknowns if one.parameter.startswith("initial.")]
-        yield Simpler(replace(plan, initial="steady"), dict.fromkeys(away, 0.0), ())
+        yield NestedModel(replace(plan, initial="steady"), dict.fromkeys(away, 0.0), ())
     if plan.offset:
-        yield Simpler(replace(plan, offset=False), {"offset": 0.0}, ())
+        yield NestedModel(replace(plan, offset=False), {"offset": 0.0}, ())
     addresses, seen = plan.rig.parameters(), set()
     for name in plan.free:
         role = addresses[name].role if name in addresses else None
@@ -80,7 +81,7 @@ def simpler(plan: Plan) -> Iterator[Simpler]:
                 rig = plan.rig.with_values({name: role.idle})
                 within = [key for key in plan.free if "." in owner and key.startswith(f"{owner}.")]
                 scales = tuple(key for key in within if addresses[key].role.idle is None)
-                yield Simpler(_without(plan, rig, [name, *scales]), {name: role.idle}, scales)
+                yield NestedModel(_without(plan, rig, [name, *scales]), {name: role.idle}, scales)
             continue
         last = int(member) > 1 and not any(key.startswith(f"{family}.{int(member) + 1}.") for key in addresses)
         if not last or owner in seen:
@@ -90,7 +91,7 @@ def simpler(plan: Plan) -> Iterator[Simpler]:
         idle = {key: value for key in names if (value := addresses[key].role.idle) is not None}
         if idle:
             scales = tuple(key for key in names if key not in idle)
-            yield Simpler(_without(plan, _shorter(plan.rig, family), names), idle, scales)
+            yield NestedModel(_without(plan, _shorter(plan.rig, family), names), idle, scales)
 
 
 def _without(plan: Plan, rig: Slider, names: list[str]) -> Plan:

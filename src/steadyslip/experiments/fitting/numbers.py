@@ -1,4 +1,4 @@
-"""A fit: what was found, how sure that is, and what it was found from."""
+"""Numbers of a fit: estimates, errors, residuals, and the plan that they come from."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from steadyslip.machine.slider import Slider
 
 @dataclass(frozen=True)
 class Estimate(Displayed):
-    """One fitted parameter.
+    """Fitted parameter with its error and 95 % interval.
 
     Attributes
     ----------
     name : str
         Dotted name; ``@2`` behind it where it belongs to the second record alone.
     value, error : float
-        SI units; the error is one standard deviation, inf where the records do not determine the parameter.
+        Estimate and standard deviation in SI units; the error is inf where the records do not determine the parameter.
     unit : str
     low, high : float
         Ends of the 95 % interval.
     area : float or None
-        Of the rig, m²: people are told totals then.
+        Contact area of the rig, m²; if given, text shows totals for the whole contact.
     """
 
     name: str
@@ -65,8 +65,8 @@ class Estimate(Displayed):
         return f"{self.name} = {self.shown()}"
 
     def shown(self) -> str:
-        """Value and error for people."""
-        if self.unit == "s":  # times are those of the record's clock
+        """Format value and error with units, as printed."""
+        if self.unit == "s":  # a time on the record's clock needs its digits
             return (
                 f"{self.value:.7g} ± {self.error:.2g} s" if self.determined else f"{self.value:.7g} s (not determined)"
             )
@@ -75,7 +75,7 @@ class Estimate(Displayed):
         return format_with_error(self.value, self.error, self.unit, self.area)
 
     def range(self) -> str:
-        """The 95 % interval for people."""
+        """Format the 95 % interval with units, as printed."""
         if self.unit == "s":
             return f"{self.low:.7g} to {self.high:.7g} s"
         return format_range(self.low, self.high, self.unit, self.area)
@@ -83,26 +83,27 @@ class Estimate(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class FitNumbers(ReadOnly):
-    """A rig fitted to records.
+    """Rig fitted to records.
 
     Attributes
     ----------
     plan : Plan
-        What was compared.
+        Rig, records and options of the fit.
     coordinates : ndarray (p,)
-        Where the sum of squares is least, in the coordinates of ``plan.space()``.
+        Coordinates of the least sum of squares, in ``plan.space()``.
     ssq : float
-        Sum of squared residuals (weighted, or as the loss has them).
+        Sum of squared residuals, weighted and scaled by the loss.
     search : SearchSummary
     noise : tuple of Noise
-        Of the residuals of every record.
+        Autocorrelation of the residuals of every record.
     covariance : ndarray (p, p)
-        Of the coordinates; infinite where a parameter is not determined.
+        Covariance of the coordinates; infinite where a parameter is not determined.
     unidentified : tuple of Combination
-        What the records cannot tell.
+        Combinations of parameters that the records do not determine.
     bounds : tuple of two ndarray (p,)
-        Where the coordinates were searched.
+        Lower and upper bounds of the search, in coordinates.
     version : str
+        Version of steadyslip that made the fit.
     """
 
     plan: Plan
@@ -116,7 +117,7 @@ class FitNumbers(ReadOnly):
     version: str = field(repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What makes the fit, without what was derived from it: kernels cannot be copied, nor need they be."""
+        """Fields of the fit, for pickling; cached results are left out, as kernels cannot be copied."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
@@ -145,7 +146,7 @@ class FitNumbers(ReadOnly):
 
     @checked(level=finite(0, 1))
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Interval of a parameter; of a positive one symmetric in its logarithm.
+        """Confidence interval of a parameter in SI units; for a positive parameter symmetric in its logarithm.
 
         Parameters
         ----------
@@ -166,7 +167,7 @@ class FitNumbers(ReadOnly):
         return max(low, one.low), min(high, one.high)
 
     def index(self, name: str) -> int:
-        """Place of a parameter, which may leave out leading parts of its name."""
+        """Index of a parameter; leading parts of its name may be left out."""
         try:
             return self.names.index(resolve(name, dict.fromkeys(self.names)))
         except UnknownNameError:
@@ -181,27 +182,27 @@ class FitNumbers(ReadOnly):
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every fitted parameter with its error."""
+        """All fitted parameters with their errors."""
         return tuple(self[name] for name in self.names)
 
     @cached_property
     def as_measured(self) -> dict[str, float] | None:
-        """Values that the displacement and normal stress as measured, instead of the commanded ones, would lead to.
+        """Values that a fit driven by the measured columns, instead of the commanded loading, would have.
 
-        None where the model does not follow commanded loading, or the columns have no noise to speak of.
+        None where the model does not follow commanded loading, or the measured columns have hardly any noise.
         """
         return driven_as_measured(self.plan, self.values, self._ends)
 
     @cached_property
     def as_ramps(self) -> tuple[Ramped, ...]:
-        """What would come of it if steps of the rate that the displacement cannot tell from ramps were ramps."""
+        """Fits with ramps in place of velocity steps that the displacement does not distinguish from ramps."""
         return with_ramps(self.plan, self.values, self._ends)
 
     @cached_property
     def with_memories(self) -> tuple[Remembered, ...]:
-        """Fits with memories of the normal stress, the best first, where it changes and the law has none.
+        """Fits with each memory of the normal stress, the best first, where it changes and the law has no memory.
 
-        None are tried if the residuals are white, which speaks for no memory.
+        Empty if the residuals are white noise, as there is then nothing that a memory could explain.
         """
         return with_memories(self.plan) if self.has_structure else ()
 
@@ -213,12 +214,12 @@ class FitNumbers(ReadOnly):
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:
-        """Where the coordinates were find_minimum, by name."""
+        """Bounds of the search, in coordinates, by name of the unknown."""
         return dict(zip(self.names, zip(*self.bounds, strict=True), strict=True))
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
-        """Parameters that ran to the end of what was find_minimum, each in a sentence."""
+        """Sentences on parameters that ended at a bound of the search."""
         low, high = self.bounds
         found = []
         for i, one in enumerate(self.space.unknowns):
@@ -232,12 +233,12 @@ class FitNumbers(ReadOnly):
                         if one.unit == "s"
                         else format_quantity(value, one.unit, area=self.plan.rig.area)
                     )
-                    text = f"{one.name} ended at the {word} value that was find_minimum, {end}"
+                    text = f"{one.name} ended at the {word} value that was searched, {end}"
                     found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
         return tuple(found)
 
     def _beyond_window(self, one: Unknown, when: str) -> str:
-        """What it means that friction would have a change at a time that the columns exclude."""
+        """Explanation for the time of a change that ended at a bound of its window; empty for other unknowns."""
         if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
             return ""
         return (
@@ -246,7 +247,7 @@ class FitNumbers(ReadOnly):
         )
 
     def _within_interval(self, one: Unknown) -> bool:
-        """Whether an unknown is the time of a step that lies between two samples."""
+        """True if an unknown is the time of a step that lies between two neighbouring samples."""
         time = self.plan.records[one.record or 0].time
         return one.parameter.startswith("step.") and one.high - one.low < 1.01 * float(np.max(np.diff(time)))
 
@@ -256,36 +257,36 @@ class FitNumbers(ReadOnly):
 
     @property
     def degrees(self) -> int:
-        """Samples less parameters."""
+        """Degrees of freedom: samples less parameters."""
         return self.samples - len(self.space)
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals."""
+        """Root mean square of the residuals, in friction."""
         return float(np.sqrt(np.mean(self.residuals**2)))
 
     @cached_property
     def model(self) -> Array:
-        """Friction of the fitted model, trend included, at all samples."""
+        """Friction coefficient of the fitted model, trend included, at all samples (n,)."""
         return np.asarray(read_only(self.comparison.model(self.coordinates[None])[0][0]))
 
     @property
     def residuals(self) -> Array:
-        """Data less model."""
+        """Residuals (n,): measured friction less that of the model."""
         return np.asarray(read_only(self.comparison.data - self.model))
 
     def part(self, values: Array, record: int = 0) -> Array:
-        """Those of `values` at all samples that belong to one record."""
+        """Part of `values` (n,) at all samples that belongs to one record."""
         return values[self.comparison.slices[record]]
 
     @property
     def correlated(self) -> bool:
-        """Whether errors take residuals as correlated from sample to sample."""
+        """True if the errors allow for correlated residuals."""
         return any(noise.correlated for noise in self.noise)
 
     @cached_property
     def correlation(self) -> Array:
-        """Correlation of the estimates; NaN where one is not determined."""
+        """Correlation matrix (p, p) of the estimates; NaN where one is not determined."""
         with np.errstate(all="ignore"):
             size = np.sqrt(np.diag(self.covariance))
             found: Array = self.covariance / np.outer(size, size)
@@ -293,7 +294,7 @@ class FitNumbers(ReadOnly):
         return np.asarray(read_only(found))
 
     def rig(self, record: int = 0) -> Slider:
-        """The rig with fitted values, driven as a record drives it."""
+        """Rig with the fitted values, and the initial velocity and normal stress of a record."""
         driven = self.comparison.parts[record].rig
         own = {
             one.parameter: self.values[one.name]
@@ -304,16 +305,16 @@ class FitNumbers(ReadOnly):
 
     @property
     def aic(self) -> float:
-        """Akaike's criterion; of fits to the same records the one with less is to be preferred."""
+        """Akaike's information criterion; of fits to the same records, the least is the best."""
         return self.criteria(self.noise)[0]
 
     @property
     def bic(self) -> float:
-        """Schwarz's criterion."""
+        """Schwarz's (Bayesian) information criterion."""
         return self.criteria(self.noise)[1]
 
     def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:
-        """AIC and BIC, counting as many samples as are independent with a given noise."""
+        """AIC and BIC with the number of independent samples that a noise model of each record gives."""
         deviance = independent = 0.0
         for i, one in enumerate(noise):
             r = self.part(self.residuals * self.comparison.weights, i)

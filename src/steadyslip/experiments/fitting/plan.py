@@ -1,4 +1,4 @@
-"""What a fit compares: rig, records, what drives the model, what is free."""
+"""Plan of a fit: rig, records, loading and free parameters."""
 
 from __future__ import annotations
 
@@ -37,47 +37,48 @@ from steadyslip.model.scales import natural_scales
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
-FRICTION = 0.01  # of friction: what matters
+FRICTION = 0.01  # natural size of an initial difference of friction from steady sliding
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything about a fit but its result.
+    """Definition of a fit: everything but its result.
 
     Attributes
     ----------
     rig : Slider
-        Laws, and the values of what is not free.
+        Laws, and values of the parameters that are not free.
     records : tuple of Record
     free : tuple of str
         Full names of the free parameters of the rig, and of free times ``protocol.pieces.1.at``.
     separate : tuple of str
-        Those of them that every record has to itself.
+        Free parameters that have a value of their own in every record.
     drive : str
-        What moves the load point: the ``commanded`` loading found in the record, its displacement ``smoothed`` or as
-        ``measured``, or the ``protocol``.
-    protocol : Protocol or None
-        On the records' clock.
+        Loading of the model: ``commanded`` (found in the record), its displacement ``smoothed`` or as ``measured``, or
+        the ``protocol``.
+        protocol : Protocol or None
+            Protocol with times on the records' clock.
     trend : int
         Order of a polynomial that is added to friction.
     trend_axis : str
         ``displacement`` or ``time``.
     offset : bool
-        Whether a constant is added to friction, besides mu_ref.
+        True to add a constant to friction, besides mu_ref.
     lag : bool
-        Whether friction may come later than what drives it, each record by a time of its own.
+        True if friction may lag its loading, in each record by a time of its own.
     initial : str
-        Whether the motion begins with ``steady`` sliding, or with a friction and a memory of its own that are ``free``.
+        ``steady`` if the motion begins with steady sliding, ``free`` if its initial friction and states are fitted.
     loss : str
     width : float or None
-        Residual from which on outliers weigh less.
-    weights : tuple of ndarray or None
-    rtol : float
-        Error allowed per step of the model.
-    sharp : tuple of Sharp
-        What happens at once in each record that drives the model as measured.
-    loading : tuple of Loading
-        What was commanded in each record, as found in its columns.
+        Residual from which outliers have less weight.
+        weights : tuple of ndarray or None
+            One array (n,) for each record; equal weights if None.
+        rtol : float
+            Relative error allowed per step of the model.
+        sharp : tuple of Sharp
+            Sudden changes of each record, if the loading is as measured.
+        loading : tuple of Loading
+            Commanded loading found in the columns of each record.
     """
 
     rig: Slider
@@ -100,16 +101,16 @@ class Plan:
 
     @property
     def follows(self) -> bool:
-        """Whether the model follows a loading that was found, not a column sample by sample."""
+        """True if the model is driven by the commanded or smoothed loading, not by samples or a protocol."""
         return self.protocol is None and self.drive != "measured"
 
     @property
     def pressed(self) -> bool:
-        """Whether the normal stress is imposed, so that the record's own drives the model."""
+        """True if the contact's normal stress is imposed, so that the measured one drives the model."""
         return self.rig.contact.is_imposed() or self.rig.contact.has_pores()
 
     def space(self) -> Space:
-        """The unknowns: shared ones, separate ones record by record, trends."""
+        """Unknowns of the fit in order: free parameters, then times, initial states and trends of each record."""
         several = len(self.records) > 1
         found: list[Unknown] = []
         for name in self.free:
@@ -128,12 +129,12 @@ class Plan:
         return Space(tuple(found))
 
     def rests(self, i: int) -> bool:
-        """Whether a record begins at rest, so that a hold of free length leads to where it begins."""
+        """True if record `i` begins at rest; a hold of free duration then precedes it."""
         return self.follows and resting_rate(self.loading[i]) is not None
 
     @cached_property
     def _natural_sizes(self) -> dict[str, float]:
-        """Of how far from steady sliding a motion may begin: 0.01 of friction, an e-fold of each state."""
+        """Natural sizes of the initial differences from steady sliding: 0.01 of friction, an e-fold of each state."""
         point = operating_point(self.rig, {})
         program = experiment_program(point.model, 0, "tsit5", settled=False)
         scales, _ = natural_scales(point, program.reduction)
@@ -142,13 +143,13 @@ class Plan:
     def _unknown(self, name: str, record: int | None) -> Unknown:
         if name.startswith("protocol."):
             if self.protocol is None:
-                raise InternalError("self.protocol is not None")
+                raise InternalError(f"the plan has the free time {name} but no protocol")
             address = parameters(self.protocol, "protocol.")[name]
             return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)
 
     def comparison(self, effort: Effort | None = None) -> Comparison:
-        """Records against the model."""
+        """Comparison of the records with the compiled model."""
         space, effort = self.space(), effort or Effort()
         parts = tuple(self._part(i, record, space, effort) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
@@ -188,19 +189,19 @@ class Plan:
         )  # fmt: skip
 
     def driven(self, record: Record, i: int) -> tuple[Slider, Array | None]:
-        """The rig as a record drives it, and the measured change of normal stress (Pa) where that is imposed."""
+        """Rig with the initial velocity and stress of a record; measured change of normal stress (n,), Pa, or None."""
         rig = self.rig
         if self.protocol is None:
             load = self.loading[i].load if self.follows else None
             rate = record.initial_rate if load is None else float(load.at(record.time[:1])[0])
             rate = (resting_rate(self.loading[i]) if self.follows else None) or rate
             if rate is None:
-                raise InternalError("rate is not None")
+                raise InternalError(f"no initial velocity was found in {record.source}")
             rig = _driven_at(rig, rate)
         if not self.pressed or record.normal is None:
             return rig, None
         stress = None if self.drive == "measured" else self.loading[i].stress
-        if stress is not None and not self.follows:  # of a protocol that leaves the normal stress to the record
+        if stress is not None and not self.follows:  # a protocol moves the load point, the record has the normal stress
             pressed = stress.at(record.time)
             rig = _pressed_with(rig, float(pressed[0]))
             return rig, (record.normal if stress.changes else pressed) - pressed[0]
@@ -223,7 +224,7 @@ def _pressed_with(rig: Slider, stress: float) -> Slider:
 
 
 def with_loading(plan: Plan) -> Plan:
-    """The plan knowing what drives the model in its records, which thinned ones no longer tell."""
+    """Plan with the loading of its records, found once: it could not be found in thinned records."""
     if plan.drive == "measured":
         drivers = (record if plan.pressed else replace(record, normal=None) for record in plan.records)
         return replace(plan, sharp=tuple(sharp_changes(driver) for driver in drivers), loading=())

@@ -1,4 +1,4 @@
-"""From what a user asks for to the plan of a fit; whatever is wrong with it is said at once."""
+"""Make the plan of a fit from the arguments of a user; one error lists everything that is wrong."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
 
 MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
-"""Samples of a record beyond which a fit works with means of them, and how many."""
+"""Samples above which a record is averaged, and number of means then; chosen by trial, to save time."""
 NEVER_FREE = ("drive.velocity", "slider.area")
 
 
@@ -30,7 +30,7 @@ def make_plan(
     rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
     separate: Sequence[str] = (), protocol: Any = None, **options: Any,
 ) -> Plan:  # fmt: skip
-    """A plan from what a user gives; see `steadyslip.fit`.
+    """Make a plan from the arguments of `steadyslip.fit`.
 
     Raises
     ------
@@ -53,13 +53,13 @@ def make_plan(
     problems: list[Problem] = []
     known = can_be_free(rig, plan_protocol)
     names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
-    if free is not None:  # the level of friction is not asked for, but never known beforehand
+    if free is not None:  # the level of friction is never known beforehand: it is free even if not named
         names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
     held = _resolved("fixed", fixed, rig.parameters(), problems)
     names = [name for name in dict.fromkeys(names) if name not in held]
     apart = _resolved("separate", separate, dict.fromkeys(names), problems)
     problems += faults({name: value for name, value in options.items() if name != "weights"})
-    for name in ("errors", "starts", "effort"):  # of the search, not of what is compared
+    for name in ("errors", "starts", "effort"):  # options of the search, which are no part of the plan
         options.pop(name, None)
     if not names and not problems:
         problems.append(Problem("free", f"nothing is free; name parameters such as {', '.join(list(known)[:3])}"))
@@ -80,7 +80,7 @@ def make_plan(
 
 
 def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Address]:
-    """What a fit may free: what has a value, and matters."""
+    """Parameters that may be free, by dotted name: those that have a value and an effect."""
     found = {
         name: a for name, a in rig.parameters().items()
         if a.value is not None and name not in NEVER_FREE and not a.role.gauge
@@ -92,7 +92,7 @@ def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Addr
 
 
 def _default_free(rig: Slider) -> list[str]:
-    """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
+    """Names that are free by default: parameters of the friction law, drainage and stiffness."""
     drains = rig.of_kind("drainage")
     found = [name for name in can_be_free(rig) if name.startswith("friction.") or name in drains]
     return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
@@ -114,7 +114,7 @@ def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> lis
 
 
 def _weighed(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
-    """Long records as means that a fit can work with, and the weights of means; None where all was measured."""
+    """Records, long ones averaged, and weights of the means; None if no sample is a mean."""
     handy = tuple(r if len(r) <= MOST_SAMPLES else r.decimated(HANDY_SAMPLES) for r in records)
     if all(record.worth is None for record in handy):
         return handy, None
@@ -135,7 +135,7 @@ def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[P
 
 
 def with_width(plan: Plan, residuals: Array) -> Plan:
-    """The plan with a width for its loss: 1.345 standard deviations of most residuals."""
+    """Plan with a width of its loss: 1.345 robust standard deviations (Huber: 95 % efficient for normal errors)."""
     spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
     if not spread > 0:
         raise NotAvailable("residuals have no width; use loss='linear'")

@@ -1,4 +1,4 @@
-"""Where the search of a fit ends if something about it is changed."""
+"""Variants of a fit: minima that are reached if its loading or its law is changed."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from steadyslip.experiments.fitting.search import find_minimum
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-BRIEF, FEW_STARTS = 0.1, 12  # of the effort of a fit, and of its starts: what a look at another law may cost
-SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # of the longest that a ramp may be: durations that are tried
+BRIEF, FEW_STARTS = 0.1, 12  # effort and starts of a trial with another law: a tenth and a quarter of the defaults
+SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
 
 
 @dataclass(frozen=True)
 class Ramped:
-    """Where the search ends if steps that may be ramps are ramps of a given share of their longest durations.
+    """Minimum with ramps in place of steps, all of one share of their longest possible durations.
 
     Attributes
     ----------
     share : float
+        Duration of each ramp as a share of its longest.
     ssq : float
         Sum of squares.
     values : dict of str to float
-        Of all unknowns, by name; durations are ``step.1.duration``.
+        Values of all unknowns, by name; durations are ``step.1.duration``.
     """
 
     share: float
@@ -42,15 +43,15 @@ class Ramped:
 def driven_as_measured(
     plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, float] | None:
-    """Where the search ends if the measured columns drive the model instead, from the fit's own minimum.
+    """Values, by name, that a fit reaches from its minimum if the measured columns drive the model; None if none.
 
     Parameters
     ----------
     plan : Plan
     values : mapping of str to float
-        At the minimum, by name of the unknown.
+        Values at the minimum, by name of the unknown.
     bounds : mapping of str to (float, float)
-        Where the coordinates were searched.
+        Bounds of the search, in coordinates, by name.
     """
     noisy = [c for loading in plan.loading for c in (loading.load,) if c is not None and np.any(c.errors > 0)]
     if any(resting_rate(loading) is not None for loading in plan.loading):
@@ -68,7 +69,7 @@ def driven_as_measured(
 
 
 def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) -> Minima:
-    """Where the search ends from z, (m, p), if it is no more work than that of a fit."""
+    """Minima from starting points z (m, p), within the work of one search."""
     samples = sum(len(record) for record in plan.records)
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.comparison(Effort(budget=budget))
@@ -77,15 +78,16 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
 
 @dataclass(frozen=True)
 class Remembered:
-    """Where a search ends if friction has a memory of the normal stress.
+    """Minimum with a law that has a memory of the normal stress.
 
     Attributes
     ----------
     choice : str
-        What the file says for it: name of the law's field, and word.
+        Line of a rig file that selects the memory: field of the law and its value.
     ssq : float
+        Sum of squares.
     values : dict of str to float
-        Of all unknowns, by name.
+        Values of all unknowns, by name.
     """
 
     choice: str
@@ -94,9 +96,9 @@ class Remembered:
 
 
 def with_memories(plan: Plan) -> tuple[Remembered, ...]:
-    """Fits with each memory of the normal stress, the best first, of a law without one; empty where nothing changes it.
+    """Minima with each memory of the normal stress, the best first; empty if it is constant or the law has one.
 
-    A short search for each: what a longer one would find may be better still.
+    Each search is short: a longer one may find a better minimum.
     """
     law = plan.rig.friction
     if not (law.forgets_stress() and plan.pressed and any(record.stress_changes for record in plan.records)):
@@ -122,17 +124,17 @@ def with_memories(plan: Plan) -> tuple[Remembered, ...]:
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:
-    """Whether a change is taken as a step although a ramp would fit the displacement as well."""
+    """True if a change is taken as a step although a ramp would fit the displacement as well."""
     return channel == "load" and change.free and change.duration == 0 and change.longest > 0
 
 
 def with_ramps(
     plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[Ramped, ...]:
-    """Where the search ends if steps that may be ramps are, the shortest first; empty where there are none.
+    """Minima with ramps in place of steps that may be ramps, the shortest first; empty if there are none.
 
-    Parameters are as for `driven_as_measured`. A number of durations are tried, as shares of the longest that each may
-    have; the middle of a ramp stays where the step may be.
+    Parameters are those of `driven_as_measured`. Several durations are tried, as shares of the longest possible ones;
+    the middle of a ramp stays within the window of the step.
     """
     if not plan.follows or not any(may_be_ramp(c, change) for one in plan.loading for c, _, change in one.changes):
         return ()

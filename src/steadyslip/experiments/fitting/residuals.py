@@ -1,4 +1,4 @@
-"""What residuals say of a fit: whether they add up to what the search ended with, and are as its errors take them."""
+"""Checks of a fit by its residuals: their sum of squares, and their scatter against the noise model."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.checks import Check, check
-from steadyslip.experiments.fitting.comparison import lost
+from steadyslip.experiments.fitting.comparison import scaled_by_loss
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.numerics.noise import Noise
 
-ADDED_UP = 1e-6  # share of the sum of squares: ten times what the search may be from its end
-PIECES, SHORTEST = 16, 4  # of a record, whose means are compared, and samples in each
-TWICE = 1.0  # share by which a scatter may be larger than expected: chance alone does so once in twenty million
+ADDED_UP = 1e-6  # relative difference of sums of squares; ten times the accuracy to which the search converges
+PIECES, SHORTEST = 16, 4  # pieces of a record whose means are compared, and least number of samples in each
+TWICE = 1.0  # relative excess of the scatter over the expected one; chance reaches it once in twenty million fits
 
 
 def residual_checks(fit: FitNumbers) -> tuple[Check, ...]:
-    """Of the sum of squares, the minimum, and the errors."""
+    """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
     r = fit.residuals * fit.comparison.weights
     if fit.plan.loss != "linear":
-        r, _ = lost(fit.plan.loss, r, fit.comparison.width)
+        r, _ = scaled_by_loss(fit.plan.loss, r, fit.comparison.width)
     missed = abs(float(r @ r) - fit.ssq) / fit.ssq if fit.ssq else float(np.any(r))
     ended = fit.search.converged and not fit.search.cut
     scatters = [one for i, noise in enumerate(fit.noise) for one in _beyond(fit.part(r, i), noise)]
@@ -34,7 +34,7 @@ def residual_checks(fit: FitNumbers) -> tuple[Check, ...]:
 
 
 def _beyond(r: Array, noise: Noise) -> Iterator[float]:
-    """By which share means over pieces of a record scatter more than its noise lets them."""
+    """Relative excess of the scatter of piecewise means over that of the noise model; nothing for short records."""
     length = len(r) // PIECES
     if length < SHORTEST:
         return

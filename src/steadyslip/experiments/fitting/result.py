@@ -1,4 +1,4 @@
-"""What a fit gives back: estimates that know their errors, in words, plain data, files and figures."""
+"""Result of a fit, with its text, JSON data, files and figures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """What the residuals say of the sum of squares, the minimum and the errors."""
+        """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
         return residual_checks(self)
 
     def to_dict(self) -> dict[str, Any]:

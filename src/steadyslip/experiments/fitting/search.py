@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
 from steadyslip.experiments.fitting.effort import Effort, work_of_search
-from steadyslip.experiments.fitting.nested import Simpler, simpler
+from steadyslip.experiments.fitting.nested import NestedModel, nested_models
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
@@ -25,7 +25,9 @@ from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SA
 from steadyslip.experiments.numerics.noise import SIGNIFICANT, lag_one
 
 ROUGH_SAMPLES = 400  # samples, over all records, of the first stage
-ROUGH_PATIENCE = 8  # integration steps per sample at most in the first stage; the final stages allow effort.MOST_STEPS
+ROUGH_PATIENCE = (
+    8  # integration steps per sample at most in the first stage; the final stages allow effort.MAX_STEPS_PER_ROW
+)
 ROUGH_GROWTH = 2.0  # first stage: give a motion up after this multiple of the steps of the slowest finished one
 ROUGH_ITERATIONS = 40  # iterations at most in the first stage; its tolerance is loose, so most starts end earlier
 MAX_ITERATIONS = 300  # iterations at most on all samples, or on the condensed ones
@@ -99,7 +101,7 @@ class SearchResult:
 
 
 SearchCache = dict[tuple[tuple[str, ...], int, bool, str], SearchResult | None]
-"""Results for nested models that were already find_minimum, by free parameters, trend order, offset and initial."""
+"""Results for nested models that were already searched, by free parameters, trend order, offset and initial."""
 
 
 def _search_or_none(
@@ -283,7 +285,7 @@ class _Search:
 
     def nested(self, found: Minima, known: SearchCache) -> Minima:
         """Add minima reached from the minima of nested models; the best first."""
-        for model in simpler(self.plan):
+        for model in nested_models(self.plan):
             if not self.cut and not self._can_compete(model):
                 continue
             key = model.plan.free, model.plan.trend, model.plan.offset, model.plan.initial
@@ -293,14 +295,14 @@ class _Search:
                 continue
             self.allowance = self.effort.budget.part(NESTED_SHARE * self.work)
             self.stages.append(self.allowance)
-            begin = model.within(self.whole.space, other.coordinates, self.low, self.high)
+            begin = model.points_in(self.whole.space, other.coordinates, self.low, self.high)
             better = other.ssq < found.ssq[0] * (1 - MIN_GAIN)
             found = (found + (self._minimise_on_all(begin) if better else self._refine_from(begin))).sorted()
         return found
 
-    def _can_compete(self, model: Simpler) -> bool:
+    def _can_compete(self, model: NestedModel) -> bool:
         """True if a nested model, on few samples and from few starts, comes near the best sum of squares."""
-        held, at = model.held(self.whole.space)
+        held, at = model.missing(self.whole.space)
         begin = np.where(held, at, self.rough.sorted().coordinates[:NESTED_STARTS])
         for i, one in enumerate(self.whole.space.unknowns):
             if one.parameter in model.scales:

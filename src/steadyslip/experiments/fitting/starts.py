@@ -1,4 +1,4 @@
-"""Where a fit starts, from the record itself: nobody has to guess.
+"""Starting points and bounds of the search, derived from features of the records.
 
 The direct effect is at least the first response to a step of the rate, the drop to the new steady friction gives
 a − b, the steepest rise of friction with displacement is at most the stiffness over normal stress, and the slip
@@ -17,7 +17,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.questions import question
 from steadyslip.core.results import read_only
-from steadyslip.experiments.fitting.commanded import CommandedInputs, windows
+from steadyslip.experiments.fitting.commanded import CommandedInputs, time_windows
 from steadyslip.experiments.fitting.comparison import RecordPart
 from steadyslip.experiments.fitting.inputs import ProtocolInputs
 from steadyslip.experiments.fitting.settings import STARTS
@@ -27,30 +27,30 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.model.sliding import steady_state
 
-NEARBY = 0.5  # share of the window of a time over which starts are spread
-SPIKE = 2.0  # ranges of nearly all friction by which a sample alone is off its neighbours: no motion does that
-STIFFEST = 100.0  # k d_c/(aσ) of a start: beyond, a record shows no more of the stiffness
-_DIRECT = (0.004, 0.01, 0.025)  # values of a where no step of the rate tells
+NEARBY = 0.5  # share of the window of a free time over which its starting values are spread
+SPIKE = 2.0  # a sample is a spike if it is off its neighbours by more than this multiple of the range of friction
+STIFFEST = 100.0  # largest starting value of k d_c/(aσ): stiffer machines cannot be told apart from friction
+_DIRECT = (0.004, 0.01, 0.025)  # starting values of a without a velocity step: the range usual for rocks
 
 
 @dataclass(frozen=True)
 class Features:
-    """What a record tells before anything is fitted.
+    """Rough properties of a record, from which starting values are derived.
 
     Attributes
     ----------
     friction : float
-        At the beginning.
+        Initial friction coefficient.
     direct : float or None
-        First response to the largest step of the rate, per e-fold.
+        Peak change of friction after the largest velocity step, per e-fold of velocity.
     drop : float or None
-        Change of steady friction per e-fold, a − b.
+        Change of steady friction per e-fold of velocity, a − b.
     slope : float
         Steepest rise of friction with displacement of the load point, 1/m.
     least_slope : float
         Range of friction over the whole displacement, 1/m.
     shortest, longest : float
-        Slip distances that could show, m.
+        Range of slip distances that the record resolves, m.
     """
 
     friction: float
@@ -64,7 +64,7 @@ class Features:
 
 @question
 def features(record: Record, rate: float) -> Features:
-    """Read the features off a record; `rate` is the load-point rate at its start, m/s."""
+    """Features of a record; `rate` is the load-point velocity at its start, m/s."""
     record = replace(record, friction=_without_spikes(record.friction))
     time, mu = record.time, record.friction
     moved = _moved(record, 0.0 if resting_rate(record.loading) is not None else rate)
@@ -83,14 +83,14 @@ def features(record: Record, rate: float) -> Features:
 
 
 def _without_spikes(friction: Array) -> Array:
-    """Friction with single samples far outside of all that it is elsewhere put back between their neighbours."""
+    """Friction (n,) with isolated outliers replaced by the median of their neighbours."""
     around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(friction, 2, mode="edge"), 5), axis=1)
     low, high = np.quantile(friction, [0.01, 0.99])
     return np.where(np.abs(friction - around) > SPIKE * (high - low), around, friction)
 
 
 def _moved(record: Record, rate: float) -> Array:
-    """How far the load point has moved, as its steps say: without the noise of a measured displacement."""
+    """Displacement of the load point (n,), m, integrated from its velocity steps and thus free of noise."""
     time = record.time
     changes = [(s.time, s.duration, s.after) for s in record.steps if s.unit != "Pa"]
     knots, rates = [float(time[0])], [rate]
@@ -104,7 +104,7 @@ def _moved(record: Record, rate: float) -> Array:
 
 
 def _response(record: Record, moved: Array, step: LoadStep) -> tuple[float, float]:
-    """Peak and steady change of friction per e-fold, without the trend before the step."""
+    """Peak and steady change of friction after a velocity step, per e-fold of velocity."""
     time, mu = record.time, record.friction
     fold = float(np.log(step.after / step.before))
     others = [s.time for s in record.steps if s.time > step.time + step.duration]
@@ -129,7 +129,7 @@ def _smoothed(values: Array, width: int = 3) -> Array:
 
 
 def _steepest(record: Record, moved: Array, step: LoadStep) -> float:
-    """Rise of friction with displacement right after a step; without the jump of friction at one of normal stress."""
+    """Steepest rise of friction with displacement, 1/m, in the samples after a step of velocity or normal stress."""
     begin = max(int(np.searchsorted(record.time, step.time)) - 1, 0)
     if step.unit == "Pa":
         begin = int(np.searchsorted(record.time, step.time + step.duration, side="right")) + 1
@@ -140,7 +140,7 @@ def _steepest(record: Record, moved: Array, step: LoadStep) -> float:
 
 
 def _steepest_anywhere(moved: Array, mu: Array) -> float:
-    """Largest slope that stands out of the noise."""
+    """Largest slope of friction with displacement, 1/m, that exceeds the noise."""
     noise = 1.4826 * float(np.median(np.abs(np.diff(mu)))) / np.sqrt(2) if len(mu) > 3 else 0.0
     best = 0.0
     for width in (2, 3, 5, 9, 17, 33, 65):
@@ -154,14 +154,14 @@ def _steepest_anywhere(moved: Array, mu: Array) -> float:
 
 
 def features_of(parts: Sequence[RecordPart]) -> tuple[Features, ...]:
-    """What the records tell."""
+    """Features of each record."""
     return tuple(features(part.record, part.rig.drive.velocity) for part in parts)
 
 
 def starting_points(
     parts: Sequence[RecordPart], found: Sequence[Features], space: Space, count: int = STARTS, already: int = 0
 ) -> Array:
-    """Coordinates to start from, (count, p): a design over what the records leave open, continued after `already`."""
+    """Starting coordinates (count, p), spread by a Halton sequence; the first `already` points are left out."""
     grid = _design(already + count)[already:]
     shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
     d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
@@ -176,7 +176,7 @@ def starting_points(
     steepness = max(f.slope for f in found) * 10.0 ** (1.2 * grid[:, 3] - 0.1)
     steepness = np.minimum(steepness, STIFFEST * a / d_c)
     alpha = 0.1 + 0.5 * grid[:, 4]
-    alike = np.argsort(steepness / a)  # lanes of one vector wait for the stiffest of them
+    alike = np.argsort(steepness / a)  # similar stiffness side by side: SIMD lanes wait for the slowest of them
     d_c, a, b, steepness, alpha, grid = (x[alike] for x in (d_c, a, b, steepness, alpha, grid))
     values = np.zeros((count, len(space)))
     for i, unknown in enumerate(space.unknowns):
@@ -195,9 +195,9 @@ def _design(count: int) -> Array:
 
 
 def search_bounds(parts: Sequence[RecordPart], told: Sequence[Features], space: Space) -> tuple[Array, Array]:
-    """Bounds of the coordinates: of the parameters themselves, and of what records can show.
+    """Bounds of the coordinates, (p,) each, from the parameters' domains and the resolution of the records.
 
-    A slip distance far below what passes between samples, or far above the whole record, changes nothing any more.
+    A slip distance far below the slip between samples, or far above the whole record, has no effect on the model.
     """
     low, high = space.low.copy(), space.high.copy()
     for i, unknown in enumerate(space.unknowns):
@@ -220,7 +220,7 @@ def search_bounds(parts: Sequence[RecordPart], told: Sequence[Features], space: 
 
 
 def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Array, ...], alone: bool) -> Array:
-    """Starting values of one parameter, `alone` if no other is of its kind."""
+    """Starting values (count,) of one unknown; `alone` is True if no other is of its kind."""
     name = unknown.parameter
     d_c, a, b, steepness, alpha, spare = design
     rig = part.rig
@@ -265,20 +265,20 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
 
 
 def _near(unknown: Unknown, part: RecordPart, spare: Array) -> Array:
-    """Starting values of a time that the record leaves open: as it has it, or anywhere between two samples."""
+    """Starting values (count,) of the time of a change, s, spread over part of its window."""
     if not isinstance(part.inputs, CommandedInputs):
         raise InternalError("times of changes are free in commanded loading only")
-    begin = {(low, high): value for value, low, high in windows(part.inputs.changes)}[(unknown.low, unknown.high)]
+    begin = {(low, high): value for value, low, high in time_windows(part.inputs.changes)}[(unknown.low, unknown.high)]
     return np.asarray(begin + NEARBY * (spare - 0.5) * (unknown.high - unknown.low))
 
 
 def _stress(part: RecordPart) -> float:
-    """Normal stress to begin with, Pa."""
+    """Initial normal stress of a record, Pa."""
     return float(part.record.normal[0]) if part.record.normal is not None else steady_state(part.rig).normal_stress
 
 
 def _time_of(name: str, part: RecordPart) -> float:
-    """A free time of the protocol: as the protocol has it."""
+    """Starting value of a free time of the protocol, s: its value in the protocol."""
     if not isinstance(part.inputs, ProtocolInputs):
-        raise InternalError("isinstance(part.inputs, ProtocolInputs)")
+        raise InternalError(f"{name} is free, but the record is not driven by a protocol")
     return float(part.inputs.plain[name] or 0.0)

@@ -1,4 +1,4 @@
-"""Fits as netCDF files: everything that is needed to go on with one, records included; opening executes nothing."""
+"""Fits in netCDF files, with their records; reading a file executes nothing in it."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ _FORMS = {
         "memories": [(str, float, {str: float})],
     },
 }
-"""What the attributes hold as JSON; see `steadyslip.files.tables.fits_form`."""
+"""Types of the attributes in JSON; see `steadyslip.files.tables.fits_form`."""
 
 
 F = TypeVar("F", bound=FitNumbers)
 
 
 def to_dataset(fit: FitNumbers) -> Any:
-    """The fit as an xarray.Dataset."""
+    """Fit as an xarray.Dataset."""
     import xarray as xr
 
     from steadyslip.files.specifications import rig_to_text
@@ -108,7 +108,7 @@ def to_dataset(fit: FitNumbers) -> Any:
 
 
 def save(fit: FitNumbers, path: str | PathLike[str]) -> None:
-    """Write a fit; a file of that name is replaced only once the new one is whole.
+    """Write a fit to a file; an existing file is replaced only when the new one is complete.
 
     Raises
     ------
@@ -119,9 +119,9 @@ def save(fit: FitNumbers, path: str | PathLike[str]) -> None:
 
 
 def read(path: str | PathLike[str], made: type[F]) -> F:
-    """A fit that `save` wrote, as an instance of `made`.
+    """Read a fit that `save` wrote, as an instance of the class `made`.
 
-    Nothing in the file is executed; damage is found, whatever it is.
+    Nothing in the file is executed; a damaged file is refused.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def read(path: str | PathLike[str], made: type[F]) -> F:
 
 
 def from_table(table: ExpectedTable, made: type[F]) -> F:
-    """The fit in a file, or in a part of one, whose attributes are `ATTRIBUTES`."""
+    """Read a fit from a file, or from a part of one, with the attributes `ATTRIBUTES`."""
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
     described, noises, loading = stored["records"], stored["noise"], stored["loading"]
     weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")
@@ -167,7 +167,7 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     )
     _check(table, fit)
     refits = stored["refits"]
-    found_before = {  # by the program that wrote it: nothing is searched or simulated anew
+    found_before = {  # results that the file holds, so that nothing is computed again
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(Ramped(*one) for one in refits["ramps"]),
         "with_memories": tuple(Remembered(*one) for one in refits["memories"]),
@@ -178,7 +178,7 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
 
 
 def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
-    """What a fit to records with these columns must hold."""
+    """Columns that the file of a fit must have, given those of its records."""
     along = ("parameter",)
     found = {name: ColumnRule(along) for name in ("coordinates", "value", "error")}
     found |= {"parameter": ColumnRule(along, text=True), "other": ColumnRule(("other",), text=True)}
@@ -196,7 +196,7 @@ def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
 
 
 def _written(loading: Loading | None) -> Any:
-    """A loading as plain data, a list for each channel; empty where it is found again in the columns."""
+    """Loading as JSON data, a list for each channel; empty if it can be found again in the record's columns."""
     return (
         []
         if loading is None
@@ -217,7 +217,7 @@ def _curves(curve: Any) -> list[Any]:
 
 
 def _read(table: ExpectedTable, written: list[Any]) -> Loading | None:
-    """The loading in such data."""
+    """Loading from the data that `_written` returns; None if they are empty."""
     if len(written) != 3:
         return None
     try:
@@ -250,7 +250,7 @@ def _record(
 
 
 def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
-    """The plan, checked as if a user gave it."""
+    """Plan made from the options of the file, with the checks of user input."""
     from steadyslip.files.specifications import protocol_from_text, slider_from_text
 
     text, source = table.attributes["rig"], str(table.path)
@@ -271,7 +271,7 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
 
 
 def _check(table: ExpectedTable, fit: FitNumbers) -> None:
-    """Numbers that no fit has."""
+    """Raise an error for numbers that no fit has, such as negative variances."""
     bad = {
         "coordinates": not np.all(np.isfinite(fit.coordinates)),
         "ssq": not 0 <= fit.ssq < np.inf,

@@ -1,4 +1,4 @@
-"""The free parameters of a fit, in coordinates in which they may take any value."""
+"""Free parameters of a fit, and the coordinates in which they are searched."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steadyslip.core.records import Address
 
 @dataclass(frozen=True)
 class Unknown:
-    """One free parameter.
+    """Free parameter with its coordinate: its logarithm, or its value in units of `size`.
 
     Attributes
     ----------
@@ -23,15 +23,15 @@ class Unknown:
         Full dotted name in the rig or the protocol.
     unit : str
     record : int or None
-        The record it belongs to; None if all share it.
-    logarithmic : bool
-        Whether its coordinate is its logarithm.
-    size : float
-        Change of a plain parameter that is one unit of its coordinate.
-    low, high : float
-        What the parameter may be.
-    kind : str
-        What its law says it is; see `steadyslip.core.roles.PARAMETER_KINDS`.
+        Index of the record it belongs to; None if all records share it.
+        logarithmic : bool
+            True if the coordinate is the logarithm of the value.
+        size : float
+            Change of the value per unit of a coordinate that is not logarithmic.
+        low, high : float
+            Bounds of the value.
+        kind : str
+            Kind that the law declares; see `steadyslip.core.roles.PARAMETER_KINDS`.
     """
 
     name: str
@@ -51,18 +51,18 @@ class Unknown:
         return np.exp(coordinate) if self.logarithmic else np.asarray(coordinate) * self.size
 
     def slope(self, coordinate: Any) -> Any:
-        """Change of the parameter per unit of its coordinate."""
+        """Derivative of the value with respect to the coordinate."""
         return np.exp(coordinate) if self.logarithmic else np.full(np.shape(coordinate), self.size)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Of the coordinate."""
+        """Lower and upper bound of the coordinate."""
         with np.errstate(divide="ignore"):
             return float(self.coordinate(self.low)), float(self.coordinate(self.high))
 
 
 def unknown(address: Address, record: int | None, scale: float | None = None) -> Unknown:
-    """The free parameter at an address: logarithmic if it must be positive and has no natural zero."""
+    """Make the unknown of a parameter: logarithmic if it must be positive and has no natural size."""
     name, domain = address.name, address.role.domain
     own = f"{name}@{record + 1}" if record is not None else name
     role = address.role
@@ -75,7 +75,7 @@ def unknown(address: Address, record: int | None, scale: float | None = None) ->
 
 
 class Space:
-    """All free parameters together."""
+    """Coordinates of all unknowns of a fit."""
 
     def __init__(self, unknowns: tuple[Unknown, ...]) -> None:
         self.unknowns = unknowns
@@ -96,6 +96,6 @@ class Space:
         return np.stack([u.coordinate(values[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
 
     def slopes(self, coordinates: Array) -> Array:
-        """Change of each parameter per unit of its coordinate."""
+        """Derivatives of the values with respect to the coordinates, of their shape."""
         powers = np.exp(np.where(self._logarithmic, coordinates, 0.0))
         return np.where(self._logarithmic, powers, self._sizes)

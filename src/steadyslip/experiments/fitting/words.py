@@ -1,4 +1,4 @@
-"""A fit in words and as plain data."""
+"""Text of a fit, its warnings, and its data for JSON."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
-WIDTH = 100
-AWAY = 3.0  # root mean squares of the residuals by which the first and last of them, on average, may be off:
-BRIEFLY = 5  # of them, or one in two hundred
-FAR = 20.0  # root mean squares of the others that an outlier is off,
-RARE = 2e-3  # of the samples at most: more are no outliers
-SURE = 9.0  # fall of the sum of squares, in variances of an independent sample, that tells a ramp from a step
-VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
+WIDTH = 100  # characters of a line of text
+AWAY = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
+BRIEFLY = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
+FAR = 20.0  # least size of an outlier, in rms of the other residuals
+RARE = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
+SURE = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
+VAGUE = 0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
 
 
 def words(fit: FitNumbers) -> str:
-    """Estimates, how good the fit is, and what to beware of."""
+    """Text of a fit: estimates, quality and warnings."""
     names = short_names(fit.names)
     wide = max(len(name) for name in names)
     rows = []
@@ -49,12 +49,12 @@ def words(fit: FitNumbers) -> str:
 
 
 def _stress_assumed(fit: FitNumbers) -> bool:
-    """Whether the normal stress is the rig's own, because no record has a column of it."""
+    """True if no record has a column of normal stress, so that the rig's value is used."""
     return fit.plan.pressed and all(record.normal is None for record in fit.plan.records)
 
 
 def _over_stress(fit: FitNumbers, one: Any) -> str | None:
-    """Stiffness over normal stress: what friction itself tells, whatever the stress; None of other parameters."""
+    """Text of stiffness over normal stress, which friction alone determines; None for other parameters."""
     bare, _, record = one.name.partition("@")
     if bare not in ("slider.stiffness", "slider.axial_stiffness"):
         return None
@@ -66,7 +66,7 @@ def _over_stress(fit: FitNumbers, one: Any) -> str | None:
 
 
 def short_names(names: tuple[str, ...]) -> list[str]:
-    """Dotted names without middle parts, where that stays unique."""
+    """Dotted names without their middle parts, where these remain unique."""
     found = []
     for name in names:
         first, *_, last = name.split(".")
@@ -93,7 +93,7 @@ def _quality(fit: FitNumbers) -> list[str]:
 
 
 def warnings(fit: FitNumbers) -> list[str]:
-    """What a reader must know before using the numbers."""
+    """Warnings on a fit, each a sentence, that a reader must know before using the numbers."""
     found = [str(one) for one in fit.unidentified]
     if fit.search.cut:
         found.append(_cut_off(fit))
@@ -112,7 +112,7 @@ def warnings(fit: FitNumbers) -> list[str]:
 
 
 def _cut_off(fit: FitNumbers) -> str:
-    """Of a search that was too much work: as happens where the model cannot follow the records well."""
+    """Warning that the search spent its budget, as it does where the model cannot follow the records well."""
     rough = "" if fit.search.converged else ", not even at its minimum"
     return (
         f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
@@ -121,7 +121,7 @@ def _cut_off(fit: FitNumbers) -> str:
 
 
 def _outliers(fit: FitNumbers) -> list[str]:
-    """Records of which a few samples, far off all others, decide the fit."""
+    """Warnings on records in which a few outliers contribute half of the sum of squares."""
     found = []
     for i, record in enumerate(fit.plan.records if fit.plan.loss == "linear" else ()):
         squares = fit.part(fit.residuals, i) ** 2
@@ -141,7 +141,7 @@ def _outliers(fit: FitNumbers) -> list[str]:
 
 
 def _unsettled(fit: FitNumbers) -> list[str]:
-    """Records whose friction begins, or ends, elsewhere than the model, which begins with steady sliding."""
+    """Warnings on records whose first or last samples are off the model, which begins with steady sliding."""
     found = []
     for i, record in enumerate(fit.plan.records):
         own = fit.part(fit.residuals, i)
@@ -161,7 +161,7 @@ def _unsettled(fit: FitNumbers) -> list[str]:
 
 
 def _off_the_loading(fit: FitNumbers) -> list[str]:
-    """Records that begin or end with samples off their loading, too few to tell why."""
+    """Warnings on records whose first or last samples are off the commanded loading."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         courses = {
@@ -185,7 +185,7 @@ def _off_the_loading(fit: FitNumbers) -> list[str]:
 
 
 def _vague_jumps(fit: FitNumbers) -> list[str]:
-    """Jumps whose time matters and is hardly known: errors of what they tell are then not Gaussian."""
+    """Warnings on jumps whose time is hardly determined, so that errors are not Gaussian."""
     found = []
     for i, one in enumerate(fit.space.unknowns):
         if _between_samples(fit, one) and float(fit.covariance[i, i]) > VAGUE**2:
@@ -198,7 +198,7 @@ def _vague_jumps(fit: FitNumbers) -> list[str]:
 
 
 def _between_samples(fit: FitNumbers, one: Any) -> bool:
-    """Whether an unknown is the time of a sudden change that lies between two neighbouring samples."""
+    """True if an unknown is the time of a sudden change between two neighbouring samples."""
     if one.parameter.startswith("jump."):
         return True
     if not one.parameter.startswith("step."):
@@ -209,7 +209,7 @@ def _between_samples(fit: FitNumbers, one: Any) -> bool:
 
 
 def _untold_ramps(fit: FitNumbers) -> list[str]:
-    """Changes of the rate that may be steps or ramps: what the displacement leaves open, and what friction says."""
+    """Warnings on velocity changes that may be steps or ramps, with the effect of ramps on the fit."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         untold = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
@@ -228,7 +228,7 @@ def _untold_ramps(fit: FitNumbers) -> list[str]:
 
 
 def _of_ramps(fit: FitNumbers, tried: tuple[Ramped, ...]) -> str:
-    """Whether friction tells ramps from steps, and what ramps make of the parameters."""
+    """Text on whether friction distinguishes ramps from steps, and on how ramps change the parameters."""
     worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
     best = min(tried, key=lambda one: one.ssq)
     alike = [one for one in tried if one.ssq < best.ssq * (1 + SURE / worth)]
@@ -243,7 +243,7 @@ def _of_ramps(fit: FitNumbers, tried: tuple[Ramped, ...]) -> str:
 
 
 def _forgotten_stress(fit: FitNumbers) -> list[str]:
-    """That the normal stress changes and friction has no memory of it, and what one would make of the fit."""
+    """Warning that the normal stress changes while the law has no memory of it, with the effect of a memory."""
     plan = fit.plan
     if not (plan.pressed and plan.rig.friction.forgets_stress()):
         return []
@@ -267,7 +267,7 @@ def _forgotten_stress(fit: FitNumbers) -> list[str]:
 
 
 def _drained_at_once(fit: FitNumbers) -> list[str]:
-    """That a changed pore pressure acts at once, because the contact has no pores to drain."""
+    """Warning that a change of pore pressure acts at once, because the contact has no pores."""
     changing = [record.source for record in fit.plan.records if record.pressure_changes]
     if not changing or fit.plan.rig.contact.has_pores():
         return []
@@ -298,7 +298,7 @@ def _listed(words: list[str]) -> str:
 
 
 def drive_line(fit: FitNumbers) -> str:
-    """What drives the model, and what that did to a, b and k."""
+    """Text on the loading of the model, and on its effect on a, b and k."""
     plan = fit.plan
     if plan.protocol is not None:
         return "the protocol that was given"
@@ -338,13 +338,13 @@ def drive_line(fit: FitNumbers) -> str:
 
 
 def _steep_names(rig: Slider) -> tuple[str, ...]:
-    """The parameters that a noisy displacement changes most."""
+    """Names of the parameters that a noisy displacement changes most."""
     kinds = ("direct effect", "evolution effect", "stiffness")
     return tuple(name for kind in kinds for name in rig.of_kind(kind))
 
 
 def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
-    """Whether the noise of the measured displacement moves the model about as much as the data scatter."""
+    """Warning if the noise of the displacement moves the model by 0.3 of the residuals' rms or more; else None."""
     record = part.record
     if record.integrated or record.displacement is None:
         return None
@@ -364,7 +364,7 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
 
 
 def as_dict(fit: FitNumbers) -> dict[str, Any]:
-    """SI units; what does not exist is None."""
+    """Data of a fit for JSON, in SI units; None for what does not exist."""
     return {
         "version": fit.version,
         "records": [record.source for record in fit.plan.records],

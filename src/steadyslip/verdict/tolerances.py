@@ -112,8 +112,8 @@ class Tolerated(ReadOnly):
         if not self.along or not np.any(np.isfinite(self.edge)):
             ranges.append(("growth rate", self.growth, "1/s"))
         for label, values, unit in ranges:
-            if (ends := _finite_range(values)) is not None:
-                lines.append(f"{label:<{wide}}{format_range(*ends, unit, self.area)}")
+            if (span := _finite_range(values)) is not None:
+                lines.append(f"{label:<{wide}}{format_range(*span, unit, self.area)}")
         for one in self.alone:
             if not np.isnan(one.safety[0]):
                 beside = f", {one.safety[0]:.4g} to {one.safety[1]:.4g} times {'critical' if own else 'its edge'}"

@@ -137,7 +137,7 @@ def test_a_fit_is_checked_by_its_residuals(tmp_path):
 
     def left(residuals, **changes):
         one = replace(fit, ssq=float(residuals @ residuals), noise=(white(scatter * np.ones(size)),), **changes)
-        one.__dict__.update(model=record.friction - residuals, as_measured=None, as_ramps=())
+        one.__dict__.update(model=record.friction - residuals, as_measured=None, as_ramps=(), with_memories=())
         return one
 
     noise = scatter * chance.standard_normal(size)

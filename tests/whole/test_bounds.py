@@ -187,6 +187,7 @@ def test_hdf5_files_lead_nowhere_else(tmp_path):
         read_record(path)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("ending", [".h5", ".mat", ".parquet"])
 def test_damaged_records_are_one_message(tmp_path, ending):
     path = tmp_path / f"record{ending}"

@@ -1,4 +1,4 @@
-"""Cycles and thresholds from a rig file and the words of a command line, and the files that they are written to."""
+"""Commands for cycles, thresholds, responses and frozen verdicts: read a rig file, compute, write files."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def cycles_of_file(
 
 
 def _nearest_oscillation(machine: Machine) -> str:
-    """The parameter of a link or the drive whose edge of oscillation is nearest, or any other where none has one."""
+    """Name of the link or drive parameter whose oscillatory edge is nearest; any other where these have none."""
     found = margins(machine)
     built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
     nearest = oscillatory_edge(built) or oscillatory_edge(found)
@@ -89,7 +89,7 @@ def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) ->
 
 @dataclass(frozen=True)
 class Thresholds(Displayed):
-    """Several kinds of kick of one rig."""
+    """Thresholds of several kinds of kick of one rig."""
 
     rig: Slider | Machine
     found: tuple[Threshold, ...]
@@ -115,7 +115,7 @@ def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
     at: str | None = None,
 ) -> Thresholds:  # fmt: skip
-    """`thresholds_shown` for the rig of a file; by usual kicks unless some are given."""
+    """`thresholds_shown` for the rig of a file; for the usual kicks unless some are given."""
     rig = read_rig(path, changes)
     usual = ("velocity",) if isinstance(rig, Machine) else ("velocity", "displacement")
     return thresholds_shown(rig, tuple(kicks) or usual, at=at, direction=-1 if reverse else 1, reference=reference)
@@ -187,6 +187,7 @@ def response_of_file(
 
 
 def _quantity(option: str, text: str, unit: str) -> float:
+    """Read a command-line option as a quantity in SI units."""
     try:
         return parse(text, unit)
     except QuantityError as error:

@@ -39,7 +39,7 @@ class Point:
 
 
 class Track:
-    """A curve of solutions.
+    """A curve of solutions, followed by pseudo-arclength continuation.
 
     Parameters
     ----------
@@ -69,11 +69,11 @@ class Track:
         return float(np.sqrt(np.sum(self.weights * u * u)))
 
     def start(self, guess: Array, tangent: Array) -> Point:
-        """The solution nearest to a guess, across the direction given; its tangent points that way."""
+        """Solve for the point nearest to a guess, in the plane across `tangent`; its tangent points that way."""
         return self.corrected(guess, tangent, 0.0)
 
     def corrected(self, guess: Array, tangent: Array, length: float, reach: float = np.inf) -> Point:
-        """Newton's method on the plane through `guess` across `tangent`.
+        """Solve by Newton's method in the plane through `guess` across `tangent`.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class Track:
     def follow(
         self, first: Point, step: float, least: float, most: float, accept: Callable[[Point], None] | None = None
     ) -> Iterator[Point]:
-        """Points along the curve from `first`, which is not among them.
+        """Yield points along the curve from `first`, which is not among them.
 
         A point is taken for the continuation of the one before only if it is as close to the tangent there as an arc
         would be that turns no more than is allowed, and does turn no more. It is looked for on the parabola that the
@@ -161,7 +161,7 @@ class Track:
         self, low: Point, high: Point, measure: Callable[[Point], float], at_low: float, at_high: float,
         width: float = 1e-11,
     ) -> tuple[Point, Point]:  # fmt: skip
-        """Two neighbouring points between which a measure changes sign (Illinois); the second is the better one.
+        """Bracket the zero of a function along the curve (Illinois method); the second point is the better one.
 
         Raises
         ------
@@ -191,7 +191,7 @@ class Track:
         return (near, far) if side == -1 else (far, near)
 
     def _between(self, low: Point, near: Point, far: Point, s: float) -> Array:
-        """Where the curve should be at distance `s` along the tangent of `low`: on the cubic through two points."""
+        """Predict the point at distance `s` along the tangent of `low`, on the cubic through two points."""
         across = self.weights * low.tangent
         a, b = (float(across @ (one.u - low.u)) for one in (near, far))
         share, chord = (s - a) / (b - a), far.u - near.u
@@ -203,5 +203,5 @@ class Track:
 
 
 def turned_round(point: Point) -> Point:
-    """The same point, to be followed the other way; lengths count the other way too."""
+    """Reverse a point: tangent and arclength change sign."""
     return replace(point, tangent=-point.tangent, length=-point.length)

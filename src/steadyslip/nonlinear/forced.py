@@ -1,4 +1,4 @@
-"""How steady sliding answers an input that swings for ever: gain, phase, mean and distortion, small and large."""
+"""Response of steady sliding to a sinusoidal input: gain, phase, mean and distortion, small and large amplitudes."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def response(
     rtol: float = 1e-9,
     progress: bool | None = None,
 ) -> FrequencyResponse:
-    """Answer of steady sliding to an input that swings as a sine for ever.
+    """Response of steady sliding to an input that oscillates sinusoidally for ever.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class _Forced:
         self.decay = float(growth_rate(rig))
 
     def _input(self, model: Model, on: str | None) -> tuple[str, str | None]:
-        """The Model's name of what swings, and the body or contact it acts on."""
+        """Name in the model of the oscillating input, and the body or contact on which it acts."""
         ending = INPUTS[self.kind]
         if self.kind == "drive-velocity":
             return "load_velocity", None
@@ -211,7 +211,7 @@ class _Forced:
         return PIECES[self.kind](amplitude=amplitude, period=period, **on)
 
     def swung(self, amplitude: float, period: float, settled: float = SETTLED) -> tuple[str, tuple[float, ...]]:
-        """How the motion ends up, and the numbers of `_NUMBERS`, NaN where it does not."""
+        """Simulate to the final motion: its description, and the numbers named in `_NUMBERS` (NaN if it has none)."""
         waited = math.log(settled) / self.decay / period if self.decay < 0 else 0.0
         count = int(min(max(LEAST_PERIODS, math.ceil(waited)), MOST_PERIODS))
         nothing, before = (math.nan,) * len(_NUMBERS), math.inf
@@ -237,7 +237,7 @@ class _Forced:
                 return _unsettled(apart), nothing
 
     def _to_come(self, time: float) -> float:
-        """How much of a transient is still to come, over what has gone in the last so many seconds."""
+        """Remaining size of a transient relative to its decay during the last `time` seconds."""
         return 1 / float(np.expm1(min(-self.decay * time, MOST_FADED))) if self.decay < 0 else 0.0
 
     def _run(self, amplitude: float, period: float, count: int, rtol: float) -> tuple[dict[str, Array], str]:
@@ -285,7 +285,7 @@ class _Forced:
         return _edge(departs, most), _edge(lost, most)
 
     def _size(self) -> float:
-        """What swings, in steady sliding: beyond it load or velocity would change sign."""
+        """Steady value of the input: at larger amplitudes load or velocity would change sign."""
         if self.kind == "drive-velocity":
             return abs(float(self.rig.drive.velocity))
         normal, shear = ("normal_force", "friction_force") if "." in self.output else ("normal_stress", "shear_stress")
@@ -296,7 +296,7 @@ class _Forced:
 
 
 def _unsettled(apart: list[float]) -> str:
-    """What periods do that are `apart` from the 1st, 2nd, ... before: repeat later, drift, or neither."""
+    """Describe periods that differ by `apart` from the 1st, 2nd, ... before: repeat later, drift, or irregular."""
     for k, own in enumerate(apart[1:], start=2):
         if own < IRREGULARLY * apart[0]:
             return f"every {k}{'nd' if k == 2 else 'rd' if k == 3 else 'th'} period"
@@ -305,7 +305,7 @@ def _unsettled(apart: list[float]) -> str:
 
 
 def _edge(beyond: Callable[[float], bool], most: float) -> float:
-    """The amplitude from which on something is so, by halving logarithms; inf if it is not up to the largest."""
+    """Smallest amplitude for which `beyond` holds, by bisection of logarithms; inf if it never does up to `most`."""
     if not beyond(most):
         return math.inf
     low, high = most / 10**DECADES, most

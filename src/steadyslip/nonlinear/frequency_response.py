@@ -1,4 +1,4 @@
-"""What comes of an input that swings: gain and phase over the period, and where they end."""
+"""Result of `steadyslip.response`: gain and phase over the period, and the limits of amplitude."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_TOLD = 4  # resonances, in words
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse(ReadOnly):
-    """Answer of one output to one input that swings about its steady value.
+    """Response of one output to one input that oscillates about its steady value.
 
     Attributes
     ----------
@@ -82,12 +82,12 @@ class FrequencyResponse(ReadOnly):
     stable: bool = True
 
     def transfer(self, periods: Any) -> Array:
-        """The small-amplitude answer G(iω) at other periods (s), complex, SI units."""
+        """Small-amplitude transfer function G(iω) at other periods (s), complex, SI units."""
         return transfer(self.rig, self.input, self.output, np.asarray(periods, dtype=float))
 
     @property
     def shown_units(self) -> tuple[tuple[float, str], tuple[float, str]]:
-        """Factor and unit in which people get input and output: totals where the rig has an area."""
+        """Factor and display unit of input and output; forces where the rig has an area."""
         return outside(self.units[0], self._area), outside(self.units[1], self._area)
 
     @property
@@ -96,7 +96,7 @@ class FrequencyResponse(ReadOnly):
 
     @property
     def gain_unit(self) -> tuple[float, str]:
-        """The same of a gain; the unit is empty where input and output are alike."""
+        """Factor and display unit of the gain; the unit is empty where input and output have the same one."""
         (below, given), (above, answered) = self.shown_units
         divisor = f"({given})" if set(given) & set("/ ") else given
         return above / below, "" if given == answered else f"{answered}/{divisor}"
@@ -118,7 +118,7 @@ class FrequencyResponse(ReadOnly):
         return "\n".join([*lines, *self._limits()])
 
     def told(self, amplitude: float) -> str:
-        """An amplitude of the input for people."""
+        """Format an amplitude of the input for display."""
         return format_quantity(amplitude, self.units[0], area=self._area)
 
     def _gain(self, gain: float) -> str:
@@ -147,7 +147,7 @@ class FrequencyResponse(ReadOnly):
         return lines
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as JSON-ready dict, SI units; what does not exist is null."""
+        """The result as JSON-ready dict, SI units; missing values are null."""
         arrays = ("periods", "gain", "phase", "resonances", "amplitudes", "gains", "phases", "shift", "mean_friction",
                   "distortion", "linear_to", "lost_at")  # fmt: skip
         return {
@@ -187,12 +187,12 @@ class FrequencyResponse(ReadOnly):
 
 
 def _some(count: int) -> list[int]:
-    """Places of at most nine lines of a table."""
+    """Indices of at most nine lines of a table."""
     return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 9))})
 
 
 def _plain(values: Array) -> Any:
-    """Nested lists, null for what is no number."""
+    """Nested lists for JSON; values that are not finite become null."""
     found = values.astype(object)
     found[~np.isfinite(values)] = None
     return found.tolist()

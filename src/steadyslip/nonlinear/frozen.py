@@ -1,4 +1,4 @@
-"""The verdict at every moment of a slow change (frozen time), beside the motion that really happens."""
+"""Stability verdict at every moment of a slow change (frozen time), beside the simulated motion."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # what ends steady 
 
 @dataclass(frozen=True, eq=False)
 class FrozenVerdicts(ReadOnly):
-    """Stability of the steady sliding that belongs to each moment of a protocol, and when motion departs from it.
+    """Stability of the steady sliding at each moment of a protocol, and the times at which motion departs from it.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class FrozenVerdicts(ReadOnly):
 
     @property
     def interrupted(self) -> bool:
-        """Whether the motion was cut short by Ctrl-C; verdicts are whole."""
+        """True if Ctrl-C cut the motion short; the verdicts are complete."""
         return self.run.status == "interrupted"
 
     @cached_property
@@ -115,7 +115,7 @@ class FrozenVerdicts(ReadOnly):
         return ", ".join(f"{n} {format_quantity(v, known[n].role.unit, area=self.rig.area_of(n))}" for n, v in found)
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as JSON-ready dict, SI units; what does not exist is null."""
+        """The result as JSON-ready dict, SI units; missing values are null."""
         return {
             "t": self.t.tolist(),
             "values": {name: own.tolist() for name, own in self.values.items()},
@@ -128,7 +128,7 @@ class FrozenVerdicts(ReadOnly):
         }
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write one row for each moment: what is changed, growth rate, critical stiffness, slip rates of the motion.
+        """Write one row for each moment: changed parameters, growth rate, critical stiffness, slip rates of the motion.
 
         What does not exist is ``nan``. Forces where the rig has an area.
 
@@ -238,7 +238,7 @@ def frozen_verdicts(
 
 
 class _Slow:
-    """A rig whose parameters a protocol changes."""
+    """A rig whose parameters change by a protocol."""
 
     def __init__(self, rig: Slider | Machine, plan: Protocol) -> None:
         self.rig, self.plan, self.acting = rig, plan, targets(rig, plan)
@@ -252,7 +252,7 @@ class _Slow:
                 self.changes.setdefault(name, {})[channel] = -share if target.endswith(PORES) else share
 
     def moments(self, end: float) -> Array:
-        """Times (s) at which to ask: even ones, and those just before and after what happens at once."""
+        """Times (s) of evaluation: evenly spaced, and just before and after each jump."""
         self.segments = pack(self.plan, float(self.rig.drive.velocity), end, self.acting.channels)
         breaks = self.segments.start[0]
         before = np.nextafter(breaks[breaks > 0], 0.0)
@@ -269,7 +269,7 @@ class _Slow:
         return found
 
     def growth_rate(self, values: dict[str, Array]) -> Array:
-        """1/s; NaN where there is no steady sliding."""
+        """Largest growth rate, 1/s; NaN where there is no steady sliding."""
         return self._where_it_slides(growth_rate, values)
 
     def critical_stiffness(self, values: dict[str, Array]) -> Array:
@@ -286,7 +286,7 @@ class _Slow:
         return found
 
     def crossings(self, t: Array, rates: Array) -> Iterator[tuple[float, str]]:
-        """Where the verdict changes, and what it becomes."""
+        """Times (s) at which the verdict changes, and the new verdicts."""
         for i in _changes(rates):
             between = np.linspace(t[i - 1], t[i], REFINED)
             own = self.growth_rate(self.values(between))
@@ -298,20 +298,20 @@ class _Slow:
 
 
 def _changes(rates: Array) -> Array:
-    """Places whose verdict is not that before."""
+    """Indices at which the verdict differs from the one before."""
     verdicts = np.array([_verdict(one) for one in rates])
     return np.flatnonzero(verdicts[1:] != verdicts[:-1]) + 1
 
 
 def _contacts(rig: Slider | Machine) -> dict[str, tuple[ContactLaw, float]]:
-    """Contact laws by the prefix of their parameters, and the area by which forces of channels are divided."""
+    """Contact laws by the prefix of their parameters, and the area (m²) by which forces are divided."""
     if isinstance(rig, Slider):
         return {"contact.": (rig.contact, 1.0)}
     return {f"contacts.{name}.contact.": (own.contact, own.area or 1.0) for name, own in rig.contacts.items()}
 
 
 def _refuse_remembered(rig: Slider | Machine) -> None:
-    """Contacts that count from the steady sliding at the start: another has not the parameters of the rig."""
+    """Refuse contact laws that refer to steady sliding at the start, as their reference cannot follow the protocol."""
     seen = {one.name: sp.Symbol(one.name) for one in fields(ContactInputs)}
     for prefix, (law, _) in _contacts(rig).items():
         memory = {f"{kind}memory": tuple(sp.symbols([f"{kind}{n}" for n in law.memory()])) for kind in ("", "steady_")}
@@ -324,7 +324,7 @@ def _refuse_remembered(rig: Slider | Machine) -> None:
 
 
 def _load_of(rig: Slider | Machine, contact: str) -> tuple[str, float]:
-    """The parameter that a constant change of the normal stress adds to, and how much a unit of the channel adds."""
+    """Parameter to which a change of normal stress adds, and the amount per unit of the channel."""
     prefix = f"contacts.{contact}.contact." if contact else "contact."
     law, area = _contacts(rig)[prefix]
     load = law.load()
@@ -337,7 +337,7 @@ def _load_of(rig: Slider | Machine, contact: str) -> tuple[str, float]:
 
 
 def _departure(found: FrozenVerdicts, begun: float) -> float:
-    """When slip is first twice as fast as the drive asks, and as it was when sliding became unstable."""
+    """Time (s) at which slip is first `DEPARTED` times faster than the drive asks and than when it became unstable."""
     run = found.run
     asked = run["load_velocity"] / run["load_velocity"][0]
     apart = np.zeros(len(run["t"]), dtype=bool)

@@ -1,1 +1,1 @@
-"""Kicks: what comes of them, the smallest that is not survived, and the basin of steady sliding."""
+"""Kicks (sudden disturbances): the outcome of one, the smallest not survived, and the basin of steady sliding."""

@@ -1,4 +1,4 @@
-"""From where in the phase plane motion returns to steady sliding."""
+"""Basin of steady sliding: the starting points in the phase plane from which motion returns to it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ STEPS = 2e9  # of integration, of all motions of a basin
 
 @dataclass(frozen=True, eq=False)
 class Basin(ReadOnly):
-    """What comes of every starting point on a grid.
+    """Outcome of the motion from every starting point on a grid of the phase plane.
 
     Attributes
     ----------
@@ -81,12 +81,12 @@ class Basin(ReadOnly):
 
     @property
     def share(self) -> float:
-        """Share of the grid's points that return."""
+        """Fraction of the grid's points whose motion returns."""
         return float(np.mean(self.outcome == "returns"))
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C came before all points were decided."""
+        """True if Ctrl-C came before all points were decided."""
         return bool(np.any(self.outcome == OUTCOMES[INTERRUPTED]))
 
     def plot(self, ax: Any = None) -> Any:
@@ -114,7 +114,7 @@ def basin(
     progress: bool | None = None,
     branch: int = 0,
 ) -> Basin:
-    """Start everywhere in the phase plane and see what returns to steady sliding.
+    """Simulate from every point of a grid of the phase plane and find which motions return to steady sliding.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def basin(
 
 @dataclass(frozen=True)
 class _Plane:
-    """What spans the plane, the natural length of the first, usual values of the second, and its steady one."""
+    """Coordinates of the phase plane: their names, scales and steady values."""
 
     names: tuple[str, str]
     units: tuple[str, str]
@@ -204,7 +204,7 @@ class _Plane:
 
 
 def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
-    """The plane of a slider's block, or of a body: that whose contact moves most unless one is named."""
+    """Phase plane of a slider's block, or of one body of a machine: unless named, that whose contact moves most."""
     if isinstance(rig, Slider):
         drive = rig.drive.velocity
         heights = drive * np.geomspace(1e-4, 1e4, POINTS)
@@ -233,7 +233,7 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
 
 
 def _unstable_cycles(rig: Slider | Machine, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:
-    """One period of each unstable cycle at the rig's own parameter; none where no branch can be followed."""
+    """One period of each unstable cycle at the rig's own parameter; empty where no branch can be followed."""
     with progress_text("following cycles", progress) as said:
 
         def told(count: int, _: Cycle) -> None:
@@ -249,7 +249,7 @@ def _unstable_cycles(rig: Slider | Machine, along: str, branch: int, progress: b
 
 @checked(periods=finite(0, 1e4))
 def orbit(rig: Slider | Machine, cycle: Cycle, periods: float = 1.0) -> History:
-    """A cycle as a history, for drawing: simulated from its start.
+    """Simulate a cycle from its start for some periods, as a history for plots.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Thresholds of many rigs at once, as a map over two parameters for instance."""
+"""Thresholds of many rigs at once: all their brackets are narrowed together."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ EDGE, UNSTABLE, ABSENT, BEYOND_FLOATS = range(len(BEYOND) - 4, len(BEYOND))
 
 @dataclass(frozen=True, eq=False)
 class Brackets:
-    """Thresholds of many rigs, arrays of one shape.
+    """Thresholds of many rigs with brackets and limiting outcomes, arrays of one shape.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ def threshold_map(
     progress: bool | None = None,
     branch: int = 0,
 ) -> Any:
-    """Thresholds of many rigs, as a map over two parameters for instance.
+    """Thresholds of many rigs, for instance over a grid of two parameters.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def threshold_brackets(
     progress: bool | None = None,
     branch: int = 0,
 ) -> tuple[Brackets, Any, Any]:
-    """`threshold_map` with brackets and reasons, as bare arrays; dimensions and coordinates of DataArrays beside."""
+    """Brackets behind `threshold_map` as plain arrays, with dimensions and coordinates of DataArrays apart."""
     flat, _, together = broadcast_arrays(rig, Protocol(), vary, {})
     shape = together.shape
     size = int(np.prod(shape, dtype=int))
@@ -155,7 +155,7 @@ def threshold_brackets(
 
 
 class _Search:
-    """Brackets of all rigs of one kind, narrowed together: first a scan of sizes, then bisection."""
+    """Brackets of all rigs for one kind of kick: a scan of sizes, then bisection."""
 
     def __init__(self, kicked: Kicked, count: int, threads: int | None, advanced: Any) -> None:
         self.kicked, self.threads, self.advanced = kicked, threads, advanced
@@ -191,7 +191,7 @@ class _Search:
             self._tried(wide, point)
 
     def _next(self, precision: float) -> tuple[Array, Array]:
-        """Sizes to try next, of the rigs whose brackets are too wide: in the middle, or beside what is undecided."""
+        """Next sizes to try for the rigs whose brackets are too wide: the middle, or beside an undecided size."""
         low, high, (left, right) = self.low, self.high, self.doubt.T
         with np.errstate(invalid="ignore"):
             clear = np.isnan(left)
@@ -204,7 +204,7 @@ class _Search:
         return point[wide], wide
 
     def _tried(self, which: Array, sizes: Array) -> Array:
-        """Try kicks of rigs `which`, note what comes of them; whether each rig is still without one that fails."""
+        """Simulate kicks of rigs `which` and update their brackets; True for each rig without a failing kick so far."""
         if not len(which):
             return np.zeros(0, dtype=bool)
         found = self.kicked.outcomes(self.rig[which], sizes, self.threads, self.advanced, effort=1.0)
@@ -225,7 +225,7 @@ class _Search:
         return np.asarray(~failed & (found != INTERRUPTED))
 
     def result(self) -> tuple[Array, Array, Array, Array, Array]:
-        """Size, low, high, beyond, contact."""
+        """Threshold, lower and upper bound, limiting outcome and contact of every rig."""
         with np.errstate(invalid="ignore"):
             middle = np.where(self.beyond == EDGE, self.high, 0.5 * (self.low + self.high))
             known = np.isfinite(self.high) & (~self.whole | (self.high - self.low <= WIDE * self.high))

@@ -1,4 +1,4 @@
-"""Closed orbits near the ends of many runs at once, found by Newton's method and judged by their multipliers.
+"""Find closed orbits near the ends of many runs by Newton's method, and their stability from multipliers.
 
 Those of one slip event, or one turn, are looked for here; longer ones by `orbits.verify`, one run after another.
 
@@ -35,7 +35,7 @@ DONE = STATUSES.index("done")
 
 
 def on_long_cycle(runs: Judged, one: int, state: Array, unknowns: Array) -> bool:
-    """Whether one run, now at `state` (n,), is on an attracting cycle of several slip events, or turns.
+    """True if one run, now at `state` (n,), is on an attracting cycle of several slip events or turns.
 
     `unknowns` (u,) are those of the balances there, NaN where they are not known.
     """
@@ -60,7 +60,7 @@ class _Turn:
 def attracted(
     runs: Judged, which: Array, states: Array, unknowns: Array, period: Array, threads: int | None = None
 ) -> tuple[Array, Array]:
-    """Whether runs `which` (k,), now at `states` (k, n), are on an attracting closed orbit of about `period` (k,).
+    """True (k,) for runs `which`, now at `states` (k, n), on an attracting closed orbit of about `period` (k,) s.
 
     And whether a period later they are where they were, but for a little: on any closed orbit, or close to one.
     `unknowns` (k, u) are those of the balances there, NaN where they are not known.
@@ -119,7 +119,7 @@ def attracted(
 def _turned(
     runs: Judged, which: Array, states: Array, unknowns: Array, scale: Array, period: Array, threads: int | None
 ) -> _Turn:
-    """One period from k states, and its derivative by central differences."""
+    """Integrate one period from k states; its derivative by central differences."""
     count, n = states.shape
     beside = BESIDE * np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)])  # (2n+1, n)
     many = (states[:, None, :] + scale[:, None, :] * beside[None]).reshape(-1, n)
@@ -132,7 +132,7 @@ def _turned(
 
 
 def _attraction(derivative: Array, ahead: Array) -> Array:
-    """How far all multipliers but the one of the motion itself lie inside the unit circle (k,); 0 if not certain.
+    """Distance inside the unit circle of all multipliers but the trivial one, (k,); 0 if uncertain.
 
     `ahead` (k, n) are the rates. That direction, which the flow carries into itself, is split off first: beside it a
     second multiplier near one would be a double one, and lose half of its digits. How well it is met tells what

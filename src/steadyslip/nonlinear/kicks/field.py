@@ -1,4 +1,4 @@
-"""Motion of rigs at constant inputs: rates, slip rates and normal stresses at any states."""
+"""Equations of motion at constant inputs: rates, slip rates and normal stresses at given states."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BALANCED = 12  # rounds of Newton's method for the balance of forces
 
 @question
 def field_of(reduction: Reduction) -> ArrayFunction:
-    """Rates and slip rates, then residuals of the balances and their slopes, row by row, where unknowns are left.
+    """Function of rates and slip rates, then residuals of the force balances and their slopes, row by row (cached).
 
     A function of the parameters, σss, v_lp, q, p, the state and the unknowns.
     """
@@ -31,17 +31,19 @@ def field_of(reduction: Reduction) -> ArrayFunction:
 
 @question
 def _jacobian_of(reduction: Reduction) -> ArrayFunction:
+    """Function of the Jacobian of the rates (cached)."""
     return _at_constant_inputs(reduction, [entry for row in reduction.jacobian() for entry in row])
 
 
 def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> ArrayFunction:
+    """Compile expressions with the derivatives of the inputs set to zero."""
     still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))
     at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
     return reduction.model.function(at_rest, V_LP, Q, P, *reduction.state, *reduction.unknowns)
 
 
 def rates_at(rest: Rest, states: Array) -> Array:
-    """Rates (m, d, n) at states (m, d, n), d of them for each rig; NaN where the balance of forces has no solution."""
+    """Rates (m, d, n) at d states for each of m rigs, (m, d, n); NaN where forces cannot balance."""
     return motion_at(rest, states)[0]
 
 
@@ -52,7 +54,7 @@ def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
 
 
 def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
-    """The same, and the unknowns of the balances (m, d, u)."""
+    """Rates, slowest slip rate, and unknowns of the force balances (m, d, u), at states (m, d, n)."""
     given = [rest.column(np.asarray(a)) for a in rest.given()]
     function, split, n = field_of(rest.reduction), np.moveaxis(states, 2, 0), states.shape[2]
     shape, count, speeds = states.shape[:2], len(rest.reduction.unknowns), len(rest.reduction.slidings)
@@ -75,7 +77,7 @@ def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
 
 
 def _newton(residuals: Array, slopes: Array) -> tuple[Array, Array]:
-    """How far each unknown is off, (m, d, u), and how much it feels a force that is."""
+    """Newton corrections of the unknowns (m, d, u), and their sensitivity to a force."""
     if residuals.shape[-1] == 1:
         return residuals / slopes[..., 0], 1 / np.abs(slopes[..., 0])
     good = np.all(np.isfinite(slopes), axis=(-2, -1)) & (np.linalg.det(slopes) != 0)
@@ -85,7 +87,7 @@ def _newton(residuals: Array, slopes: Array) -> tuple[Array, Array]:
 
 
 def _forces(rest: Rest) -> Array:
-    """Size of what balances, (m,)."""
+    """Typical size of the balanced forces, (m,)."""
     areas = rest.point.evaluate(areas_of(rest.reduction.model))
     found = [np.maximum(1.0, np.abs(area)) * sigma for area, sigma in zip(areas, rest.sigmas, strict=True)]
     return np.asarray(np.maximum.reduce(np.broadcast_arrays(*found)))
@@ -113,14 +115,14 @@ def slopes_at(
 
 
 def normal_stresses(rest: Rest, state: Array, unknowns: Array) -> Array:
-    """Of every contact, at states (m, n) and unknowns (m, u), one for each rig: (m, contacts)."""
+    """Normal stresses (m, contacts) at states (m, n) and unknowns (m, u), one for each rig."""
     inputs = rest.velocity, rest.force, rest.pressure
     found = rest.point.evaluate(_normal_of(rest.reduction), *inputs, *state.T, *unknowns.T)
     return in_columns(found, len(state))
 
 
 def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
-    """The same of slip rates."""
+    """Slip rates (m, contacts), m/s, at states (m, n) and unknowns (m, u), one for each rig."""
     found = field_of(rest.reduction)(*rest.given(), *state.T, *unknowns.T)
     n = state.shape[1]
     return in_columns(found[n : n + len(rest.reduction.slidings)], len(state))
@@ -128,7 +130,7 @@ def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
 
 @question
 def _normal_of(reduction: Reduction) -> ArrayFunction:
-    """Normal stresses."""
+    """Function of the normal stresses of all contacts (cached)."""
     still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))
     wanted = (one.outputs["sigma"].xreplace(still) for one in reduction.slidings)
     return reduction.model.function(wanted, V_LP, Q, P, *reduction.state, *reduction.unknowns)

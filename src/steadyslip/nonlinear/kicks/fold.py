@@ -1,4 +1,4 @@
-"""Folds of the balance of forces: where motion of a block without mass has no continuous solution any further.
+"""Folds of the force balance: states beyond which a massless block has no continuous motion.
 
 Velocity is what balances forces. Where friction falls when the block speeds up, two such velocities may meet and vanish
 as the state changes; beyond, the block would have to jump to another one far away.
@@ -20,7 +20,7 @@ CLOSE = 1e-3  # and difference of ln(velocity/drive), where its own velocity is 
 
 
 def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:
-    """Whether states (m, n), one for each rig, are where two velocities that balance forces meet (m,).
+    """True (m,) for states (m, n), one for each rig, at which two velocities that balance the forces merge.
 
     `unknowns` (m, 1) are those of the balance at the states, NaN where they are lost: next to a fold forces may balance
     at a velocity that is not at it.
@@ -46,7 +46,7 @@ def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:
 
 
 def _balance(rest: Rest, states: Array, turns: Array) -> tuple[Array, Array]:
-    """Force that is missing at velocities (m, k), and how it changes with them; given as asinh or ln."""
+    """Residual force at velocities (m, k), given as asinh or ln, and its derivative."""
     given = [rest.column(np.asarray(number)) for number in rest.given()]
     unknown = turns
     if rest.reduction.velocity == "linear":

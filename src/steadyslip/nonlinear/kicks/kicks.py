@@ -1,4 +1,4 @@
-"""Kicks: what is done to a rig in steady sliding at time zero, and what comes of it.
+"""Kicks (sudden disturbances of steady sliding at time zero): their kinds, sizes, and the motions after them.
 
 A kick has a size without unit, from nothing upwards; all of them change the state or the inputs once, after which
 the inputs are constant, so that one kernel runs them all.
@@ -34,7 +34,7 @@ PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matt
 
 @dataclass(frozen=True)
 class Kick:
-    """One kind of kick.
+    """One kind of kick, with the unit of its amount and the range of sizes that is searched.
 
     Attributes
     ----------
@@ -79,12 +79,12 @@ OF_MACHINES = {
 
 
 def kicks_of(rig: Slider | Machine) -> dict[str, Kick]:
-    """What a rig can be kicked by."""
+    """Kinds of kick that a rig can get."""
     return KICKS if isinstance(rig, Slider) else OF_MACHINES
 
 
 def kick_problems(rig: Slider | Machine, kick: str, at: str | None = None) -> list[Problem]:
-    """What is wrong with a kick and where it is to act.
+    """Problems with the kind and the place of a kick, as a list for error messages.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def kick_problems(rig: Slider | Machine, kick: str, at: str | None = None) -> li
 
 
 def options_for(model: Model, rtol: float | None) -> Options:
-    """How kicked motion is integrated: less finely with mass or bristles, which need a Rosenbrock method.
+    """Integration options of kicked motion: a larger tolerance with mass or bristles, which need an implicit method.
 
     Rounding in the force of stiff bristles is more than the finer tolerance allows.
     """
@@ -110,7 +110,7 @@ def options_for(model: Model, rtol: float | None) -> Options:
 
 
 class Kicked:
-    """A rig, or many, about to be kicked.
+    """One rig or many, with a kind of kick, from which motions after kicks are prepared.
 
     Parameters
     ----------
@@ -182,18 +182,18 @@ class Kicked:
 
     @property
     def highest(self) -> float:
-        """Largest size that makes sense."""
+        """Largest size that is physically meaningful."""
         if self.sign < 0 and (self.kick.name in ("normal-stress", "normal-force", "impulse") or self._is_blow):
             return 0.999
         return 1e10 if self._is_blow else self.kick.high
 
     @property
     def _is_blow(self) -> bool:
-        """Whether a body gets another velocity at once."""
+        """True if the kick changes the velocity of a body at once."""
         return self.kick.name == "impulse" or (self.kick.name == "velocity" and not self.of_drive)
 
     def amount(self, size: Any, which: Any = slice(None)) -> Array:
-        """The kick in SI units: velocity beside the rig's own drive, change of anything else; signed."""
+        """Kick in SI units, signed: for a velocity kick the change beside the drive, else the change of the input."""
         size = np.asarray(size, dtype=float)
         with np.errstate(over="ignore"):
             if self.kick.name == "velocity" and self.of_drive:
@@ -212,7 +212,7 @@ class Kicked:
 
     @property
     def moves_rest(self) -> bool:
-        """Whether the steady sliding after the kick is another than the rig's own."""
+        """True if steady sliding after the kick differs from the rig's own."""
         if self.kick.name == "velocity":
             return self.of_drive and not self.from_other
         return self.kick.name in ("normal-stress", "normal-force", "force")
@@ -228,13 +228,13 @@ class Kicked:
         return (velocity, nothing, amount) if self.kick.name == "force" else (velocity, amount, nothing)
 
     def rest_after(self, which: Array, sizes: Array) -> Rest:
-        """The steady sliding that kicks of `sizes` (n,) of rigs `which` (n,) lead to."""
+        """Steady sliding after kicks of `sizes` (n,) of rigs `which` (n,)."""
         if not self.moves_rest:
             return self.rest.part(which)
         return rest_of(self._jobs(which), *self.inputs(which, sizes))
 
     def may_return(self, which: Array, sizes: Array) -> Array:
-        """Whether there is stable (or neutral) steady sliding to return to after kicks, (n,)."""
+        """True (n,) if stable or neutral steady sliding exists after kicks of `sizes` (n,)."""
         rest = self.rest_after(which, sizes)
         return np.asarray(rest.exists & (rest.stable | rest.neutral))
 
@@ -263,11 +263,11 @@ class Kicked:
         self, which: Array, sizes: Array, threads: int | None = None,
         advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
     ) -> Array:  # fmt: skip
-        """What comes of kicks: indices into `OUTCOMES`, (n,); see `Judged` for `effort`."""
+        """Outcomes of kicks as indices into `OUTCOMES`, (n,); see `Judged` for `effort`."""
         return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
 
     def contacts(self, which: Array, sizes: Array, threads: int | None = None) -> Array:
-        """Where kicks lead to loss of contact or blow-up: at which contact of a machine; names (n,), else empty."""
+        """Name of the contact at which each kick leads to loss of contact or blow-up, (n,); else empty."""
         return contacts_of(self.runs(which, sizes), np.arange(len(which)), threads)
 
     def _jobs(self, which: Array) -> Jobs:
@@ -278,7 +278,7 @@ class Kicked:
         )  # fmt: skip
 
     def _started_at(self, jobs: Jobs, velocity: Array) -> Jobs:
-        """The same rigs in steady sliding at another velocity of the load point."""
+        """Jobs that start in steady sliding at another velocity of the load point."""
         nothing = np.zeros(len(velocity))
         before = rest_of(jobs, velocity, nothing)
         inputs = velocity, nothing, nothing
@@ -286,13 +286,13 @@ class Kicked:
         return replace(jobs, initial=initial, near=near)
 
     def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
-        """The same rigs with another velocity of the block, or of a body."""
+        """Jobs that start with another velocity of the block or of a body."""
         if not self.at:
             return self._started(jobs, {"v": self.drive[which] + change})
         own = np.asarray(steady_speeds(jobs.point, self.at), dtype=float)
         return self._started(jobs, {f"{self.at}.v": own + change})
 
     def _started(self, jobs: Jobs, given: Mapping[str, Any]) -> Jobs:
-        """The same rigs from other starting values."""
+        """Jobs that start from other initial values."""
         initial, speed = initial_values(jobs.reduction, jobs.point, given)
         return replace(jobs, initial=initial, velocity=speed)

@@ -1,4 +1,4 @@
-"""A neighbourhood of steady sliding from which all motion returns to it.
+"""Compute a ball around steady sliding from which all motion returns to it.
 
 With y = y0 + B q, the columns of B the modes of the linearisation, V = |q|² is a Lyapunov function of the linearised
 motion. It is one of the motion itself wherever V' < 0, and a ball of V on and in which this holds is never left and
@@ -54,14 +54,14 @@ class Neighbourhood:
         self.radius = np.where(rest.stable, np.nan, 0.0)
 
     def part(self, which: Array) -> Neighbourhood:
-        """Those of some of the rigs."""
+        """Balls of some of the rigs."""
         found = Neighbourhood(self.rest.part(which))
         for name in ("basis", "inverse", "decay", "radius"):
             setattr(found, name, getattr(self, name)[which])
         return found
 
     def computed(self, which: Array | None = None) -> Array:
-        """Radii of some rigs, of all unless given."""
+        """Radii (in q) of some rigs; of all unless given."""
         which = np.arange(len(self.radius)) if which is None else which
         asked = np.unique(which[np.isnan(self.radius[which])])
         for start in range(0, len(asked), 512):
@@ -81,7 +81,7 @@ class Neighbourhood:
             return np.asarray(np.einsum("kij,kj->ki", self.inverse[which], away))
 
     def around(self, which: Array) -> Array:
-        """Directions of q in which rigs `which` (k,) are looked at, (k, d, n), unit vectors."""
+        """Unit vectors of q (k, d, n) along which the motion of rigs `which` (k,) is checked."""
         decay = self.decay[which]
         lessened = (np.min(decay, axis=1)[:, None] / decay)[:, None, :]
         even = directions(decay.shape[1])[None]
@@ -89,13 +89,13 @@ class Neighbourhood:
         return np.asarray(found / np.linalg.norm(found, axis=2)[:, :, None])
 
     def distance(self, which: Array, states: Array) -> Array:
-        """|q| of states (k, n) of rigs `which` (k,); beyond the radius it means nothing."""
+        """Distance |q| of states (k, n) of rigs `which` (k,) from steady sliding; meaningless beyond the radius."""
         with np.errstate(all="ignore"):
             found = np.linalg.norm(self.coordinates(which, states), axis=1)
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
     def holds(self, which: Array, states: Array) -> Array:
-        """Whether states (k, n) of rigs `which` (k,) lie in the ball."""
+        """True (k,) for states (k, n) of rigs `which` inside their balls."""
         radius = self.computed(which)
         return np.asarray(self.distance(which, states) < radius)
 
@@ -116,7 +116,7 @@ class Neighbourhood:
         return radius
 
     def _decays(self, which: Array, radius: Array) -> Array:
-        """Whether V falls as fast as asked for, everywhere on a shell."""
+        """True where V falls at least `MARGIN` times as fast as linearly, everywhere on a shell."""
         rest = self.rest.part(which)
         q = self.around(which) * radius[:, None, None]
         away = np.einsum("kij,kdj->kdi", self.basis[which], q)
@@ -130,7 +130,7 @@ class Neighbourhood:
 
 
 def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
-    """Real weighted modes of stable steady sliding, slow ones first.
+    """Real weighted eigenvectors of stable steady sliding, slowest decay first.
 
     Natural sizes are those of the state. A mode in which slip changes by many of them before velocity or memory
     change by one is as long as these allow: slip itself changes forces in proportion.
@@ -168,7 +168,7 @@ def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
 
 @lru_cache(maxsize=8)
 def directions(n: int) -> Array:
-    """Directions all around, (count, n): evenly spread, with the axes among them."""
+    """Unit vectors (count, n), evenly spread over all directions, the axes included."""
     if n == 1:
         return np.array([[1.0], [-1.0]])
     if n == 2:

@@ -1,4 +1,4 @@
-"""What comes of motion under constant inputs, decided by what is certain and by nothing else.
+"""Decide the outcome of motions under constant inputs, from criteria that are certain.
 
 A motion returns once it is in a computed neighbourhood of steady sliding that is never left (`neighbourhood`); it
 oscillates once it is on a closed orbit that was found and attracts (`closed_orbits`); blow-up and loss of contact are
@@ -56,7 +56,7 @@ CODE = {word: number for number, word in enumerate(STATUSES)}
 def outcomes_of(
     runs: Judged, threads: int | None = None, advanced: Callable[[int], None] | None = None, start: Array | None = None
 ) -> Array:
-    """Run motions and say what comes of them: indices into `OUTCOMES`, (m,); from states `start` (m, n) if given.
+    """Simulate motions and return outcomes, indices into `OUTCOMES` (m,); from states `start` (m, n) if given.
 
     `advanced` is told now and then how many more have been decided.
     """
@@ -64,7 +64,7 @@ def outcomes_of(
 
 
 def contacts_of(runs: Judged, which: Array, threads: int | None = None) -> Array:
-    """At which contact of a machine motions `which` lose contact, or blow up: names, (m,); empty elsewhere.
+    """Name of the contact at which each motion loses contact or blows up, (m,); empty for other outcomes.
 
     They are run once more, to where they end.
     """
@@ -87,7 +87,7 @@ def contacts_of(runs: Judged, which: Array, threads: int | None = None) -> Array
 
 
 class _Course:
-    """Motions on their way to an outcome, span after span.
+    """Motions on their way to an outcome, simulated span by span.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class _Course:
         self.explicit = automatic_method(runs.rest.reduction) != STIFF
 
     def run(self, advanced: Callable[[int], None] | None) -> Array:
-        """The outcomes."""
+        """Simulate until every motion has an outcome; indices into `OUTCOMES`, (m,)."""
         open_ = np.flatnonzero(self.found == OPEN)
         while len(open_):
             before = self.begun[open_]
@@ -140,7 +140,7 @@ class _Course:
         return self.found
 
     def _advanced(self, open_: Array) -> Spans:
-        """A span of some motions: those of each method, and those from their beginning, by themselves."""
+        """Simulate one span of some motions, grouped by method and by first span or later."""
         fresh = ~self.begun[open_]
         found = Spans.empty(len(open_), self.state.shape[1], self.runs.rest.unknowns.shape[1])
         for stiff, anew in ((False, True), (False, False), (True, True), (True, False)):
@@ -156,7 +156,7 @@ class _Course:
         return found
 
     def _retried(self, open_: Array, ended: Spans) -> Array:
-        """Note where explicit steps were too many, to do the span once more; the others, which go on from its end.
+        """Mark motions for which the explicit method needed too many steps for a repeat; return the others.
 
         A span that too many steps were not enough for has ended where they were used up.
         """
@@ -175,7 +175,7 @@ class _Course:
         return over
 
     def _judge(self, which: Array, ended: Spans, watched: Array) -> None:
-        """Say what is certain of motions at the end of a span."""
+        """Record the outcomes that are certain at the end of a span."""
         runs, found, state = self.runs, self.found, self.state
         found[which] = _seen(runs, which, ended)
         running = np.flatnonzero(found[which] == OPEN)
@@ -207,7 +207,7 @@ class _Course:
         self.between[which] = apart
 
     def _goes_on(self, which: Array, tally: Array) -> Array:
-        """Whether motions about unstable steady sliding go on for good, bounded though not repeating themselves."""
+        """True for motions about unstable steady sliding that stay bounded without repeating themselves."""
         rest = self.runs.rest.part(which)
         count, peak = (tally[:, TALLY.index(name)] for name in ("velocity_peaks", "peak_velocity"))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -217,7 +217,7 @@ class _Course:
             return np.asarray(left & (count > PEAKS) & (now <= before + HIGHER * np.abs(before)))
 
     def _give_up(self, open_: Array) -> None:
-        """Call undecided what has had its time, or its steps."""
+        """Record as undecided the motions that have used up their time or steps."""
         runs, open_ = self.runs, open_[self.found[open_] == OPEN]
         late = self.elapsed[open_] >= self.most[open_]
         unseen = runs.rest.stable[open_] & (runs.near.radius[open_] == 0)
@@ -228,18 +228,18 @@ class _Course:
 
 
 def _fates(runs: Judged, threads: int | None, start: Array) -> Array:
-    """What comes of motions from given states."""
+    """Outcomes of motions from given states."""
     return outcomes_of(runs, threads, start=start)
 
 
 def _alike(now: Array, before: Array) -> Array:
-    """Whether slip events follow each other in the same time as at the end of the span before."""
+    """True where slip events are as far apart in time as at the end of the span before."""
     with np.errstate(invalid="ignore"):
         return np.asarray((now > 0) & (np.abs(now - before) < ALIKE * now))
 
 
 def _seen(runs: Judged, which: Array, ended: Spans) -> Array:
-    """Outcomes that a run's end itself tells; OPEN where it can go on."""
+    """Outcomes that follow from the status of a run; OPEN where it can go on."""
     status = ended.status
     found = np.full(len(status), NO_SOLUTION)
     found[status == CODE["done"]] = OPEN

@@ -1,4 +1,4 @@
-"""Where a kick acts, and what one of size one is there: in the units of the body, contact or drive that it is of."""
+"""Place and unit of a kick: what size one means at a body, contact or drive."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = np.ndarray
 
 
 def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Problem]:
-    """What is wrong with where a kick is to act."""
+    """Problems with the place of a kick, as a list for error messages."""
     if isinstance(rig, Slider):
         if at is None:
             return []
@@ -44,7 +44,7 @@ def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Pro
 
 
 def refuse_jump(rig: Slider | Machine) -> None:
-    """A step of the load point through a dashpot is an infinite force; NotAvailable."""
+    """Raise NotAvailable if the load point acts through a dashpot: its step would be an infinite force."""
     if isinstance(rig, Machine) and any(e.damping and LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
             "a displacement step of the drive acts through a dashpot (of a link, a kd) as an infinite force; kick a "
@@ -53,7 +53,7 @@ def refuse_jump(rig: Slider | Machine) -> None:
 
 
 def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, Array]:
-    """The unit of a kind of kick, what size one is in it, and the change of velocity that a blow of size one makes."""
+    """SI unit of a kick, its amount at size one, and the velocity change of a blow of size one."""
     model, point, none = jobs.point.model, jobs.point, np.zeros(1)
     if not rest.is_machine:
         drive = np.abs(np.asarray(point.drive, dtype=float))
@@ -90,7 +90,7 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
 
 
 def _force(point: OperatingPoint, model: Model, at: str) -> Array:
-    """The largest steady normal force, as it would be felt at a body: through the lever at which contacts rub."""
+    """Largest steady normal force (N) as felt at a body, through the lever at which contacts rub."""
     numbers = [np.asarray(one, dtype=float) for one in point.evaluate(_levers(model, at))]
     areas = point.evaluate(_areas(model))
     normal = [area * np.asarray(sigma, dtype=float) for area, sigma in zip(areas, point.sigmas, strict=True)]
@@ -101,7 +101,7 @@ def _force(point: OperatingPoint, model: Model, at: str) -> Array:
 
 
 def steady_speeds(point: OperatingPoint, at: str) -> Any:
-    """Velocity of a body in steady sliding."""
+    """Velocity of a body in steady sliding, m/s (rad/s for a rotation)."""
     return point.evaluate(_speeds(point.model))[_place(point.model, at)]
 
 
@@ -126,7 +126,7 @@ def _areas(model: Model) -> ArrayFunction:
 
 @question
 def _levers(model: Model, at: str) -> ArrayFunction:
-    """Slip rate of each contact over the velocity of a body: as it moves alone, or else as all move in sliding."""
+    """Slip rate of each contact per velocity of a body: moving alone, or else with all bodies as in sliding."""
     body = model.coordinates[_place(model, at)]
     found = []
     for contact in model.contacts:

@@ -1,4 +1,4 @@
-"""Steady sliding under constant inputs: where a rig would come to rest relative to its load point after a kick."""
+"""Steady sliding under constant inputs, which is the state a kicked rig may return to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NEUTRAL = 1e-8  # growth per radian below which small motions neither grow nor d
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Steady sliding of m rigs at their inputs, in the n state variables of the kernels.
+    """Steady sliding of m rigs at constant inputs, in the n state variables of the kernels.
 
     Attributes
     ----------
@@ -59,24 +59,24 @@ class Rest:
         return tuple(np.broadcast_to(sigma, self.velocity.shape) for sigma in own)
 
     def given(self) -> tuple[Any, ...]:
-        """What functions of `field_of` take before the state."""
+        """Arguments that functions of `field_of` take before the state."""
         own = (np.broadcast_to(np.asarray(one, dtype=float), self.velocity.shape) for one in self.point.steady)
         return (*self.point.arguments, *own, self.velocity, self.force, self.pressure)
 
     @property
     def is_machine(self) -> bool:
-        """Whether bodies and contacts have names."""
+        """True if bodies and contacts have names."""
         return bool(self.reduction.model.contacts[0].name)
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Where displacements stand in the state."""
+        """Indices of the displacements in the state."""
         own = {one.displacement for one in self.reduction.model.coordinates}
         return tuple(i for i, symbol in enumerate(self.reduction.state) if symbol in own)
 
     @property
     def speeds(self) -> Array:
-        """Natural velocities of these, (m, places)."""
+        """Typical velocity of each coordinate in `places`, shape (m, places)."""
         if not self.is_machine:
             return np.asarray(np.abs(self.velocity)[:, None])
         own, _ = natural_scales(self.point, self.reduction)
@@ -98,7 +98,7 @@ class Rest:
 
     @property
     def contact(self) -> int:
-        """The contact that moves most in the leading mode of the first rig, by whose slip motions are watched."""
+        """Index of the contact that moves most in the leading mode of the first rig; its slip marks the turns."""
         slidings = self.reduction.slidings
         if len(slidings) == 1 or not np.all(np.isfinite(self.matrix[0])):
             return 0
@@ -110,13 +110,13 @@ class Rest:
         return int(np.argmax(np.abs(rows @ mode) / np.abs(ratios)))
 
     def slip_rate(self, contact: int) -> Array:
-        """At a contact as fast as the load point, m/s, (m,)."""
+        """Slip rate (m,) of a contact in steady sliding, m/s."""
         ratios = in_columns(self.point.evaluate(_ratios(self.reduction)), len(self.velocity))
         return np.asarray(self.velocity * ratios[:, contact])
 
     @property
     def exists(self) -> Array:
-        """Whether there is steady sliding (m,)."""
+        """True (m,) where steady sliding exists."""
         return np.asarray(np.all(np.isfinite(self.roots), axis=1))
 
     @property
@@ -127,30 +127,30 @@ class Rest:
 
     @property
     def neutral(self) -> Array:
-        """Whether small motions neither grow nor decay, within rounding (m,)."""
+        """True (m,) where small motions neither grow nor decay, within rounding."""
         leading, largest = self.leading, np.max(np.abs(self.roots), axis=1)
         with np.errstate(invalid="ignore"):
             return np.asarray(np.abs(leading.real) <= NEUTRAL * np.abs(leading) + 1e-15 * largest)
 
     @property
     def stable(self) -> Array:
-        """Whether small motions decay (m,); not where they are neutral."""
+        """True (m,) where small motions decay; False where they are neutral."""
         with np.errstate(invalid="ignore"):
             return np.asarray((self.leading.real < 0) & ~self.neutral)
 
     def part(self, which: Array) -> Rest:
-        """Some of the rigs."""
+        """Steady sliding of some of the rigs."""
         own = (getattr(self, name)[which] for name in (
             "velocity", "force", "pressure", "state", "unknowns", "scales", "matrix", "roots"))  # fmt: skip
         return Rest(self.reduction, self.point.part(which), *own)
 
     def column(self, number: Any) -> Any:
-        """A parameter as it broadcasts against (m, ...) arrays with one more axis."""
+        """Value of one parameter, shaped to broadcast against (m, ...) arrays with one more axis."""
         return number[:, None] if np.ndim(number) and len(number) != 1 else number
 
 
 def picked(array: Any, which: Array) -> Any:
-    """Entries of an array with one for each rig; single ones are for all of them."""
+    """Entries `which` of an array with one entry for each rig; a single entry is shared by all."""
     return array[which] if np.ndim(array) and len(array) > 1 else array
 
 
@@ -170,7 +170,7 @@ def _slip_gradients(reduction: Reduction) -> ArrayFunction:
 
 
 def in_columns(numbers: Any, count: int) -> Array:
-    """Numbers, or arrays (count,), as the columns of one array."""
+    """Numbers or arrays (count,) as the columns of one array."""
     if not len(numbers):
         return np.empty((count, 0))
     return np.column_stack([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in numbers])

@@ -1,4 +1,4 @@
-"""The steady sliding that constant inputs lead to, found from the Model's own equations, and the linearisation there.
+"""Solve for steady sliding under constant inputs, and linearise the motion there.
 
 A step of the load-point velocity or of the normal stress leads to another steady sliding than the rig's own: other
 stress, memory and spring length. Of a slider it is a formula, but for the normal stress perhaps; of a machine it is
@@ -34,7 +34,7 @@ ROUNDED = 1e-5  # or less than this, where rounding keeps it from falling any fu
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """Steady sliding at other inputs; functions of parameters, own σss, v_lp, p and the stress s."""
+    """Functions for steady sliding at other inputs, of parameters, own σss, v_lp, p and the normal stress s."""
 
     affine: bool
     stress: ArrayFunction
@@ -43,7 +43,7 @@ class _Balance:
 
 @question
 def _balance(reduction: Reduction) -> _Balance:
-    """The equation for the normal stress in steady sliding at v_lp and p, its slope, and the state there."""
+    """Equation for the normal stress in steady sliding at v_lp and p, its slope, and the state there (cached)."""
     model = reduction.model
     contact, zero = model.contact, sp.Integer(0)
     velocity = model.parameters["drive.velocity"]
@@ -103,7 +103,7 @@ def _linearised(
     reduction: Reduction, point: OperatingPoint, velocity: Array, force: Array, pressure: Array, state: Array,
     unknowns: Array, scales: Array,
 ) -> Rest:  # fmt: skip
-    """Steady sliding that is known, with the matrix there."""
+    """Build the `Rest` of a known state, with the matrix of the linearised motion."""
     count, n = state.shape
     with np.errstate(all="ignore"):
         matrix = slopes_at(reduction, point, (velocity, force, pressure), state, unknowns, scales)
@@ -115,7 +115,7 @@ def _linearised(
 
 
 def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressure: Array) -> Array:
-    """Normal stress in steady sliding at the inputs: in closed form, or followed there from the rig's own."""
+    """Normal stress in steady sliding at the inputs: in closed form, or by stepping there from the rig's own."""
     balance, sigma = _balance(reduction), np.broadcast_to(point.stresses, velocity.shape)
     if balance.affine:
         at_zero, slope = point.evaluate(balance.stress, velocity, pressure, np.zeros(len(sigma)))
@@ -138,7 +138,7 @@ def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressu
 
 
 def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) -> Rest:
-    """Newton's method on the rates: from velocities and memory as they are there, else step by step."""
+    """Solve for a machine's steady sliding by Newton's method, in several steps of the inputs if one fails."""
     reduction, point, count = jobs.reduction, jobs.point, len(velocity)
     own, _ = natural_scales(point, reduction)
     drive = np.broadcast_to(np.asarray(point.drive, dtype=float), (count,))
@@ -163,7 +163,7 @@ def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) ->
 
 
 def _as_fast(reduction: Reduction, point: OperatingPoint, faster: Array) -> list[Any]:
-    """The state in steady sliding so many times as fast, and the unknowns; places and integrals are the rig's."""
+    """State and unknowns in steady sliding `faster` times as fast; displacements and integrals stay."""
     return point.evaluate(_steady_state_of(reduction), faster)
 
 
@@ -172,7 +172,7 @@ FASTER = inner_symbol("faster", positive=True)
 
 @question
 def _steady_state_of(reduction: Reduction) -> ArrayFunction:
-    """That of a rig's parameters and normal stresses, and of how many times as fast it slides."""
+    """Function of the steady state, from parameters, normal stresses and the factor of velocity (cached)."""
     model = reduction.model
     drive = model.parameters["drive.velocity"]
 
@@ -194,7 +194,7 @@ def _steady_state_of(reduction: Reduction) -> ArrayFunction:
 def _settled(
     reduction: Reduction, point: OperatingPoint, inputs: tuple[Array, ...], guess: Array, scales: Array
 ) -> tuple[Array, Array]:
-    """State (m, n) and unknowns (m, u) at which nothing changes, near a guess of both; NaN where there is none."""
+    """Solve for a state (m, n) and unknowns (m, u) of rest, near a guess of both; NaN where there is none."""
     count, n = scales.shape
     state, unknowns = guess[:, :n].copy(), guess[:, n:].copy()
     nothing = np.full((count, n, n), np.nan)

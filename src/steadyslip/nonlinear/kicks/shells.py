@@ -1,4 +1,4 @@
-"""Close to an edge of stability: which way motion drifts, read off single turns instead of waiting for thousands.
+"""Decide outcomes close to an edge of stability from the drift of single turns, without simulating thousands.
 
 There, the distance |q| (see `neighbourhood`) changes by parts in thousands or millions a turn, and swings by more
 within it.
@@ -38,7 +38,7 @@ SLOW = 0.02  # decay per radian above which waiting is as quick
 
 
 class Shells:
-    """Shells around the steady sliding of some runs, computed for each steady sliding when first asked for.
+    """Shells around the steady sliding of some runs, computed on first use for each steady sliding.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Shells:
         self.beyond = np.full(count, OPEN)  # what comes of that
 
     def outcomes(self, which: Array, states: Array) -> Array:
-        """What shells tell of runs `which` (k,) at `states` (k, n): an outcome, or OPEN."""
+        """Outcomes of runs `which` (k,) at `states` (k, n) as far as shells decide them; else OPEN."""
         group = self.runs.group[which]
         self._ask(np.unique(group))
         useful = (self.inner[group] > 0) | (self.band[group, 0] < self.band[group, 1])
@@ -94,7 +94,7 @@ class Shells:
                 self._compute(part)
 
     def _compute(self, group: Array) -> None:
-        """Ball and band of rigs that are all alike: on a surface, or not."""
+        """Ball and band of a group of equal rigs, on a two-dimensional surface or not."""
         near, leading = self.runs.near, self.runs.rest.leading[group]
         with np.errstate(divide="ignore"):
             blurred = NOISE * self.runs.jobs.options.rtol * np.abs(leading.imag / (2 * np.pi * leading.real))
@@ -120,7 +120,7 @@ class Shells:
             self.band[group] = np.column_stack([begin, end])
 
     def _drift(self, group: Array, radii: Array) -> tuple[Array, Array]:
-        """Whether distances fall, and whether they rise, over a turn from radii (k, r)."""
+        """True where distances fall, and where they rise, over a turn from radii (k, r)."""
         rest, near = self.runs.rest, self.runs.near
         n = rest.state.shape[1]
         flat = self.flat[group[0]]
@@ -146,7 +146,7 @@ class Shells:
         return np.all(change < -least, axis=2), np.all(change > least, axis=2)
 
     def _to_ray(self, which: Array, states: Array, guess: Array) -> tuple[Array, Array]:
-        """Where runs from `states` (k, n) meet the ray after about as long as guessed (k,), and the states there.
+        """Times at which runs from `states` (k, n) meet the ray, near those guessed (k,), and the states there.
 
         NaN where they do not; distances count in the slowest two modes.
         """
@@ -175,7 +175,7 @@ class Shells:
         return radius, found
 
     def _on_ray(self, which: Array, states: Array) -> Array:
-        """|q| where runs at `states` (k, n) meet the ray after the next turn but a part."""
+        """Distance |q| at which runs from `states` (k, n) next meet the ray."""
         rest, near = self.runs.rest, self.runs.near
         q = near.coordinates(which, states)
         sense = self._sense(which)
@@ -184,13 +184,13 @@ class Shells:
         return np.where(np.isnan(found), np.inf, found)
 
     def _sense(self, which: Array) -> Array:
-        """1 where motion turns from the first mode to the second, else -1."""
+        """Sense of rotation in the plane of the first two modes: 1 from the first to the second, else −1."""
         rest, near = self.runs.rest, self.runs.near
         turned = near.inverse[which] @ rest.matrix[which] @ near.basis[which]
         return np.asarray(np.sign(turned[:, 1, 0]))
 
     def _fate(self, one: int, radius: float) -> int:
-        """What comes of motion from the end of a band, one turn's worth of it; OPEN where that differs."""
+        """Common outcome of motions from the outer edge of a band, over one turn of phases; OPEN if they differ."""
         rest, near = self.runs.rest, self.runs.near
         turn = 2 * np.pi / np.abs(rest.leading[one : one + 1].imag)
         ray = near.basis[one][:, 0]
@@ -204,7 +204,7 @@ class Shells:
 
 
 def _drifts(radii: Array, falls: Array, rises: Array) -> tuple[Array, Array, Array]:
-    """Up to where distances fall, and from where to where they rise beyond; inf where they do not. Arrays (k, r)."""
+    """Radius up to which distances fall, and the one from which they rise; inf without one. Arrays (k, r)."""
     count, each = radii.shape[1], np.arange(len(radii))
     last = np.argmin(np.column_stack([falls, np.zeros(len(radii), dtype=bool)]), axis=1) - 1
     beyond = rises & (np.arange(count) > last[:, None])

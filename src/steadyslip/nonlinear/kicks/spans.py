@@ -1,4 +1,4 @@
-"""Motions of kicked rigs under constant inputs, run side by side for a span of time at a time."""
+"""Simulate motions of kicked rigs under constant inputs side by side, one span of time after another."""
 
 from __future__ import annotations
 
@@ -48,25 +48,25 @@ NEUTRAL_TURNS = 100.0  # where small motions neither grow nor decay: what stays 
 
 
 def doubt_of(outcome: int) -> str:
-    """Why an outcome is undecided; empty where it is not."""
+    """Reason for an undecided outcome; empty for others."""
     return DOUBTS[outcome - UNDECIDED] if UNDECIDED <= outcome < len(OUTCOMES) else ""
 
 
 @dataclass
 class StepBudget:
-    """Steps of integration that a search may still take, all its motions together."""
+    """Integration steps that a search may still take, over all its motions."""
 
     steps: float = np.inf
 
     @classmethod
     def of(cls, steps: float, variables: int) -> StepBudget:
-        """So many steps of a slider; fewer where each takes longer, as the elimination of more variables does."""
+        """Budget of `steps` for a slider, fewer in proportion to the number of variables."""
         return cls(steps * min(1.0, (USUAL / variables) ** 2))
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Motions under constant inputs, about to be run.
+    """Motions under constant inputs, ready to be simulated.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Judged:
     budget: StepBudget = field(default_factory=StepBudget)
 
     def repeated(self, one: int, count: int) -> Judged:
-        """So many motions of one rig, to be started anywhere."""
+        """Copies of one rig, to be started from any states."""
         which = np.full(count, one)
         rest, near = self.rest.part(which), self.near.part(which)
         nothing = np.zeros(count)
@@ -140,7 +140,7 @@ ARRAYS = ("status", "time", "state", "unknowns", "steps", "tally")
 
 @dataclass
 class Spans:
-    """What a span of some runs ended with: status, time reached (s), state (k, n), steps and tally.
+    """State of some runs at the end of a span: status, time reached (s), state (k, n), steps and tally.
 
     `unknowns` (k, u) are those of the balances.
     """
@@ -155,17 +155,17 @@ class Spans:
 
     @classmethod
     def empty(cls, count: int, n: int, unknowns: int) -> Spans:
-        """Of runs that are still to be run."""
+        """Placeholder for runs not simulated yet."""
         return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan),
                    np.full((count, unknowns), np.nan), np.zeros(count),
                    np.full((count, len(TALLY)), np.nan))  # fmt: skip
 
     def part(self, which: Array) -> Spans:
-        """Those of some of the runs."""
+        """Entries of some of the runs."""
         return replace(self, **{name: getattr(self, name)[which] for name in ARRAYS})
 
     def put(self, which: Array, found: Spans) -> None:
-        """Fill in those of some of the runs."""
+        """Store entries for some of the runs."""
         for name in ARRAYS:
             getattr(self, name)[which] = getattr(found, name)
         self.whole = self.whole and found.whole
@@ -175,7 +175,7 @@ def advanced_runs(
     runs: Judged, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
     options: Options | None = None, unknowns: Array | None = None,
 ) -> Spans:  # fmt: skip
-    """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning.
+    """Simulate runs `which` (k,) for `span` (k,) s from states `start` (k, n), or from their beginning.
 
     `unknowns` (k, u) are those of the balances at `start`, NaN where they are not known.
     """
@@ -210,7 +210,7 @@ def advanced_runs(
 def continuous_at(
     reduction: Reduction, point: OperatingPoint, state: Array, inputs: tuple[Array, ...], unknowns: Array | None = None
 ) -> tuple[Array, Array]:
-    """What a kernel starts from: the continuous variables, and near what it finds the others, as in `Jobs.near`.
+    """Continuous variables with which a kernel starts, and guesses of its unknowns, as in `Jobs.near`.
 
     `inputs` are the velocity of the load point, the force on a body and the added normal stress, each (m,);
     `unknowns` (m, u) those of the balances at the states, NaN where they are not known.

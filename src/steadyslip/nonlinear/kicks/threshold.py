@@ -1,4 +1,4 @@
-"""The smallest kick after which sliding does not become steady again."""
+"""Find the smallest kick after which sliding does not become steady again."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ BEYOND = 1.01  # edges over this: where it is looked what happens beyond
 
 @dataclass(frozen=True)
 class Threshold(Displayed):
-    """How large a kick steady sliding survives.
+    """Largest kick of one kind that steady sliding survives, with its bracket and the outcome beyond.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Threshold(Displayed):
 
     @property
     def area(self) -> float | None:
-        """Over which the amount is a stress, for whoever speaks of the whole of it."""
+        """Contact area by which a stress amount is multiplied for display as a force; None without one."""
         return self.rig.area if isinstance(self.rig, Slider) else None
 
     def __str__(self) -> str:
@@ -134,7 +134,7 @@ class Threshold(Displayed):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units."""
+        """The result as JSON-ready dict, SI units."""
 
         def plain(x: float) -> float | None:
             return float(x) if np.isfinite(x) else None
@@ -177,7 +177,7 @@ def threshold(
     branch: int = 0,
     progress: Callable[[int, float, float], None] | None = None,
 ) -> Threshold:
-    """The smallest kick of a given kind that does not return to steady sliding.
+    """Find the smallest kick of a given kind that does not return to steady sliding.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def threshold(
 
 
 def require_steady(rig: Slider | Machine) -> None:
-    """NoSteadySliding, saying why, where there is none."""
+    """Raise NoSteadySliding, with the reason, if the rig has no steady sliding."""
     if isinstance(rig, Machine):
         steady_state(rig)
     else:
@@ -254,7 +254,7 @@ def require_steady(rig: Slider | Machine) -> None:
 
 
 class _Search:
-    """The bracket of one threshold: a scan of rising sizes, then rounds inside it.
+    """Search for the bracket of one threshold: a scan of rising sizes, then rounds inside it.
 
     Attributes
     ----------
@@ -293,11 +293,11 @@ class _Search:
 
     @property
     def at_edge(self) -> bool:
-        """Whether the steady sliding that kicks lead to loses its stability before any other limit."""
+        """True if the steady sliding after kicks loses its stability before any other limit is met."""
         return bool(np.isfinite(self.high) and self.high == self.edge)
 
     def _scan(self, sizes: Array) -> None:
-        """Rising sizes up to the first that fails; a block beyond the first doubt is the last."""
+        """Simulate rising sizes up to the first failure, at most one block beyond the first undecided one."""
         for start in range(0, len(sizes), BLOCK):
             block, low = sizes[start : start + BLOCK], self.low
             doubt = self.outcome >= UNDECIDED
@@ -308,7 +308,7 @@ class _Search:
                 break
 
     def _narrow(self, sizes: Array, effort: float) -> None:
-        """Try rising sizes inside the bracket."""
+        """Simulate rising sizes inside the bracket and narrow it."""
         if not len(sizes):
             return
         found = self._outcomes(sizes, effort)
@@ -327,6 +327,7 @@ class _Search:
             raise KeyboardInterrupt
 
     def _outcomes(self, sizes: Array, effort: float) -> Array:
+        """Simulate kicks of some sizes; outcomes as indices into `OUTCOMES`."""
         def advanced(count: int) -> None:
             self.tried += count
             if self.progress is not None:
@@ -335,7 +336,7 @@ class _Search:
         return self.kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, None, advanced, effort)
 
     def result(self, rig: Slider | Machine, precision: float) -> Threshold:
-        """What is known."""
+        """Build the `Threshold` from the present bracket."""
         kicked, low, high = self.kicked, self.low, self.high
         decided = bool(high - low <= precision * high) if np.isfinite(high) else self.outcome == RETURNS
         size = high if self.at_edge else 0.5 * (low + high)
@@ -354,7 +355,7 @@ class _Search:
 
 
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
-    """Smallest size beyond which rigs `which` (n,) have no stable steady sliding to return to; inf if none is found.
+    """Smallest size beyond which no stable steady sliding exists after the kick, (n,); inf if none is found.
 
     Looked for between rising `sizes`, then bisected to rounding.
     """
@@ -381,7 +382,7 @@ def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
 
 @dataclass(frozen=True)
 class KickMargin(Displayed):
-    """How far an expected disturbance is from the limit.
+    """Distance of an expected disturbance from the smallest kick that is not survived.
 
     Attributes
     ----------
@@ -405,7 +406,7 @@ class KickMargin(Displayed):
 
     @property
     def survives(self) -> bool | None:
-        """Whether the step returns to steady sliding; None where that is undecided."""
+        """True if the step returns to steady sliding; None if undecided."""
         return None if self.outcome == "undecided" else self.outcome == "returns"
 
     def __str__(self) -> str:
@@ -414,7 +415,7 @@ class KickMargin(Displayed):
         return f"{words[self.survives]}{ratio}\n{self.threshold}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units."""
+        """The result as JSON-ready dict, SI units."""
         ratio = float(self.ratio) if np.isfinite(self.ratio) else None
         return {"survives": self.survives, "outcome": self.outcome, "doubt": self.doubt, "ratio": ratio,
                 "threshold": self.threshold.to_dict()}  # fmt: skip
@@ -422,7 +423,7 @@ class KickMargin(Displayed):
 
 @checked(precision=finite(0, 0.1), branch=BRANCH)
 def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
-    """Distance of an expected disturbance from the smallest that is not survived, and what comes of itself.
+    """Compare an expected disturbance with the smallest kick that is not survived, and simulate it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The cubic coefficient c1 of an oscillatory edge, and by how much rounding may have changed it.
+"""Compute the cubic coefficient c1 of an oscillatory edge, with a bound of its rounding error.
 
 First Lyapunov coefficient by projection on the critical eigenvectors (Kuznetsov, Elements of Applied Bifurcation
 Theory, eq. 5.62), for the Model as a differential-algebraic system M Y' = F(Y).
@@ -76,13 +76,13 @@ def coefficients(point: OperatingPoint, omega: Array) -> Cubic:
 
 @question
 def _at_contacts(model: Model) -> ArrayFunction:
-    """Steady slip rates and areas of the contacts."""
+    """Steady slip rates (m/s) and areas (m²) of the contacts (cached)."""
     contacts = model.contacts
     return model.function([*(model.steady[one.velocity] for one in contacts), *(one.area for one in contacts)])
 
 
 def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> Cubic:
-    """The same from Taylor terms, steady slip rates and areas of the contacts (m, contacts)."""
+    """First Lyapunov coefficients from Taylor terms, steady slip rates and areas of the contacts (m, contacts)."""
     n = len(expansion.mass)
     gradient, unsure = (np.broadcast_to(e, (len(omega), n, n)) for e in (expansion.gradient, expansion.gradient_error))
     mass = np.diag(expansion.mass)
@@ -133,7 +133,7 @@ def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> 
 
 
 class _Scaled:
-    """Matrices (m, n, n) in scales of rows and columns in which their entries are alike, and errors of what they give.
+    """Matrices (m, n, n) scaled by rows and columns to entries of similar size, with componentwise error bounds.
 
     Errors are componentwise: a solution is as far off as the errors of entries, and of the rounding of n products,
     move it to first order.
@@ -147,7 +147,7 @@ class _Scaled:
         self.error = rows[:, :, None] * error * columns[:, None, :] + n * EPS * np.abs(self.matrix)
 
     def solve(self, right: Array, right_error: Array) -> tuple[Array, Array]:
-        """The solution for a right side (m, n), and its error; infinite where rounding has made a matrix singular."""
+        """Solve for a right side (m, n); the error is infinite where rounding makes a matrix singular."""
         singular = np.linalg.cond(self.matrix) > 1 / EPS
         matrix = np.where(singular[:, None, None], np.eye(self.matrix.shape[-1]), self.matrix)
         inverse = np.linalg.inv(matrix)
@@ -172,11 +172,12 @@ class _Scaled:
 
 
 def _times(matrix: Array, vector: Array) -> Array:
+    """Product of matrices (m, n, n) and vectors (m, n)."""
     return np.asarray((matrix @ vector[:, :, None])[:, :, 0])
 
 
 def even_scales(size: Array) -> tuple[Array, Array]:
-    """Factors for rows and columns (m, n) that make the entries of matrices alike, whatever units these are in.
+    """Factors for rows and columns (m, n) that bring the entries of matrices to similar size, in any units.
 
     First those with which the logarithms of the entries that are not zero are least in the mean square (Curtis and
     Reid 1972): they turn with the units. Then all rows and columns are brought towards the same length, where small
@@ -202,4 +203,5 @@ def even_scales(size: Array) -> tuple[Array, Array]:
 
 
 def _inverse(value: Array) -> Array:
+    """Reciprocal; 1 where the value is not positive."""
     return 1 / np.where(value > 0, value, 1.0)

@@ -1,4 +1,4 @@
-"""The cubic coefficient with many digits, where ordinary ones cannot tell its sign.
+"""Compute the cubic coefficient to fifty digits, where double precision cannot tell its sign.
 
 Steady sliding, the place of the edge and the critical eigenvector are found together: what ordinary numbers know of
 them is made better by Newton's method, whose residuals have fifty digits and whose matrix has ordinary ones. The two
@@ -35,13 +35,13 @@ Numbers = list[Any]
 
 
 class _Failed(ArithmeticError):
-    """Newton's method does not settle: the edge is not a simple one."""
+    """Newton's method does not converge: the edge is not a simple one."""
 
 
 def coefficient(
     point: OperatingPoint, along: str, omega: float, contact: int, vector: Array, error: float
 ) -> tuple[float, float] | None:
-    """c1 (1/s) of a rig on an oscillatory edge, and by how much one rounding of every number of the rig changes it.
+    """c1 (1/s) of one rig on an oscillatory edge, and its change when each number of the rig is rounded once (1/s).
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def coefficient(
 
 @question
 def _steady_misfits(model: Model) -> list[sp.Expr]:
-    """What vanishes in steady sliding, of normal stresses and of what links carry."""
+    """Residuals of steady sliding: of normal stresses and of forces carried by links (cached)."""
     misfits = [contact.steady_stress - contact.sigma_ss for contact in model.contacts]
     carried = model.carried
     if carried is not None:
@@ -99,7 +99,7 @@ def _steady_misfits(model: Model) -> list[sp.Expr]:
 
 @question
 def _linear(model: Model) -> tuple[sp.Expr, ...]:
-    """First derivatives, misfits of steady sliding and slip rates."""
+    """First derivatives of the model, residuals of steady sliding, and slip rates (cached)."""
     found = system(model)
     speeds = [model.steady[contact.velocity] for contact in model.contacts]
     return (*found.expressions[: len(found.entries[0])], *_steady_misfits(model), *speeds)
@@ -107,14 +107,14 @@ def _linear(model: Model) -> tuple[sp.Expr, ...]:
 
 @question
 def _functions(model: Model) -> tuple[ArrayFunction, PreciseFunction, PreciseFunction]:
-    """Of these in ordinary numbers and in many digits; of higher derivatives."""
+    """Compiled functions: `_linear` in double precision and in fifty digits, higher derivatives in fifty (cached)."""
     higher = system(model).expressions[len(system(model).entries[0]) :]
     linear = _linear(model)
     return model.function(linear), PreciseFunction(model.arguments, linear), PreciseFunction(model.arguments, higher)
 
 
 class _Rig:
-    """One rig near its edge: `arguments` are its parameters, unknowns those of `_misfits`."""
+    """One rig near its edge, solved in fifty digits for steady sliding, edge and eigenvector together."""
 
     def __init__(self, point: OperatingPoint, along: str, omega: float, contact: int, vector: Array) -> None:
         self.model, self.contact = point.model, contact
@@ -162,7 +162,7 @@ class _Rig:
         return total / 2
 
     def _parted(self, arguments: Numbers, y: Numbers) -> tuple[Numbers, Any, Numbers]:
-        """All arguments of functions, the frequency and the eigenvector."""
+        """Split the unknowns `y` into arguments of the functions, the frequency (rad/s) and the eigenvector."""
         many = len(y) - 2 - 2 * self.n
         values = [*arguments, *y[:many]]
         values[self.along] = y[many]
@@ -170,7 +170,7 @@ class _Rig:
         return values, y[many + 1], [mpmath.mpc(a, b) for a, b in zip(parts[: self.n], parts[self.n :], strict=True)]
 
     def _misfits(self, arguments: Numbers, y: Numbers) -> Numbers:
-        """Steady sliding, (G − iωM) q = 0, and the amplitude, as many real numbers as unknowns."""
+        """Residuals of steady sliding, of (G − iωM) q = 0 and of the amplitude, as many as unknowns."""
         values, omega, q = self._parted(arguments, y)
         found = self.linear(*values)
         rows = _times(self._entries(found), q, self.n)
@@ -182,7 +182,7 @@ class _Rig:
         return [*found[first : len(found) - contacts], *map(mpmath.re, rows), *map(mpmath.im, rows)]
 
     def _slopes(self, y: Array) -> Array:
-        """Derivatives of `_misfits` in ordinary numbers, by differences where numbers of the rig are unknowns."""
+        """Jacobian of `_misfits` in double precision; differences for unknowns that are numbers of the rig."""
         n, many = self.n, len(y) - 2 - 2 * self.n
         dynamic, first = self.system.dynamic, len(self.system.entries[0])
         base = np.array([*map(float, self.arguments), *y[:many]])
@@ -212,17 +212,18 @@ class _Rig:
         return np.concatenate([above, below.real, below.imag])
 
     def _entries(self, found: Numbers) -> list[tuple[int, int, Any]]:
+        """Entries (row, column, value) of the gradient."""
         return [(i, j, e) for (i, j), e in zip(self.system.entries[0], found, strict=False)]
 
     def _higher(self, found: Numbers) -> tuple[Callable[..., Numbers], Callable[..., Numbers]]:
-        """Second and third derivatives applied to directions."""
+        """Functions that apply the second and third derivatives to directions."""
         second = list(zip(self.system.entries[1], found, strict=False))
         third = list(zip(self.system.entries[2], found[len(second) :], strict=True))
         return lambda *u: _applied(second, u, self.n), lambda *u: _applied(third, u, self.n)
 
 
 def _applied(entries: Sequence[tuple[Index, Any]], directions: Sequence[Numbers], n: int) -> Numbers:
-    """Derivatives applied to directions, symmetric."""
+    """Apply a symmetric derivative tensor, given by its entries, to directions."""
     out = [mpmath.mpf(0)] * n
     for (row, *index), value in entries:
         for arranged in arrangements(*index):
@@ -234,6 +235,7 @@ def _applied(entries: Sequence[tuple[Index, Any]], directions: Sequence[Numbers]
 
 
 def _times(entries: Sequence[tuple[int, int, Any]], x: Numbers, n: int) -> Numbers:
+    """Product of a sparse matrix, given by entries, and a vector of n numbers."""
     out = [mpmath.mpf(0)] * n
     for i, j, e in entries:
         out[i] = out[i] + e * x[j]
@@ -241,6 +243,7 @@ def _times(entries: Sequence[tuple[int, int, Any]], x: Numbers, n: int) -> Numbe
 
 
 def _dense(entries: Sequence[tuple[int, int, Any]], n: int) -> Array:
+    """Dense complex matrix (n, n) from entries."""
     found = np.zeros((n, n), dtype=complex)
     for i, j, e in entries:
         found[i, j] += complex(e)
@@ -248,7 +251,7 @@ def _dense(entries: Sequence[tuple[int, int, Any]], n: int) -> Array:
 
 
 class _Inverse:
-    """The inverse of a matrix in ordinary numbers, with which equations are solved to many digits."""
+    """Inverse of a matrix in double precision, used to solve equations to fifty digits by iterative refinement."""
 
     def __init__(self, matrix: Array) -> None:
         rows, columns = even_scales(np.abs(matrix)[None])
@@ -256,7 +259,7 @@ class _Inverse:
         self.inverse = np.linalg.inv(self.rows[:, None] * matrix * self.columns)
 
     def refined(self, misfits: Callable[[Numbers], Numbers], start: Numbers) -> Numbers:
-        """Where the misfits vanish, near the start, each step taken with this inverse.
+        """Find a zero of the residuals near `start`, by steps with this inverse.
 
         Raises
         ------
@@ -283,7 +286,7 @@ class _Inverse:
         raise _Failed
 
     def solved(self, matrix: Sequence[tuple[int, int, Any]], right: Numbers) -> Numbers:
-        """The solution of linear equations whose matrix, by entries, is that of this inverse but for rounding."""
+        """Solve linear equations whose matrix, by entries, agrees with this inverse's up to rounding."""
         n = len(right)
 
         def missed(x: Numbers) -> Numbers:

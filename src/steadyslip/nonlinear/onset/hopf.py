@@ -1,4 +1,4 @@
-"""The kind of onset: what small oscillations near an edge of stability do.
+"""Kind of onset (supercritical or subcritical) at an oscillatory edge of stability, from the cubic coefficient c1.
 
 At an oscillatory edge the amplitude ρ of ln(v/v0), of a machine at the contact where it is largest, obeys to lowest
 order
@@ -45,7 +45,7 @@ UNDECIDED = "not decided"
 
 @dataclass(frozen=True)
 class Onset(Displayed):
-    """What happens at an oscillatory edge of stability.
+    """Kind of onset at an oscillatory edge of stability, with the numbers that decide it.
 
     Attributes
     ----------
@@ -96,23 +96,23 @@ class Onset(Displayed):
 
     @property
     def has_sign(self) -> bool:
-        """Whether the cubic coefficient is known to be of one sign."""
+        """True if the sign of the cubic coefficient is known."""
         return self.kind in ("supercritical", "subcritical")
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """Whether the cubic coefficient is larger than its error, or vanishes in exact arithmetic."""
+        """Check that the cubic coefficient exceeds its error, or vanishes in exact arithmetic."""
         share = 0.0 if self.kind == "degenerate" else self.coefficient_error / (abs(self.coefficient) or np.nan)
         return (check("kind of onset", "error of the cubic coefficient", share, 1.0),)
 
     @property
     def is_weak(self) -> bool:
-        """Whether motion in ordinary numbers does not see the cubic coefficient, or nobody knows its sign."""
+        """True if the cubic coefficient is too small to affect motion in double precision, or its sign is unknown."""
         return not (self.has_sign and self.share > WEAK)
 
     @property
     def title(self) -> str:
-        """The kind with its noun."""
+        """Noun phrase for the kind, such as "supercritical onset"."""
         return "onset of a kind not decided" if self.kind == UNDECIDED else f"{self.kind} onset"
 
     @property
@@ -133,7 +133,7 @@ class Onset(Displayed):
 
     @property
     def is_near(self) -> bool:
-        """Whether the rig itself is so near the edge that the small cycle predicted for it is small.
+        """True if the rig is so near the edge that the predicted amplitude of ln v of its small cycle is below 1.
 
         Friction knows velocity by ln v, so that small is an amplitude of ln v below one, a factor below e in velocity.
         """
@@ -146,7 +146,7 @@ class Onset(Displayed):
 
     @property
     def meaning(self) -> str:
-        """What the kind of onset means, in a sentence."""
+        """One sentence that explains the kind of onset."""
         return MEANINGS[self.kind]
 
     def __str__(self) -> str:
@@ -175,7 +175,7 @@ MEANINGS = {
 
 @checked(branch=BRANCH, along=NAME)
 def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) -> Onset:
-    """Kind of onset at the oscillatory edge of stability nearest to the rig.
+    """Find the kind of onset at the oscillatory edge of stability nearest to the rig.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
 
 
 def parameter_along(rig: Slider | Machine, along: str) -> str:
-    """Full name of a parameter; for the stiffness, the one that the rig has: a spring's, a press's, or a gain kp."""
+    """Full name of a parameter; "stiffness" becomes the one the rig has: a spring's, a press's, or a gain kp."""
     name = rig.resolve(along)
     if isinstance(rig, Machine):
         return name
@@ -223,7 +223,7 @@ def parameter_along(rig: Slider | Machine, along: str) -> str:
 
 
 def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
-    """Kind of onset at an oscillatory edge found before."""
+    """Kind of onset at a given oscillatory edge."""
     name = edge.parameter
     point = _flat(rig, name, [edge.value], branch)
     found, kind = onsets(point, np.array([edge.angular_frequency]), name)
@@ -248,6 +248,7 @@ def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
 
 
 def _flat(rig: Slider | Machine, name: str, at: Any, branch: int) -> OperatingPoint:
+    """Operating points with the parameter `name` at the values `at` (m,), SI units."""
     present = (name,) if rig.parameters()[name].role.structural else ()
     return operating_point(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
 

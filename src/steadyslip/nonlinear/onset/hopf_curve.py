@@ -1,4 +1,4 @@
-"""The edge of stability in the plane of two parameters, by continuation of the Hopf condition.
+"""Follow the oscillatory edge of stability in the plane of two parameters, by continuation of the Hopf condition.
 
 Unknowns are the two parameters and the frequency; equations are the real and the imaginary part of the
 characteristic polynomial at s = iβ.
@@ -37,7 +37,7 @@ SMALLEST_FREQUENCY = 1e-4  # of the one at the start; below, the edge has become
 
 @dataclass(frozen=True)
 class SpecialPoint(Displayed):
-    """A place on a curve where something changes.
+    """A point of the curve at which the kind of onset changes.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def hopf_curve(
 
 
 class _Plane:
-    """Two parameters and a frequency as coordinates of order one."""
+    """Conversion between two parameters with a frequency and coordinates of order one; the Hopf equations in these."""
 
     def __init__(
         self, rig: Slider | Machine, names: tuple[str, str], between: Mapping[str, Sequence[Any]], branch: int
@@ -209,6 +209,7 @@ class _Plane:
         self.limits = limits
 
     def coordinates(self, first: float, second: float, omega: float) -> Array:
+        """Coordinates (3,) of two parameter values (SI units) and an angular frequency (rad/s)."""
         parts = [
             np.log(value / scale) if logarithmic else value / scale
             for value, scale, logarithmic in zip((first, second), self.scales, self.logarithmic, strict=True)
@@ -224,6 +225,7 @@ class _Plane:
         return first, second, self.reference * np.exp(u[..., 2])
 
     def values(self, u: Array) -> OperatingPoint:
+        """Operating points at coordinates (m, 3); Failure outside the domain."""
         first, second, _ = self.parameters(u)
         for column, role in zip((first, second), self.roles, strict=True):
             if not np.all(role.domain.contains(column)):
@@ -235,7 +237,7 @@ class _Plane:
         return found
 
     def _polynomials(self, u: Array) -> tuple[Array, Array]:
-        """P(iβ) and the sum of the sizes of its terms."""
+        """Characteristic polynomial P(iβ) and the sum of the absolute values of its terms."""
         values = self.values(u)
         if not np.all(in_range(values)):
             raise Failure("numbers leave the range of floating point")
@@ -246,6 +248,7 @@ class _Plane:
         return np.sum(c * powers, axis=-1), np.sum(np.abs(c * powers), axis=-1)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
+        """Scaled residual (2,), real and imaginary part of P(iβ), and its Jacobian (2, 3) by central differences."""
         step = 1e-5
         shifts = step * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
         found, size = self._polynomials(u + shifts)
@@ -254,7 +257,7 @@ class _Plane:
         return np.array([found[0].real, found[0].imag]), np.array([slope.real, slope.imag])
 
     def outside(self, u: Array) -> str:
-        """Why a point is beyond the end, or nothing."""
+        """Reason for which the curve ends at this point; empty if it goes on."""
         first, second, omega = self.parameters(u)
         for name, value, (low, high) in zip(self.names, (first, second), self.limits, strict=True):
             if not low <= value <= high:
@@ -265,7 +268,7 @@ class _Plane:
 
 
 def _followed(curve: Track, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
-    """Points one way, and why they end; the last lies on the limit of a range to within rounding."""
+    """Follow the curve one way: its points, and the reason for its end; the last lies on the limit of a range."""
     found: list[Point] = []
     here = start
     try:
@@ -286,7 +289,7 @@ def _followed(curve: Track, start: Point, plane: _Plane, spacing: float) -> tupl
 
 
 def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
-    """The point where the curve leaves the range of a parameter."""
+    """Locate the point at which the curve leaves the range of a parameter; empty if that fails."""
     values = [plane.parameters(p.u) for p in (inside, outside)]
     for i, (low, high) in enumerate(plane.limits):
         a, b = float(values[0][i]), float(values[1][i])
@@ -304,6 +307,7 @@ def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) ->
 def _described(
     rig: Slider | Machine, plane: _Plane, curve: Track, points: list[Point], ends: tuple[str, str]
 ) -> HopfCurve:
+    """Build the result: kinds of onset along the points, and where they change."""
     u = np.array([point.u for point in points])
     values = plane.values(u)
     first, second, omega = plane.parameters(u)

@@ -1,4 +1,4 @@
-"""Cycles along a parameter, special ones among them, and where their branch ends."""
+"""Result of `steadyslip.cycles`: the branch of cycles, its bifurcations, stable ranges and ends."""
 
 from __future__ import annotations
 
@@ -101,17 +101,17 @@ class CycleBranch(Displayed):
         return np.array([getattr(cycle, own[name][0] if name in own else name) for cycle in self.cycles])
 
     def _of_contacts(self) -> dict[str, tuple[str, str]]:
-        """Quantities at the contacts of a machine: contact and attribute, by name."""
+        """Contact and attribute of each quantity at the contacts of a machine, by public name."""
         contacts = self.rig.contacts if isinstance(self.rig, Machine) else ()
         return {f"{one}.{item.name}": (one, item.name) for one in contacts for item in fields(CycleRange)}
 
     def _units(self) -> dict[str, str]:
-        """Units of the quantities that are numbers."""
+        """SI unit of each numeric quantity, by name."""
         units = {"value": self.unit} | {name: unit for name, (_, unit) in quantities(self.rig).items()}
         return units | {name: RANGE_UNITS[what] for name, (_, what) in self._of_contacts().items()}
 
     def _area(self, name: str) -> float | None:
-        """Area for which people get a quantity as a total."""
+        """Area (m²) by which a quantity is multiplied for display as a total; None if it is not."""
         if name == "value" or isinstance(self.rig, Slider):
             return self.rig.area_of(self.along)
         return None
@@ -145,13 +145,13 @@ class CycleBranch(Displayed):
         return CyclesAt([*found, *also], [*multiples, *(0 for _ in also)], missed, seen, beside, window)
 
     def _between(self, low: Cycle, high: Cycle) -> str:
-        """Where there is a cycle between two neighbours, in words."""
+        """Describe two neighbours between which a cycle lies, for a message."""
         where = " and ".join(format_quantity(one.value, self.unit, 6, self._area("value")) for one in (low, high))
         periods = " and ".join(format_quantity(one.period, "s") for one in (low, high))
         return f"between {where}, of a period between {periods},"
 
     def _continuous(self) -> list[list[Cycle]]:
-        """Cycles from gap to gap, folds among them."""
+        """Cycles, folds included, of each continuous part of the branch."""
         starts = (0, *self.gaps, len(self.cycles))
         folds = {point.index: point.cycle for point in self.special if point.kind == "fold"}
         found = []
@@ -175,7 +175,7 @@ class CycleBranch(Displayed):
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """How well the kind of onset is known, the cycles close, and their multipliers are known."""
+        """Checks of the kind of onset, of the closing of the cycles, and of their multipliers."""
         return (*self.onset.checks, *checks_of(self.cycles, self.repeated))
 
     def to_xarray(self) -> Any:
@@ -204,7 +204,7 @@ class CycleBranch(Displayed):
         write_columns(path, columns | {"stable": self["stable"].astype(float)}, "%.12g")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``steadyslip cycles --json`` prints it."""
+        """The result as JSON-ready dict, SI units, as ``steadyslip cycles --json`` prints it."""
 
         area, names = self._area("value"), quantities(self.rig)
         units = {"value": self.unit} | {name: unit for name, (_, unit) in names.items()}
@@ -248,11 +248,12 @@ class CycleBranch(Displayed):
 
     @property
     def _drop(self) -> str:
+        """Label of the stress drop (or force drop of a machine)."""
         return stress_name("stress drop", self.rig.area) if isinstance(self.rig, Slider) else "force drop"
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C ended the branch early."""
+        """True if Ctrl-C ended the branch early."""
         return self.end.startswith("interrupted")
 
     def __str__(self) -> str:
@@ -290,13 +291,13 @@ class CycleBranch(Displayed):
 
 
 def _plain(one: CycleRange) -> dict[str, float | None]:
-    """For JSON."""
+    """A contact's extremes as JSON-ready dict; infinite values become null."""
     found = {item.name: getattr(one, item.name) for item in fields(CycleRange)}
     return {name: value if np.isfinite(value) else None for name, value in found.items()}
 
 
 def _stable(branch: CycleBranch) -> str:
-    """Where along the branch cycles are stable, in words."""
+    """Describe the parameter ranges in which the cycles are stable."""
     if all(one.stable for one in branch.stretches):
         return "all"
     area = branch.rig.area_of(branch.along)

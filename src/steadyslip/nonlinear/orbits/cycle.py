@@ -1,4 +1,4 @@
-"""One cycle, and one at which a branch of them changes: what is known of each."""
+"""Result types for one cycle: `Cycle`, `CycleRange` per contact, `SpecialCycle` (bifurcation), `End` of a branch."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RANGE_UNITS = {"peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1
 
 
 def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
-    """What is known of a cycle, by the name that it has for a rig: the attribute and its unit; forces of a machine."""
+    """Attribute and SI unit of each quantity of a cycle, by its public name; stresses become forces for a machine."""
     if isinstance(rig, Slider):
         return {name: (name, unit) for name, unit in UNITS.items()}
     return {name.replace("stress", "force"): (name, unit.replace("Pa", "N")) for name, unit in UNITS.items()}
@@ -33,7 +33,7 @@ UNCERTAIN = 3.0  # errors of multipliers other than the one along the motion are
 
 @dataclass(frozen=True)
 class CycleRange(Displayed):
-    """What slip at a contact of a machine passes through in a cycle.
+    """Extremes of slip rate and forces at one contact of a machine over a cycle.
 
     Attributes
     ----------
@@ -118,12 +118,12 @@ class Cycle(Displayed):
 
     @property
     def multiplier_error(self) -> float:
-        """Relative error of the multipliers, estimated: by how much the one along the motion misses 1."""
+        """Estimated relative error of the multipliers: the distance from 1 of the multiplier along the motion."""
         return abs(self.trivial - 1)
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """Whether the motion closes, and whether the largest multiplier is farther from 1 in size than its error."""
+        """Two checks: the motion closes after a period; the largest multiplier is farther from 1 than its error."""
         room = abs(self.growth - 1) / (UNCERTAIN * self.growth) if self.growth else IMPRECISE
         return (
             check("the cycle", "closing by an integration of the motion alone", self.closing, OPEN),
@@ -138,7 +138,7 @@ class Cycle(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class SpecialCycle(Displayed):
-    """A cycle at which the branch changes.
+    """A cycle at a bifurcation of the branch: fold, period doubling, torus or branch point.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class SpecialCycle(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """Where a part of a branch that is continuous begins or stops.
+    """End of a continuous part of a branch.
 
     Attributes
     ----------

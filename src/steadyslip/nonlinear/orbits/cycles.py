@@ -1,4 +1,4 @@
-"""The branch of cycles that begins at an edge of stability, made of the sheets that can be followed."""
+"""Follow the branch of cycles from the edge of stability: `cycles`, the entry point of this folder."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def cycles(
 
 
 def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: int) -> CycleBranch:
-    """What comes back: sheets one after another, and the cycles of twice the period."""
+    """Join the pieces of a branch, follow the cycles of twice the period, and build the result."""
     whole, gaps, ends = sheets[0], [], [sheets[0].end]
     for sheet in sheets[1:]:
         gaps.append(len(whole.known))
@@ -133,7 +133,7 @@ def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: 
 
 
 def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
-    """Cycles with those computed again, with smaller errors per step, that did not pass their checks; and how many."""
+    """Recompute cycles whose checks fail with a smaller error per step; return all cycles and the number replaced."""
     failing = [i for i, cycle in enumerate(found) if is_open(cycle) or is_undecided(cycle)][:MOST_REPEATED]
     if not failing or tracer.interrupted:
         return found, 0
@@ -154,7 +154,7 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
 
 
 def _from_the_edge(tracer: Tracer, amplitude: float | None) -> Sheet:
-    """The sheet that begins at the edge.
+    """Follow the branch piece that begins at the edge of stability.
 
     Where small cycles drown in rounding, as next to an almost degenerate onset, it begins at larger ones.
     """
@@ -169,7 +169,7 @@ def _from_the_edge(tracer: Tracer, amplitude: float | None) -> Sheet:
 
 
 def _of_amplitude(tracer: Tracer, amplitude: float) -> Sheet:
-    """The sheet that begins with the cycle of a small amplitude."""
+    """Follow the branch piece that begins at the edge with the cycle of a given small amplitude of ln v."""
     onset = End("onset", tracer.onset.value)
     try:
         shooting, first = tracer.small(amplitude)
@@ -184,6 +184,7 @@ def _of_amplitude(tracer: Tracer, amplitude: float) -> Sheet:
 
 
 def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) -> tuple[float, float]:
+    """Lowest and highest value of the parameter (SI units) to follow the branch to; checks what the user gave."""
     role = rig.parameters()[onset.along].role
     if between is None:
         if role.domain.low == 0 and onset.value > 0:

@@ -1,4 +1,4 @@
-"""Branches of twice the period: entered at each period doubling, ended at that where the period is halved."""
+"""Follow the branches of twice the period, from each period doubling to the one where they end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIZES = (1e-3, 1e-2, 1e-4, 1e-1)  # of the first cycle's distance from the doubl
 
 
 def doubled_sheets(tracer: Tracer, flips: Sequence[Cycle]) -> list[Sheet]:
-    """Cycles of twice the period, from each of some period doublings that no sheet before has ended at."""
+    """Follow the cycles of twice the period from each doubling at which no earlier piece has ended."""
     sheets: list[Sheet] = []
     reached: set[int] = set()
     since = tracer.flow.steps
@@ -40,7 +40,7 @@ def doubled_sheets(tracer: Tracer, flips: Sequence[Cycle]) -> list[Sheet]:
 
 
 def _entered(tracer: Tracer, sheets: list[Sheet], flip: Cycle) -> Sheet:
-    """The sheet from a doubling on, as far as it can be followed or to one that is known."""
+    """Follow the piece from one doubling, as far as possible or to a known piece."""
     begins, why = End("period doubling", flip.value, flip), ""
     for size in SIZES:
         try:
@@ -58,7 +58,7 @@ def _entered(tracer: Tracer, sheets: list[Sheet], flip: Cycle) -> Sheet:
 
 
 def _nearest(flips: Sequence[Cycle], sheet: Sheet) -> int | None:
-    """Which doubling lies between the last cycle of a sheet and the next, where the period was halved."""
+    """Index of the doubling at which a piece ends, where its period is halved; None if none is near."""
     pair = [sheet.known[-1], *([] if sheet.beyond is None else [sheet.beyond])]
     seen = np.array([looks(known.cycle) - [np.log(2), 0, 0] for known in pair])
     reach = MET + float(np.ptp(seen, axis=0).max()) + 2 * max(float(np.abs(known.half).max()) for known in pair)
@@ -68,7 +68,7 @@ def _nearest(flips: Sequence[Cycle], sheet: Sheet) -> int | None:
 
 
 def _close(tracer: Tracer, sheet: Sheet, flip: Cycle) -> None:
-    """Lead a sheet up to the doubling at which it ends: its last cycle is then as near to it as its first to another.
+    """Append a cycle next to the doubling at which a piece ends, as near to it as the first cycle is to its own.
 
     The cycle there begins in the half of the period in which the one before it does.
     """
@@ -86,7 +86,7 @@ def _close(tracer: Tracer, sheet: Sheet, flip: Cycle) -> None:
 
 
 def _join(sheets: list[Sheet], sheet: Sheet) -> None:
-    """Join a sheet to the one that it has met."""
+    """Join a piece to the one that it has met."""
     meeting = sheet.beyond or sheet.known[-1]
     i = next(i for i, one in enumerate(sheets) if met([one], meeting))
     cut_back(sheets[i], meeting.cycle)

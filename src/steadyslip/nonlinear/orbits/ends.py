@@ -1,4 +1,4 @@
-"""Why a sheet of cycles ends: what a cycle shows, or the last few of them, and words for it."""
+"""Decide why a piece of a branch ends, from its last cycles, and the texts of these reasons."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ENDS = {
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Ends of sheets of the cycles of one flow that are born at an onset."""
+    """Criteria for the end of a branch piece, for one rig and onset."""
 
     flow: Flow
     onset: Onset
@@ -55,7 +55,7 @@ class Ends:
     def finished(
         self, limits: tuple[float, float], before: Known, now: Known, first: Known, twice: bool
     ) -> tuple[str, bool]:
-        """Why a sheet ends at this cycle, or nothing; and whether the cycle is still one of it."""
+        """Reason for which a piece ends at this cycle (empty if it goes on); True if the cycle still belongs to it."""
         low, high = limits
         cycle = now.cycle
         if not low < cycle.value < high:
@@ -83,7 +83,7 @@ class Ends:
         return "", True
 
     def words(self, status: str, contact: str = "") -> str:
-        """An end in words, where there are any for it; of a machine with the name of the contact."""
+        """Text of a reason, empty if there is none; names the contact of a machine."""
         if status not in ENDS:
             return ""
         machine = isinstance(self.flow.rig, Machine)
@@ -93,7 +93,7 @@ class Ends:
         return f"{head} at {contact}{colon}{reason}" if contact else head + colon + reason
 
     def slows(self, now: Known) -> bool:
-        """Whether the block no longer speeds up where the cycle starts: beyond one that has shrunk to nothing.
+        """True if slip decelerates where the cycle starts: the continuation has passed a cycle of zero size.
 
         With mass rounding in the state is most of the acceleration; what is carried round once is true.
         """
@@ -107,7 +107,7 @@ class Ends:
         return bool(faster @ rates[0] <= 0 and faster @ carried <= 0)
 
     def other_edge(self, last: list[Cycle]) -> End | None:
-        """The edge at which cycles that shrink to nothing end: that to which values of the last two lead."""
+        """Edge of stability at which shrinking cycles end, extrapolated from the last two; None if none is near."""
         if len(last) < 2:
             return None
         sizes = [cycle.amplitude**2 for cycle in last]
@@ -124,14 +124,14 @@ class Ends:
 
 
 def is_damped(rig: Slider | Machine) -> bool:
-    """Whether something holds a light block back the more, the faster it is."""
+    """True if the rig has damping that limits the velocity of a massless block."""
     if isinstance(rig, Slider):
         return bool(rig.radiation_damping)
     return any(bool(np.any(one.damping)) for one in rig.mechanism().elements)
 
 
 def winds(special: list[SpecialCycle]) -> bool:
-    """Whether the last folds close in on one value while the period grows (Shilnikov)."""
+    """True if the last folds converge to one value while the period grows (Shilnikov)."""
     folds = [point.cycle for point in special if point.kind == "fold"][-WINDINGS:]
     if len(folds) < WINDINGS:
         return False
@@ -140,7 +140,7 @@ def winds(special: list[SpecialCycle]) -> bool:
 
 
 def retraces(known: list[Cycle]) -> bool:
-    """Whether the last cycles lie between neighbours that were passed before, and are no larger or smaller than these.
+    """True if the last cycles lie between earlier neighbours, in amplitude too: the continuation has turned back.
 
     Periods and velocities of small cycles are alike, and where a branch begins upright, as at a degenerate onset, their
     values are rounding: amplitudes tell that it goes on.
@@ -152,14 +152,14 @@ def retraces(known: list[Cycle]) -> bool:
 
 
 def _sized(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
-    """Whether the amplitude of a cycle is one of those between two neighbours."""
+    """True if the amplitude of a cycle lies between those of two neighbours."""
     *ends, size = (float(np.log(min(one.amplitude, LARGE))) for one in (a, b, cycle))
     spread = MET + 0.3 * (ends[1] - ends[0]) ** 2
     return min(ends) - spread < size < max(ends) + spread
 
 
 def stands(last: list[Cycle]) -> bool:
-    """Whether the parameter stands still but for rounding while cycles hardly change."""
+    """True if the parameter changes by no more than rounding while the cycles hardly change."""
     if len(last) < STANDING:
         return False
     value = np.array([cycle.value for cycle in last])

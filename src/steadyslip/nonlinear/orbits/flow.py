@@ -1,4 +1,4 @@
-"""The motion over a given time as a smooth map of starting state and one parameter, with its derivative.
+"""Integrate the motion over given times, with its derivatives in the starting state and one parameter.
 
 Cycles are fixed points of this map. Inputs are constant: `Runs` takes them, and the rig, from prepared jobs, as they
 are; `Flow` leaves one parameter of a rig free, which is driven at its own velocity and not disturbed.
@@ -47,7 +47,7 @@ DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants
 
 
 class FlowFailure(Failure):
-    """A run that did not reach its end.
+    """An integration that stopped before its end.
 
     `status` says why, in the words of `steadyslip.motion.status`, `contact` at which contact of a machine.
     """
@@ -59,18 +59,20 @@ class FlowFailure(Failure):
 
 @question
 def _with_sensitivities(reduction: Reduction, method: str) -> Runner:
+    """Compiled equations of motion with their variational equations (cached)."""
     return Runner(with_sensitivities(reduction), Choice(method, dense=False))
 
 
 @question
 def _slip_shares(reduction: Reduction, contact: int) -> ArrayFunction:
-    """How slip at a contact follows from the state, and its rate in steady sliding over that of the load point."""
+    """Derivative of slip at a contact in each state variable, and its steady slip rate over the drive's (cached)."""
     sliding = reduction.slidings[contact]
     return reduction.model.function([*(derivative(sliding.slip, s) for s in reduction.state), sliding.ratio])
 
 
 @question
 def _shifts(reduction: Reduction) -> ArrayFunction:
+    """Change of each state variable for a unit displacement of the load point (cached)."""
     return reduction.model.function(reduction.shifts)
 
 
@@ -105,7 +107,7 @@ class FlowSetting:
 
 
 class Runs:
-    """Runs of one rig under constant inputs.
+    """Integrates one rig under constant inputs.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ class Runs:
 
     @property
     def tolerances(self) -> slice:
-        """Where settings have the absolute tolerances of the state."""
+        """Slice of the kernel settings that holds the absolute tolerances of the state."""
         return slice(Setting.ATOL, Setting.ATOL + self.size)
 
     @property
@@ -180,6 +182,7 @@ class Runs:
         return float(np.min(self.scales[shares] / np.abs(self.own.slip[shares])))
 
     def _natural_time(self) -> float:
+        """Natural time of the rig, s."""
         if self.reduction.model.is_single:
             return self.way / self.own.speed
         return float(np.ravel(shortest_time(natural_scales(self.own.point, self.reduction)[0]))[0])
@@ -187,14 +190,14 @@ class Runs:
     # -- one rig
 
     def setting(self, value: float) -> FlowSetting:
-        """The rig as it is: there is no parameter."""
+        """Kernel tables of the rig; `value` is ignored, as there is no free parameter."""
         return self.own
 
     def _set(
         self, point: OperatingPoint, inputs: Array, value: float = 0.0, unit: float = 1.0,
         rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
     ) -> FlowSetting:  # fmt: skip
-        """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
+        """Build a setting; `rates` are the derivatives of constants and inputs in the parameter, per unit."""
         constants = self.machine.constants(point)
         settings = self._settings_at(point, value)
         scales, behind = settings[0, self.tolerances], self.tolerances.stop
@@ -209,7 +212,7 @@ class Runs:
         )  # fmt: skip
 
     def _settings_at(self, point: OperatingPoint, value: float) -> Array:
-        """What kernels are told beside constants: sizes mostly, which hold in the neighbourhood of a parameter."""
+        """Kernel settings (tolerances, natural sizes), reused within `NEIGHBOURHOOD` of the parameter."""
         at, settings = self._near
         if not len(settings) or abs(value - at) > NEIGHBOURHOOD * abs(at):
             jobs = replace(self.base, point=point)
@@ -222,7 +225,7 @@ class Runs:
     def run(
         self, setting: FlowSetting, states: Array, times: Array, amplitude: float = 1.0
     ) -> tuple[Array, Array, Array]:
-        """Runs from `states` (m, n) over `times` (m,).
+        """Integrate with sensitivities from `states` (m, n) over `times` (m,), s.
 
         Returns
         -------
@@ -262,21 +265,23 @@ class Runs:
         return settings
 
     def _unit(self, count: int) -> Array:
-        """S and D where a run starts."""
+        """Initial sensitivities of `count` runs: unit matrix in the state, zero in the parameter."""
         return np.tile(np.append(np.eye(self.size).ravel(), np.zeros(self.size)), (count, 1))
 
     def _finer(self, settings: Array, amplitude: float) -> Array:
-        """Settings for small motions: absolute errors allowed shrink with their size."""
+        """Settings with absolute tolerances reduced in proportion to a small amplitude."""
         finer = settings.copy()
         finer[:, self.tolerances] *= max(min(1.0, amplitude), self.finest)
         finer[:, SETTINGS.index("watch")] = finer[:, SETTINGS.index("record")] = 0.0
         return finer
 
     def _continuous(self, setting: FlowSetting, states: Array) -> Array:
+        """Continuous variables with which the kernel starts, from states (m, n)."""
         found = setting.point.evaluate(restored_of(self.reduction), *states.T, *setting.inputs, 0.0)
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
     def _advanced(self, setting: FlowSetting, settings: Array, initial: Array, times: Array) -> Array:
+        """Integrate the system with sensitivities; final values, or FlowFailure."""
         tables = (setting.varied[0], np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
         call = Call(self.sensitive, tables, len(times), np.empty(0))
         call.run_steps(2**62)
@@ -289,7 +294,7 @@ class Runs:
         return outcome.state
 
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:
-        """Rates (m, n), their Jacobian (m, n, n) and their slopes in the parameter (m, n) at given states."""
+        """Rates (m, n), their Jacobian (m, n, n) and their derivative in the parameter (m, n) at given states."""
         count, n = len(states), self.size
         further = max(len(self.reduction.unknowns) - 1, 0)
         open_ = np.full((count, 1), np.nan)
@@ -306,7 +311,7 @@ class Runs:
         self, setting: FlowSetting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER,
         unknowns: Array | None = None,
     ) -> Outcome:  # fmt: skip
-        """One run with its events and steps, and samples at given times.
+        """Integrate once without sensitivities, with events, all steps, and samples at given times.
 
         `unknowns` (u,) are those of the balances at `state`, NaN where they are not known.
 
@@ -333,7 +338,7 @@ class Runs:
         return outcome
 
     def _failure(self, setting: FlowSetting, outcome: Outcome, row: int) -> FlowFailure:
-        """Why one of some runs, with sensitivities or without, did not reach its end."""
+        """Build the FlowFailure of one run that stopped early, with the contact concerned."""
         status = WORDS[int(outcome.status[row])]
         names = [contact.name for contact in self.reduction.model.contacts]
         end = np.hstack([outcome.point[row, : 1 + self.size], outcome.point[row, 1 + outcome.size :]])[None]
@@ -382,7 +387,7 @@ class Runs:
 
 
 class Flow(Runs):
-    """Runs of a rig with one parameter left free.
+    """Integrates a rig with one free parameter.
 
     Parameters
     ----------
@@ -411,7 +416,7 @@ class Flow(Runs):
         self.rounding = self._rounding(own)
 
     def _rounding(self, value: float) -> float:
-        """Size of the error that rounding of forces makes in a state, in natural sizes: in steady sliding at a value.
+        """Error in the state, in natural sizes, that rounding of forces makes in steady sliding.
 
         Forces are rounded as sums of far larger ones that balance; the state settles where what is left is zero.
         """
@@ -438,6 +443,7 @@ class Flow(Runs):
         return self._settings[value]
 
     def _made(self, value: float) -> FlowSetting:
+        """Build the setting for a parameter value."""
         if not self.domain.contains(value):
             raise Failure(f"{self.name} leaves its domain")
         point = self._varied(np.array([value]))
@@ -449,7 +455,7 @@ class Flow(Runs):
         return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
 
     def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
-        """How fast constants and inputs change with the parameter, per unit: central differences."""
+        """Derivatives of constants and inputs in the parameter, per unit, by central differences."""
         beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
         found = self.sensitive.constants(beside)
         if len(found) == 1:
@@ -459,14 +465,14 @@ class Flow(Runs):
         return rates[None, None], {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
 
     def _varied(self, around: Array) -> OperatingPoint:
-        """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
+        """Operating point with the free parameter changed; short cut where nothing else depends on it."""
         if isinstance(self.rig, Machine) or self.rig.axial_stiffness is None:
             named = self.base.point.named() | {self.name: around}
             return self.base.point.with_arguments(named.values(), np.shape(around))
         return operating_point(self.rig, {self.name: around}, self.present, self.branch, scan=True)
 
     def steady(self, value: float) -> Array:
-        """State in steady sliding."""
+        """State (n,) in steady sliding at a parameter value."""
         setting = self.setting(value)
         continuous, _ = initial_values(self.reduction, setting.point, {})
         where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
@@ -476,7 +482,7 @@ class Flow(Runs):
         return np.array([where[symbol] for symbol in self.reduction.state])
 
     def ahead(self, value: float, ways: float) -> Array:
-        """The state when the load point has jumped back from steady sliding by some natural sizes of slip."""
+        """State after the load point has jumped back from steady sliding by `ways` natural sizes of slip."""
         shifts = self.setting(value).point.evaluate(_shifts(self.reduction))
         found = self.steady(value)
         for i, shift in enumerate(shifts):
@@ -485,12 +491,12 @@ class Flow(Runs):
 
     @property
     def _share(self) -> float:
-        """Slip rate at the contact that is watched over the velocity of the load point."""
+        """Slip rate at the watched contact over the velocity of the load point."""
         return self.own.speed / float(self.own.inputs[0])
 
 
 def states_between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
-    """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
+    """States at some times between recorded steps, by cubic Hermite interpolation."""
     time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
     i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     h = (time[i + 1] - time[i])[:, None]
@@ -502,7 +508,7 @@ def states_between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -
 
 
 def passages(runs: Runs, setting: FlowSetting, record: Array) -> tuple[Array, Array]:
-    """Times in a recorded run at which slip, speeding up, is as fast as the load point, and its acceleration there.
+    """Times at which slip, accelerating, passes the load point's velocity in a recorded run; its acceleration there.
 
     Both by linear interpolation between steps.
     """
@@ -514,7 +520,7 @@ def passages(runs: Runs, setting: FlowSetting, record: Array) -> tuple[Array, Ar
 
 
 def _rows(inputs: Array, times: Array) -> Array:
-    """One segment of constant inputs for each run, as kernels read it."""
+    """Kernel table of one segment of constant inputs for each run."""
     rows = np.zeros((len(times), 1, 9))  # start, end, jump, values, slopes
     rows[:, 0, 1] = times
     rows[:, 0, 3:6] = inputs

@@ -1,4 +1,4 @@
-"""What is known of a cycle once its equations are solved: velocities, stresses, multipliers, and that it is one."""
+"""Compute the properties of a cycle from its solved equations: velocities, stresses, Floquet multipliers, checks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME = 1e-4  # distance, as a share of the cycle's size, within which a state ha
 
 
 def amplitude(velocity: Array) -> float:
-    """Half of ln(highest/lowest); infinite where the block stops or turns round."""
+    """Half of ln(highest/lowest) of slip rates; infinite where the block stops or turns round."""
     high, low = float(velocity.max()), float(velocity.min())
     if not low > 0:
         return np.inf
@@ -27,7 +27,7 @@ def amplitude(velocity: Array) -> float:
 
 
 def _range(velocity: Array, normal: Array, pull: Array) -> CycleRange:
-    """What is passed through at a contact."""
+    """Extremes of slip rate, normal stress and spring stress at one contact over a cycle."""
     return CycleRange(
         float(velocity.max()), float(velocity.min()), amplitude(velocity), float(pull.max() - pull.min()),
         float(normal.min()), float(normal.max()),
@@ -35,14 +35,14 @@ def _range(velocity: Array, normal: Array, pull: Array) -> CycleRange:
 
 
 def _start(flow: Runs, seen: dict[str, Array]) -> dict[str, float]:
-    """What a motion has to start with to be on the cycle."""
+    """Initial values, by variable name (SI units), with which a simulation starts on the cycle."""
     variables = [item.name for item in flow.reduction.model.variables]
     return {name: float(seen[name][0]) for name in (*variables, *(["v"] if "v" in seen else []))}
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A cycle run through once.
+    """A cycle with its properties, computed by integrating it over one period.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Measured:
 
 
 def measured(shooting: Shooting, u: Array) -> Measured:
-    """The cycle of some unknowns.
+    """Compute the cycle that a solution vector `u` of the shooting equations stands for, and its properties.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def measured(shooting: Shooting, u: Array) -> Measured:
 
 
 class _Begin:
-    """Where a cycle passes the load point's velocity most steeply, if that is much steeper than where it begins."""
+    """Search for a better starting point of a cycle: a passage of the load point's velocity that is much steeper."""
 
     def __init__(self, shooting: Shooting, orbit: Orbit) -> None:
         self.flow, self.now = shooting.flow, orbit
@@ -139,7 +139,7 @@ class _Begin:
         self.steepest = STEEPER * float(self.setting.slip @ jacobian[0] @ rates[0])
 
     def look(self, outcome: Outcome) -> None:
-        """Passages in a part of it that was run through."""
+        """Keep the steepest passage in an integrated part of the cycle, if much steeper than the present start."""
         times, slopes = passages(self.flow, self.setting, outcome.recorded)
         if len(slopes) and slopes.max() > self.steepest:
             self.steepest = float(slopes.max())

@@ -1,4 +1,4 @@
-"""Ranges of the parameter in which the cycles of a branch attract, and the answers to the questions that check it."""
+"""Stable ranges of a branch, the nearest bifurcations beside a value, and checks over all cycles."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ class Stretch:
 
 
 def _near(value: float, ends: Sequence[float]) -> bool:
-    """Whether a value cannot be told from one of the ends."""
+    """True if a value equals one of the ends within rounding."""
     return any(abs(value - end) <= NOISE * abs(end) for end in ends)
 
 
 def stretches_of(
     cycles: Sequence[Cycle], special: Sequence[SpecialCycle], gaps: Sequence[int], bounds: Sequence[tuple[End, End]]
 ) -> Iterator[Stretch]:
-    """Stretches of equal stability of a branch, in its order; `bounds` are the ends of each of its parts."""
+    """Split a branch into stretches of equal stability, in its order; `bounds` are the ends of each of its parts."""
     where = {point.index: End(point.kind, point.cycle.value, point.cycle) for point in special}
     for (start, stop), (begins, stops) in zip(pairwise((0, *gaps, len(cycles))), bounds, strict=True):
         changes = [i for i in range(start + 1, stop) if cycles[i].stable != cycles[i - 1].stable]
@@ -62,7 +62,7 @@ def stretches_of(
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A place beside a value of the parameter at which cycles of a branch, or of its doublings, change or stop.
+    """Nearest bifurcation or end of a branch (or of its doublings) beside a value of the parameter.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Neighbour:
     multiple: int
 
     def words(self, unit: str, area: float | None) -> str:
-        """What is there, of which cycles, and where."""
+        """Name and place of the neighbour, for messages."""
         name = WORDS.get(self.kind, self.kind)
         of = "" if self.multiple == 1 else f" of the cycles of {self.multiple} times the period"
         return f"the {name}{of} at {format_quantity(self.value, unit, 6, area)}"
@@ -93,7 +93,7 @@ Changing = tuple[Sequence[SpecialCycle], Sequence[Stretch]]
 
 
 def neighbours(levels: Sequence[Changing], value: float) -> tuple[Neighbour | None, Neighbour | None]:
-    """The nearest of such places below a value and above it; levels are a branch, its doublings, and theirs."""
+    """Nearest bifurcations or ends below and above a value; `levels` are the branch and its successive doublings."""
     places = list[Neighbour]()
     for i, (special, stretches) in enumerate(levels):
         places += [Neighbour(one.kind, one.cycle.value, 2**i) for one in special]
@@ -105,7 +105,7 @@ def neighbours(levels: Sequence[Changing], value: float) -> tuple[Neighbour | No
 
 
 def checks_of(cycles: Sequence[Cycle], repeated: int) -> tuple[Check, ...]:
-    """The checks of the cycles of a branch, all together; how many fail, where some do."""
+    """Checks over all cycles of a branch, with the number that fail."""
     kinds = (
         ("", 0, is_open, cycles),
         ("stability of ", 1, is_undecided, [one for one in cycles if not _is_small(one)]),
@@ -125,14 +125,15 @@ def checks_of(cycles: Sequence[Cycle], repeated: int) -> tuple[Check, ...]:
 
 
 def is_open(cycle: Cycle) -> bool:
-    """Whether a motion that begins on a cycle does not come back to its start."""
+    """True if the motion that begins on a cycle does not return to its start."""
     return not cycle.checks[0].passed
 
 
 def is_undecided(cycle: Cycle) -> bool:
-    """Whether multipliers do not tell if a cycle attracts, and it is too large for the kind of onset to tell."""
+    """True if errors of the multipliers leave stability open and the cycle is too large to use the kind of onset."""
     return not (cycle.checks[1].passed or _is_small(cycle))
 
 
 def _is_small(cycle: Cycle) -> bool:
+    """True if the cycle is so small that the kind of onset decides its stability."""
     return cycle.amplitude <= SMALL

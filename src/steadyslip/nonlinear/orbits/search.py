@@ -1,4 +1,4 @@
-"""Sheets of cycles that cannot be reached from the edge: looked for by simulation, and joined where they meet."""
+"""Find pieces of the branch that cannot be reached from the edge, by simulation, and join pieces that meet."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PATIENCE = 12  # stretches of motion within which it has to come to a cycle
 
 
 def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
-    """Add sheets found by simulation, as long as the last one does not cross the unstable range."""
+    """Add pieces found by simulation, as long as the last one does not cross the unstable range."""
     low, high = tracer.limits
     onset = tracer.onset
     limit = low if onset.stable == "above" else high
@@ -46,7 +46,7 @@ def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
 
 
 def _crossed(sheet: Sheet, tracer: Tracer) -> bool:
-    """Whether a sheet ends for good: for a reason in the matter, other than leaving the range on the stable side."""
+    """True if a piece ends for a physical reason other than leaving the range on the stable side."""
     if not sheet.whole or not sheet.known:
         return False
     if not sheet.end.startswith("end of the range"):
@@ -55,7 +55,7 @@ def _crossed(sheet: Sheet, tracer: Tracer) -> bool:
 
 
 def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> Known | None:
-    """A cycle that motions at a value come to: from known cycles beside it, and from beside steady sliding."""
+    """Simulate from known cycles and from beside steady sliding; return the first cycle that is reached, or None."""
     try:
         starts = [orbit_of(cycle).states[0] for cycle in near] + [tracer.flow.ahead(value, AHEAD)]
     except Failure:
@@ -71,7 +71,7 @@ def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> Known | None
 
 
 def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) -> None:
-    """Follow a cycle both ways: back to a sheet that is known, or the edge, and on."""
+    """Follow a cycle both ways: back to a known piece or the edge, and forward."""
     forth = seed if seed.point.tangent[-1] * away > 0 else replace(seed, point=turned_round(seed.point))
     back = replace(forth, point=turned_round(forth.point))
     step = 0.1 * LARGEST_STEP
@@ -94,12 +94,12 @@ def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) ->
 
 
 def met(sheets: list[Sheet], known: Known) -> bool:
-    """Whether a cycle lies between two neighbours that are known."""
+    """True if a cycle lies between two neighbours of a known piece."""
     return any(lies_between(a.cycle, b.cycle, known.cycle) for sheet in sheets for a, b in pairwise(sheet.known))
 
 
 def cut_back(sheet: Sheet, meeting: Cycle) -> None:
-    """Leave out what lies behind the place at which another sheet met this one."""
+    """Remove the cycles of a piece beyond the place at which another piece met it."""
     for i in range(len(sheet.known) - 1):
         if lies_between(sheet.known[i].cycle, sheet.known[i + 1].cycle, meeting):
             del sheet.known[i + 1 :]

@@ -1,4 +1,4 @@
-"""Where to cut a cycle into segments, so that deviations across the motion grow little in each.
+"""Choose shooting segments such that deviations across the motion grow little within each.
 
 A deviation along the motion is a matter of time only: in a slip event of many decades it grows with the velocity and
 shrinks with it again. It is left out, and cuts are made where the motion is slow.
@@ -18,7 +18,7 @@ QUICK = 30.0  # speed, in units of the mean along the cycle, beyond which it is 
 
 
 def cut(shooting: Shooting, u: Array) -> Orbit | None:
-    """The orbit of some unknowns in new segments; None if these would be no more than there are.
+    """Divide an orbit into new segments; None if they would be no more than the present ones.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def cut(shooting: Shooting, u: Array) -> Orbit | None:
 
 
 def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
-    """Times and states evenly spread along the cycle, as it looks in the unknowns, where it is slow."""
+    """Times (s) and states of candidate cuts: evenly spread along the cycle in the unknowns, where motion is slow."""
     flow = shooting.flow
     setting = flow.setting(orbit.value)
     times, states = [], []
@@ -65,7 +65,7 @@ def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
 
 
 def _cuts(steps: Array) -> list[int]:
-    """Indices of nodes at which segments start: each as long as nothing in it grows more than is allowed."""
+    """Indices of the nodes at which segments start; each is as long as `MOST_GROWTH` allows."""
     found, running = [0], [steps[0]]
     for k in range(1, len(steps)):
         further = [steps[k] @ product for product in (*running, np.eye(len(steps[k])))]

@@ -1,4 +1,4 @@
-"""Cycles as solutions of equations: shooting over one or several segments of the period.
+"""Shooting equations: residual and Jacobian of a cycle over one or several segments of the period.
 
 Unknowns are asinh(state/scale) at the start of each segment, the logarithm of the period, and the free parameter:
 linear for small motions, logarithmic for large ones, so that branches over many decades are nearly straight.
@@ -24,7 +24,7 @@ KNOWN = 1e-3  # but no farther than this share of a cycle's size
 
 @dataclass(frozen=True, eq=False)
 class Orbit(ReadOnly):
-    """A cycle: states at the starts of its segments (K, n), period, parameter, shares of the period (K,).
+    """A cycle as the equations see it: states at the segment starts (K, n), period (s), parameter, shares (K,).
 
     `scales` (n,) are the sizes that its states were measured by; natural ones where there are none.
     """
@@ -37,7 +37,7 @@ class Orbit(ReadOnly):
 
 
 class Shooting:
-    """The equations of a cycle for `continuation.Track`.
+    """Shooting equations of a cycle, to be solved by `continuation.Track`.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Shooting:
         self._last: tuple[bytes, Array, Array] | None = None
 
     def curve(self) -> Track:
-        """The curve of these cycles, for continuation.
+        """Build the continuation curve of these equations.
 
         Its lengths and angles count the first state, period and parameter only: further segments are the same cycle.
         """
@@ -74,21 +74,22 @@ class Shooting:
 
     @property
     def segments(self) -> int:
+        """Number of shooting segments K."""
         return len(self.fractions)
 
     def packed(self, orbit: Orbit) -> Array:
-        """Unknowns of an orbit."""
+        """Convert an orbit to the vector of unknowns (K n + 2,)."""
         value = np.log(orbit.value / self.size) if self.logarithmic else orbit.value / self.size
         return np.append(np.arcsinh(orbit.states / self.scales).ravel(), [np.log(orbit.period / self.flow.time), value])
 
     def orbit(self, u: Array) -> Orbit:
-        """The orbit of some unknowns."""
+        """Convert a vector of unknowns (K n + 2,) to an orbit; the period comes from its last but one entry."""
         states = np.sinh(u[:-2].reshape(self.segments, self.flow.size)) * self.scales
         value = self.size * (np.exp(u[-1]) if self.logarithmic else u[-1])
         return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value), self.fractions, self.scales)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
-        """Residuals and Jacobian; see `continuation.Equations`."""
+        """Residuals (K n + 1,) and Jacobian (K n + 1, K n + 2); see `continuation.Equations`."""
         flow, n, count = self.flow, self.flow.size, self.segments
         if not np.all(np.isfinite(u)) or np.max(np.abs(u[:-1])) > 60 or (self.logarithmic and abs(u[-1]) > 60):
             raise Failure("out of range")
@@ -120,25 +121,25 @@ class Shooting:
         return residual, jacobian
 
     def _stretch(self, orbit: Orbit) -> Array:
-        """d(state)/d(unknown)."""
+        """Derivative of state with respect to unknown, (K, n)."""
         return np.asarray(np.hypot(self.scales, orbit.states))
 
     def multipliers(self, u: Array) -> tuple[float, Array]:
-        """The trivial Floquet multiplier and the others, see `multipliers`."""
+        """Trivial Floquet multiplier, and the others (n−1,); see the function `multipliers`."""
         orbit = self.orbit(u)
         rates, _, _ = self.flow.field(self.flow.setting(orbit.value), orbit.states)
         return multipliers(self.sensitivities(u), rates / self.flow.scales)
 
     def sensitivities(self, u: Array) -> Array:
-        """∂(end)/∂(start) of every segment, in natural scales, (K, n, n)."""
+        """Derivative of each segment's end in its start, in natural scales, (K, n, n)."""
         return np.asarray(self._run(u)[1] * self.flow.scales[None, :] / self.flow.scales[:, None])
 
     def forget(self) -> None:
-        """Run anew, even for the same unknowns."""
+        """Drop the cached integration."""
         self._last = None
 
     def _run(self, u: Array) -> tuple[Array, Array]:
-        """Ends and sensitivities, kept for the latest unknowns."""
+        """Ends and sensitivities of the segments; those of the latest unknowns are cached."""
         if self._last is None or self._last[0] != u.tobytes():
             orbit = self.orbit(u)
             times = self.fractions * orbit.period
@@ -186,7 +187,7 @@ def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
 
 
 def _carried_round(sensitivities: Array, along: Array) -> float:
-    """By what factor one round multiplies the direction of motion."""
+    """Factor by which one period multiplies the direction of motion (1 but for errors)."""
     ends = np.einsum("kij,kj->ki", sensitivities, along)
     starts = np.roll(along, -1, axis=0)
     return float(np.prod(np.sum(starts * ends, axis=1) / np.sum(starts * starts, axis=1)))

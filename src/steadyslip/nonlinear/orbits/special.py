@@ -1,4 +1,4 @@
-"""Cycles at which a branch changes: folds, period doublings, tori, between two neighbours of it."""
+"""Detect and locate bifurcations (fold, period doubling, torus) between neighbouring cycles of a branch."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SMALL = 1e-2  # amplitude below which multipliers within rounding of one are jud
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A point of a branch with what is derived from it.
+    """A point of a branch of cycles: solution vector, shooting equations, and the cycle with its properties.
 
     `half` is how far the state has moved after half a period, in natural sizes: zero where that was a whole one;
     `extent` the range that each state variable goes through; `begin` is a better beginning, where there is one.
@@ -41,7 +41,7 @@ Made = Callable[[Shooting, Point], Known]
 
 
 def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCycle]:
-    """Folds, doublings and tori between two neighbouring points with the same unknowns, in their order.
+    """Locate folds, doublings and tori between two neighbouring points with the same unknowns, in order.
 
     Where stability changes at none of these, as at cycles that are symmetric beyond a multiplier 1, the place is found
     by the size of the largest multiplier. Where both have the same value of the parameter but for rounding, as in a
@@ -76,7 +76,7 @@ def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCy
 
 
 def may_return(earlier: Known, before: Known, now: Known) -> bool:
-    """Whether something may have changed sign twice between two neighbours, so that both look alike.
+    """True if a test function may have changed sign twice between two neighbours, so that none is seen.
 
     It may where it would change, had it gone on as from the cycle before them; where a multiplier comes closer to the
     unit circle than it moves in the step, too.
@@ -100,12 +100,12 @@ def may_return(earlier: Known, before: Known, now: Known) -> bool:
 
 
 def growth(multipliers: Array) -> float:
-    """Logarithm of the size of the largest multiplier."""
+    """Test function: logarithm of the size of the largest multiplier."""
     return float(np.log(np.max(np.abs(multipliers))))
 
 
 def _passing(cycle: Cycle) -> str:
-    """Kind of a cycle at which a multiplier passes the unit circle: by the one that is nearest to it."""
+    """Name of the bifurcation, from the multiplier that is nearest to the unit circle."""
     nearest = min(cycle.multipliers, key=lambda m: abs(abs(m) - 1))
     if abs(nearest.imag) > REAL * abs(nearest):
         return "torus"
@@ -115,6 +115,7 @@ def _passing(cycle: Cycle) -> str:
 def _located(
     kind: str, before: Known, now: Known, measure: Callable[[Point], float], made: Made, index: int
 ) -> SpecialCycle | None:
+    """Locate the zero of a test function between two points; None if that fails or is no bifurcation."""
     shooting = now.shooting
     try:
         ends = measure(before.point), measure(now.point)
@@ -136,12 +137,12 @@ def _located(
 
 
 def doubling(multipliers: Array) -> float:
-    """Changes sign where a multiplier passes −1: the product of 1 + μ, each kept of order one."""
+    """Test function of period doubling: product of scaled 1 + μ, which changes sign where one multiplier passes −1."""
     return float(np.real(np.prod((1 + multipliers) / (1 + np.abs(multipliers)))))
 
 
 def torus(multipliers: Array) -> float:
-    """Positive where a pair of complex multipliers lies outside the unit circle; -1 where there is none.
+    """Test function of a torus: positive where a complex pair lies outside the unit circle; −1 without such a pair.
 
     Next to one a pair cannot be told from two real multipliers.
     """
@@ -150,13 +151,13 @@ def torus(multipliers: Array) -> float:
 
 
 def looks(cycle: Cycle) -> Array:
-    """Logarithms of period and velocities, by which cycles are told from each other."""
+    """Logarithms of period and velocities (3,), by which cycles are compared."""
     lowest = np.arcsinh(cycle.lowest_velocity / cycle.speed)
     return np.array([np.log(cycle.period), np.log(cycle.peak_velocity), lowest])
 
 
 def lies_between(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
-    """Whether a cycle is one of those between two neighbours."""
+    """True if a cycle's parameter, period and velocities fit between those of two neighbours."""
     if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
         return False
     share = (cycle.value - a.value) / (b.value - a.value) if b.value != a.value else 0.5

@@ -1,4 +1,4 @@
-"""Following one sheet of cycles: a curve of solutions from a first one to where it ends."""
+"""Follow one piece of a branch of cycles by continuation, from a first cycle to where it ends."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ INTERRUPTED = "interrupted by the user"
 
 @dataclass(eq=False)
 class Sheet:
-    """Cycles in the order in which they were followed, and special ones with their places among them.
+    """Cycles in the order in which they were followed, and the bifurcations among them.
 
     `whole` tells an end that lies in the matter from one where the cycles could not be followed any further; `contact`
     is that of a machine which lifts off there, or is the fastest. `begins` and `stops` are both ends where they are not
@@ -53,7 +53,7 @@ class Sheet:
 
     @property
     def bounds(self) -> tuple[End, End]:
-        """Where it begins and stops."""
+        """First and last end of the piece."""
         ends = []
         for end, i in ((self.begins, 0), (self.stops, -1)):
             if end is None and self.known:
@@ -62,13 +62,13 @@ class Sheet:
         return ends[0], ends[1]
 
     def reversed(self) -> Sheet:
-        """The same cycles the other way round."""
+        """The piece with its cycles in reverse order."""
         count = len(self.known)
         special = [replace(one, index=count - one.index) for one in reversed(self.special)]
         return Sheet(self.known[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
 
     def joined(self, more: Sheet) -> Sheet:
-        """This one, and another that begins where it ends."""
+        """Join this piece and `more`, which begins where this one ends."""
         count = len(self.known)
         special = [replace(one, index=one.index + count) for one in more.special]
         return Sheet(
@@ -77,7 +77,7 @@ class Sheet:
 
 
 class Tracer:
-    """Follows sheets of cycles of one flow.
+    """Follows pieces of the branch of cycles of one rig along one parameter.
 
     Parameters
     ----------
@@ -103,22 +103,23 @@ class Tracer:
         self.begun, self.most_steps = 0, MOST_STEPS
 
     def allot(self, since: int, share: float) -> None:
-        """Let the next sheets take steps up to a share of those for a branch, which began after `since` steps."""
+        """Limit the integration steps of the next pieces to a share of those of a branch, counted from step `since`."""
         self.begun, self.most_steps = self.flow.steps, since + round(share * MOST_STEPS)
 
     def shooting(self, fractions: Array = ONE, amplitude: float = 1.0, scales: Array | None = None) -> Shooting:
+        """Shooting equations for given segments (shares of the period) and a typical amplitude (natural sizes)."""
         made = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value, scales)
         made.amplitude = amplitude
         return made
 
     def unknown(self, value: float) -> float:
-        """The parameter as it stands in the unknowns."""
+        """Convert a parameter value (SI units) to the last unknown of the shooting equations."""
         return float(np.log(value / self.unit_of_value)) if self.logarithmic else value / self.unit_of_value
 
     # -- where a sheet starts
 
     def small(self, amplitude: float) -> tuple[Shooting, Point]:
-        """The cycle of a given small amplitude of ln v, from the critical eigenvector.
+        """Solve for the cycle of a given small amplitude of ln v, starting from the critical eigenvector.
 
         Raises
         ------
@@ -146,7 +147,7 @@ class Tracer:
         return shooting, first
 
     def doubled(self, cycle: Cycle, size: float) -> Known:
-        """The cycle of twice the period, so far away in unknowns, along the eigenvector of the multiplier −1.
+        """Solve for a cycle of twice the period, `size` (in unknowns) away along the eigenvector of multiplier −1.
 
         Raises
         ------
@@ -171,7 +172,7 @@ class Tracer:
         return self.known(shooting, curve.start(guess, tangent / curve.size(tangent)))
 
     def deviation(self, cycle: Cycle, multiplier: complex) -> tuple[Array, Array]:
-        """Deviation (n,) from a cycle's start that a multiplier belongs to, and sensitivities of the segments.
+        """Eigenvector (n,) of one multiplier at a cycle's start, and the sensitivities of the segments (K, n, n).
 
         It leaves slip at the load point's velocity, and is one unit of the unknowns large.
 
@@ -193,7 +194,7 @@ class Tracer:
         return vector / np.max(np.abs(vector / np.hypot(scales, orbit.states[0]))), pieces
 
     def resumed(self, orbit: Orbit, amplitude: float, direction: Array | None = None, length: float = 0.0) -> Known:
-        """An orbit as a point of the curve, its tangent along `direction` of first state, period and parameter.
+        """Solve for the cycle next to a known orbit; `direction` (first state, period, parameter) orients its tangent.
 
         Raises
         ------
@@ -216,7 +217,7 @@ class Tracer:
         self, shooting: Shooting, first: Point | Known, step: float, *, twice: bool = False,
         met: Callable[[Known], bool] | None = None,
     ) -> Sheet:  # fmt: skip
-        """All cycles from a first one on, as far as they can be followed.
+        """Follow the cycles from a first one on, as far as possible.
 
         Parameters
         ----------
@@ -274,7 +275,7 @@ class Tracer:
         return sheet
 
     def _add_changes(self, sheet: Sheet, before: Known, here: Known) -> None:
-        """Special cycles between two neighbours; where there are several, with a cycle between each two."""
+        """Append the bifurcations between two neighbouring cycles; of several, with a cycle between each two."""
         earlier = sheet.known[-2] if len(sheet.known) > 1 else before
         for one in self._changes(earlier, before, here, len(sheet.known), HALVINGS):
             last = sheet.special[-1] if sheet.special else None
@@ -284,7 +285,7 @@ class Tracer:
             sheet.special.append(replace(one, index=len(sheet.known)))
 
     def _changes(self, earlier: Known, before: Known, here: Known, index: int, halvings: int) -> list[SpecialCycle]:
-        """Special cycles between two neighbours, also where two of a kind lie between them."""
+        """Bifurcations between two neighbouring cycles; halves the step where two of one kind may cancel."""
         found = changes(before, here, self.known, index)
         if found or halvings == 0 or not may_return(earlier, before, here):
             return found
@@ -296,7 +297,7 @@ class Tracer:
         return first + self._changes(before, middle, here, index, halvings - 1)
 
     def _on_the_way(self, before: Known, here: Known, length: float) -> Known:
-        """The cycle at a length of the curve between those of two neighbours.
+        """Solve for the cycle at an arclength between those of two neighbours.
 
         Raises
         ------
@@ -312,13 +313,14 @@ class Tracer:
         return self.known(here.shooting, point)
 
     def _add(self, sheet: Sheet, known: Known) -> None:
+        """Append a point to the piece and report progress."""
         sheet.known.append(known)
         self.count += 1
         if self.progress is not None:
             self.progress(self.count, known.cycle)
 
     def _points(self, here: Known, step: float) -> Iterator[tuple[Known, Known]]:
-        """Each point with the one before it, in the same unknowns.
+        """Yield pairs of consecutive points of the piece, both in the same unknowns.
 
         Cycles are cut into segments anew where they are too unstable, where deviations grow and shrink again so much
         within a segment that the trivial multiplier is lost, or where they cannot be followed any further. Where steps
@@ -369,7 +371,7 @@ class Tracer:
                 here = finer
 
     def _rescaled(self, known: Known) -> Known | None:
-        """The same point, its states measured by what they go through in the cycle; None if that changes little.
+        """Restate a point with states measured by their range in the cycle; None if that changes the scales little.
 
         Beside a body that sticks another may ring on and be anywhere in its small oscillation when slip begins, by
         turns ahead and behind as the parameter changes. Measured by natural sizes that makes the branch wriggle.
@@ -388,7 +390,7 @@ class Tracer:
             return None
 
     def _begun_anew(self, known: Known) -> Known | None:
-        """The same cycle, begun where slip passes the load point's velocity more steeply; None if nowhere."""
+        """Restate a point with the start of the cycle at a steeper passage; None if there is none."""
         if known.begin is None:
             return None
         direction = np.append(np.zeros(self.flow.size), known.point.tangent[-2:])
@@ -398,12 +400,13 @@ class Tracer:
             return None
 
     def _curve(self, known: Known) -> Track:
+        """Continuation curve through a point, with a Newton tolerance that suits its rounding errors."""
         curve = known.shooting.curve()
         curve.tolerance = max(curve.tolerance, min(1e-6, 0.01 * abs(known.cycle.trivial - 1)))
         return curve
 
     def _finer(self, known: Known) -> Known | None:
-        """The same point in more segments; None if there is no use for them."""
+        """Restate a point with more shooting segments; None if more are of no use."""
         try:
             orbit = cut(known.shooting, known.point.u)
             if orbit is None:
@@ -414,7 +417,7 @@ class Tracer:
             return None
 
     def known(self, shooting: Shooting, point: Point) -> Known:
-        """Everything about a cycle.
+        """Derive the cycle and its properties from a solution of the shooting equations.
 
         Raises
         ------
@@ -435,7 +438,7 @@ class Tracer:
         return Known(point, shooting, cycle, found.half, found.extent, found.begin)
 
     def _attracts(self, cycle: Cycle) -> bool:
-        """Whether all multipliers lie inside the unit circle; by the kind of onset where that is too close to tell."""
+        """True if all multipliers lie inside the unit circle; where that is too close, decided by the kind of onset."""
         if self.onset.is_weak and abs(cycle.growth - 1) < IMPRECISE:
             return False
         if cycle.amplitude < SMALL and abs(cycle.growth - 1) < max(UNRESOLVED, UNCERTAIN * cycle.multiplier_error):
@@ -443,7 +446,7 @@ class Tracer:
         return cycle.growth < 1
 
     def _at_limit(self, inside: Known, outside: Known) -> Known:
-        """The cycle on the limit of the range."""
+        """Solve for the cycle at the limit of the parameter's range, between two neighbours."""
         low, high = self.limits
         try:
             return self.between(inside, outside, low if outside.cycle.value <= low else high)
@@ -451,7 +454,7 @@ class Tracer:
             return outside
 
     def between(self, near: Known, far: Known, value: float) -> Known:
-        """The cycle at a value of the parameter between those of two neighbours with the same unknowns.
+        """Solve for the cycle at a parameter value between those of two neighbours with the same unknowns.
 
         Raises
         ------
@@ -476,7 +479,7 @@ class Tracer:
 
 
 def orbit_of(cycle: Cycle) -> Orbit:
-    """The solution that a cycle was made of."""
+    """States and period from which a cycle was computed."""
     if cycle._orbit is None:
         raise InternalError("a cycle without its orbit; please report it")
     return cycle._orbit

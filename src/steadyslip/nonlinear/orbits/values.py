@@ -1,4 +1,4 @@
-"""The cycles at one value of the parameter: of a branch, or of a motion that comes to one."""
+"""Compute the cycles at one value of the parameter: by continuation from the branch, or by simulation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ASIDE = 1e-2  # of the unknowns: how far from an unstable cycle a motion begins
 
 
 def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
-    """What follows the cycles that begin at an onset, anywhere."""
+    """Build a `Tracer` for the cycles of an onset without limits of the parameter."""
     rig = onset.rig.with_values({onset.along: onset.value})
     return Tracer(Flow(rig, onset.along, steady, rtol, onset.contact), onset, (-np.inf, np.inf), MOST_STEPS_BETWEEN)
 
@@ -33,7 +33,7 @@ def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
 def cycles_at(
     onset: Onset, steady: int, rtol: float | None, value: float, stretches: Sequence[Sequence[Cycle]]
 ) -> tuple[list[Cycle], list[tuple[Cycle, Cycle]]]:
-    """The cycles at one value among stretches of a branch that are continuous, in the order of the branch.
+    """Cycles at one parameter value, from continuous parts of a branch, in its order.
 
     Second come neighbours to both sides of the value between which no cycle was found.
     """
@@ -52,7 +52,7 @@ def cycles_at(
 
 @dataclass(frozen=True)
 class Simulation:
-    """What a motion at one value of the parameter showed.
+    """Outcome of one simulated motion at a value of the parameter.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class CyclesAt(tuple[Cycle, ...]):
         simulated: Sequence[Simulation] = (), between: tuple[Neighbour | None, Neighbour | None] = (None, None),
         window: str = "",
     ) -> CyclesAt:  # fmt: skip
-        """The cycles as a tuple, with what motions showed, and the window around the value in words."""
+        """Build the tuple of cycles with the outcomes of simulations and the description of the window."""
         made = super().__new__(cls, cycles)
         made.multiples, made.missed = tuple(multiples), tuple(missed)
         made.simulated, made.between, made._window = tuple(simulated), between, window
@@ -122,7 +122,7 @@ class CyclesAt(tuple[Cycle, ...]):
 def simulations(
     onset: Onset, steady: int, rtol: float | None, value: float, beside: Sequence[Cycle]
 ) -> list[Simulation]:  # fmt: skip
-    """Motions at a value from beside unstable cycles and steady sliding, until one comes to a stable cycle."""
+    """Simulate from beside unstable cycles and steady sliding until a motion reaches a stable cycle."""
     tracer, found = tracer_of(onset, steady, rtol), list[Simulation]()
     for cycle in (*beside, None):
         try:
@@ -140,7 +140,7 @@ def simulations(
 
 
 def _start(tracer: Tracer, value: float, cycle: Cycle | None) -> tuple[Array, str]:
-    """State at which a motion begins, and words for it."""
+    """Starting state (n,) of a simulation, and its description."""
     if cycle is None:
         return tracer.flow.ahead(value, AHEAD), "beside steady sliding"
     orbit, vector = orbit_of(cycle), tracer.deviation(cycle, cycle.multipliers[0])[0]
@@ -148,7 +148,7 @@ def _start(tracer: Tracer, value: float, cycle: Cycle | None) -> tuple[Array, st
 
 
 def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | None:
-    """The cycle between two neighbours: along the branch from one to the other, from either side."""
+    """Solve for the cycle at a value between two neighbours, by continuation from either; None if it fails."""
     for one, other in ((low, high), (high, low)):
         if one.value == value:
             return one
@@ -160,7 +160,7 @@ def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | 
 
 
 def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
-    """Follow the cycles from one known to another until the value is passed; the cycle there."""
+    """Follow the branch from one known cycle towards another until the value is passed; return the cycle there."""
     orbits = orbit_of(start), orbit_of(end)
     first = tracer.shooting(scales=orbits[0].scales)
     ends = [first.packed(replace(orbit, states=orbit.states[:1])) for orbit in orbits]

@@ -1,4 +1,4 @@
-"""From a motion that seems to repeat itself to the cycle that it is on, or is near: found by Newton's method.
+"""Find the cycle near a simulated motion that seems to repeat itself, by Newton's method.
 
 Peaks that agree are no proof of a cycle: ringing after a kick, or a slow approach to something else, have them too. A
 cycle is believed only where the equations of a cycle are solved, next to the motion, by a state that does not return
@@ -37,7 +37,7 @@ def cycle_near(
     runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
     unknowns: Array | None = None,
 ) -> Cycle | None:  # fmt: skip
-    """The cycle that a motion is on, or comes to.
+    """Cycle that a motion is on or approaches, or None.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def motion_from(
     runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
     unknowns: Array | None = None,
 ) -> Simulated:  # fmt: skip
-    """What a motion shows that starts at a state: the cycle that it comes to, or what it does instead.
+    """Simulate from a state: the cycle that the motion approaches, or a description of what it does instead.
 
     Parameters are those of `cycle_near`.
     """
@@ -90,7 +90,7 @@ def motion_from(
 
 @dataclass(frozen=True)
 class Simulated:
-    """What a motion comes to: a cycle, if it does, and words for it."""
+    """Cycle that a motion approaches (or None), and a description of the motion."""
 
     cycle: Cycle | None
     words: str
@@ -114,7 +114,7 @@ class _Stretch:
 def _stretches(
     runs: Runs, setting: FlowSetting, state: Array, unknowns: Array | None, patience: int
 ) -> Iterator[_Stretch]:
-    """The motion, some returns at a time."""
+    """Yield the motion in parts of some returns each."""
     span, spent = FIRST_SPAN * runs.time, 0
     for _ in range(patience):
         slips, passes = _Returns(), _Returns()
@@ -164,19 +164,19 @@ def _enough(slips: _Returns, passes: _Returns) -> bool:
 
 
 def _ends(speeds: list[Array]) -> tuple[float, float]:
-    """Lowest and highest."""
+    """Lowest and highest of several arrays."""
     return float(min(one.min() for one in speeds)), float(max(one.max() for one in speeds))
 
 
 def _candidates(runs: Runs, seen: _Stretch) -> Array:
-    """How many returns a period may have: those after which the motion was close to where it is now."""
+    """Numbers of returns that a period may have: those after which the motion was close to its present place."""
     places = np.arcsinh(seen.states / runs.scales)
     away = np.abs(places[-2::-1] - places[-1]).max(axis=1)
     return 1 + np.flatnonzero(away < CLOSE * min(1.0, seen.extent))[:MOST_TRIES]
 
 
 def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None:
-    """The cycle next to the last of some returns, with so many returns in its period."""
+    """Solve for the cycle next to the last return, with `back` returns per period; None if there is none."""
     shooting = Shooting(runs, np.ones(1), False, abs(value) or 1.0)
     shooting.amplitude = min(1.0, seen.extent)
     period = seen.times[-1] - seen.times[-1 - back]

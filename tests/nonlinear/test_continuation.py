@@ -7,10 +7,10 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, LAWS, rig
-from steadyslip.nonlinear.continuation import Failure, Track
+from steadyslip.nonlinear.continuation import Failure, SolutionCurve
 from steadyslip.nonlinear.orbits import flow as flow_module
+from steadyslip.nonlinear.orbits.cut_segments import _cuts
 from steadyslip.nonlinear.orbits.flow import Flow
-from steadyslip.nonlinear.orbits.segments import _cuts
 from steadyslip.nonlinear.orbits.shooting import multipliers
 
 # -- continuation itself
@@ -20,7 +20,7 @@ def test_continuation_follows_a_circle_all_the_way_round():
     def circle(u):
         return np.array([u @ u - 1]), 2 * u[None]
 
-    curve = Track(circle)
+    curve = SolutionCurve(circle)
     start = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     angles = []
     for point in curve.follow(start, 0.05, 1e-6, 0.2):
@@ -35,7 +35,7 @@ def test_continuation_locates_a_fold():
     def parabola(u):
         return np.array([u[0] ** 2 + u[1] - 0.3]), np.array([[2 * u[0], 1.0]])
 
-    curve = Track(parabola)
+    curve = SolutionCurve(parabola)
     here = curve.start(np.array([-1.0, -0.7]), np.array([1.0, 1.0]) / np.sqrt(2))
     for ahead in curve.follow(here, 0.1, 1e-6, 0.3):
         if here.tangent[1] * ahead.tangent[1] < 0:
@@ -51,7 +51,7 @@ def test_continuation_says_when_it_cannot_go_on():
             raise Failure("a wall")
         return np.array([u[0] - u[1]]), np.array([[1.0, -1.0]])
 
-    curve = Track(ends)
+    curve = SolutionCurve(ends)
     start = curve.start(np.zeros(2), np.ones(2) / np.sqrt(2))
     with pytest.raises(Failure, match="a wall"):
         list(curve.follow(start, 0.1, 1e-4, 0.2))
@@ -66,7 +66,7 @@ def test_continuation_does_not_jump_to_another_curve():
         slope = np.pi * np.cos(np.pi * y)
         return np.array([np.sin(np.pi * y)]), np.array([[slope, -slope * bend]])
 
-    curve = Track(two_lines)
+    curve = SolutionCurve(two_lines)
     start = curve.start(np.array([-0.3, 0.0]), np.array([0.0, 1.0]))
     for point in curve.follow(start, 0.4, 1e-6, 0.4):
         assert point.u[0] == pytest.approx(0.3 * np.tanh(20 * (point.u[1] - 0.5)), abs=1e-9)
@@ -81,7 +81,7 @@ def corrected_by(steps, reach=np.inf):
     def equations(u):
         return np.array([left.pop(0) if len(left) > 1 else left[0]]), np.array([[1.0, 0.0]])
 
-    return Track(equations).corrected(np.zeros(2), np.array([0.0, 1.0]), 0.0, reach)
+    return SolutionCurve(equations).corrected(np.zeros(2), np.array([0.0, 1.0]), 0.0, reach)
 
 
 def test_newton_ends_at_rounding_and_may_step_back_once():

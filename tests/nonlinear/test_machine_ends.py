@@ -11,7 +11,7 @@ from machines import rate_state, surface
 from steadyslip.nonlinear.kicks.kicks import Kicked
 from steadyslip.nonlinear.kicks.outcomes import contacts_of
 from steadyslip.nonlinear.kicks.spans import constant_inputs
-from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs
+from steadyslip.nonlinear.orbits.flow import FlowFailure, FlowRunner
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "machines"
 LIFTED = 1.2  # times its steady normal force, taken away
@@ -29,7 +29,7 @@ def relieved(rig, contact):
     yield contacts_of(lifted, np.zeros(1, dtype=int))[0]
     rest = lifted.rest
     inputs = constant_inputs(np.ones(1), rest.velocity, np.zeros(1), rest.pressure, rest.force)
-    orbits = Runs(replace(lifted.repeated(0, 1).jobs, segments=inputs))
+    orbits = FlowRunner(replace(lifted.repeated(0, 1).jobs, segments=inputs))
     with pytest.raises(FlowFailure) as caught:
         orbits.watched(orbits.own, kicked.rest.state[0], 1.0)
     yield caught.value.contact

@@ -1,6 +1,28 @@
-"""Beyond small perturbations: onset, stick-slip cycles, kicks that are survived, answers to what swings for ever.
+"""Motion beyond small perturbations: onset of oscillation, stick-slip cycles, kicks, periodic forcing, slow changes.
 
-Knows stability and motion; no records of experiments, no maps, no words of the verdict.
+Depends on stability (`linear`) and simulation (`motion`); not on experiments, maps or the texts of verdicts.
+
+How a cycle is found, and gets its period (`cycles`, one file per step):
+
+1. `onset/hopf.py`: `hopf` finds the edge of stability nearest to the rig, with its frequency ω and kind of onset.
+2. `orbits/follow.py`: `cycles` starts there, and joins the pieces of the branch that can be followed.
+3. `orbits/tracer.py`: `Tracer.small` makes the first cycle of the critical eigenvector, with period 2π/ω;
+   `Tracer.followed` goes on from cycle to cycle by `continuation.py` (pseudo-arclength, Newton's method).
+4. `orbits/shooting.py`: `Shooting.equations`. ln(period) is an unknown beside the starting state and the parameter; one
+   more equation, that slip passes the load point's velocity at the start, determines it. `Shooting.orbit` reads it off.
+   `orbits/flow.py` integrates the motion and its derivatives for these equations.
+5. `orbits/cycle_properties.py`: `cycle_data` integrates the solved cycle once more, for velocities, stresses and
+   stability (Floquet multipliers), into a `Cycle` (`orbits/cycle.py`).
+
+Besides in `orbits/`: `special.py` locates bifurcations, `end_reasons.py` decides where a piece ends, `doublings.py`
+follows cycles of twice the period, `cut_segments.py` divides unstable cycles, `search.py` and `cycle_from_motion.py`
+find cycles by simulation, `at_value.py` computes those at one value of the parameter, `ranges.py` the stable ranges;
+`branch.py` is the result.
+
+How the smallest kick not survived is found (`threshold`): `kicks/threshold.py` searches over sizes, `kicks/kicks.py`
+makes a motion of each, `kicks/settled.py` solves for the steady sliding it may return to, `kicks/outcomes.py` decides
+the outcome, with `spans.py` (simulation), `neighbourhood.py` (returns), `closed_orbits.py` (oscillates), `fold.py` (no
+solution) and `shells.py` (close to an edge).
 """
 
 from __future__ import annotations
@@ -15,7 +37,7 @@ from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.onset.hopf_curve import HopfCurve, SpecialPoint, hopf_curve
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
-from steadyslip.nonlinear.orbits.cycles import cycles
+from steadyslip.nonlinear.orbits.follow import cycles
 
 __all__ = [
     "Basin",

@@ -33,7 +33,7 @@ from steadyslip.nonlinear.kicks.kicks import kick_problems
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.cycles import cycles
+from steadyslip.nonlinear.orbits.follow import cycles
 
 ENDINGS = (".nc", ".csv", ".html", *FIGURES)
 KICKED = (".html", *FIGURES)

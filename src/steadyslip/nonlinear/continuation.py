@@ -38,7 +38,7 @@ class Point:
     rounding: float = 0.0
 
 
-class Track:
+class SolutionCurve:
     """A curve of solutions, followed by pseudo-arclength continuation.
 
     Parameters

@@ -10,13 +10,13 @@ from dimensionless import two_states
 from doubled_machines import ALONG, closing, drawn, drawn_otherwise, judged, places
 from steadyslip.core.checks import in_words
 from steadyslip.nonlinear.continuation import turned_round
-from steadyslip.nonlinear.orbits import tracer, values
+from steadyslip.nonlinear.orbits import at_value, tracer
+from steadyslip.nonlinear.orbits.at_value import tracer_of
 from steadyslip.nonlinear.orbits.cycle import End
-from steadyslip.nonlinear.orbits.doublings import doubled_sheets
+from steadyslip.nonlinear.orbits.doublings import doubled_pieces
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
 from steadyslip.nonlinear.orbits.search import seed_at
 from steadyslip.nonlinear.orbits.tracer import orbit_of
-from steadyslip.nonlinear.orbits.values import tracer_of
 
 
 @dataclass
@@ -108,7 +108,7 @@ def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling
 
 def test_a_cycle_that_cannot_be_computed_is_said(doubling, monkeypatch):
     """On the branch and on its doublings, between which neighbours; a simulation finds the one that attracts."""
-    monkeypatch.setattr(values, "_at_value", lambda *_: None)
+    monkeypatch.setattr(at_value, "_at_value", lambda *_: None)
     value = 0.862 * doubling.onset.value
     found = doubling.at(value)
     assert (len(found.missed), found.multiples) == (2, (0,))
@@ -213,8 +213,8 @@ def test_a_branch_goes_on_where_the_beginning_of_its_cycles_disappears():
         first = replace(first, point=turned_round(first.point))
     sheet = follower.followed(first.shooting, first, 0.02)
     assert sheet.end.startswith("end of the range")
-    assert (np.diff([known.cycle.value for known in sheet.known]) < 0).all()
-    assert (np.diff([known.cycle.period for known in sheet.known]) > 0).all()
+    assert (np.diff([known.cycle.value for known in sheet.points]) < 0).all()
+    assert (np.diff([known.cycle.period for known in sheet.points]) > 0).all()
     assert [one.kind for one in sheet.special] == ["period doubling"]
 
 
@@ -226,9 +226,9 @@ def test_each_doubling_has_a_part_of_the_work(monkeypatch):
     branch = ss.cycles(machine, ALONG, between=(0.4 * edge, 1.05 * edge), doublings=0)
     flips = [point.cycle for point in branch.special if point.kind == "period doubling"]
     monkeypatch.setattr(tracer, "MOST_STEPS", 120_000)
-    sheets = doubled_sheets(tracer_of(branch.onset, 0, None), flips)
+    sheets = doubled_pieces(tracer_of(branch.onset, 0, None), flips)
     assert [sheet.bounds[0].value for sheet in sheets] == [flip.value for flip in flips]
-    assert min(len(sheet.known) for sheet in sheets) > 3
+    assert min(len(sheet.points) for sheet in sheets) > 3
     assert all("million steps of integration taken" in sheet.end for sheet in sheets)
 
 

@@ -12,7 +12,7 @@ from rigs_of_theory import rate_state
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits import tracer as tracer_module
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
-from steadyslip.nonlinear.orbits.ends import ENDS, Ends
+from steadyslip.nonlinear.orbits.end_reasons import ENDS, EndRules
 from steadyslip.nonlinear.orbits.tracer import Tracer
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -52,7 +52,7 @@ def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
         return (ENDS["growth"], True) if now.cycle.amplitude > 0.1 else ("", True)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Ends, "finished", broken)
+        patched.setattr(EndRules, "finished", broken)
         patched.setattr(sys.modules["steadyslip.nonlinear.orbits.search"], "cycle_near", stop)
         partial = ss.cycles(damped.rig, between=between)
     assert (len(partial) > 3, partial.end, partial.gaps) == (True, "interrupted by the user", ())
@@ -89,7 +89,7 @@ def test_no_small_cycle_at_the_edge_is_no_traceback(damped, monkeypatch):
 
 def test_a_reason_is_kept_where_the_edge_fails(damped, monkeypatch):
     """No small cycle, and the sheet that simulation leads to breaks off before the edge: both are said."""
-    onset, real = damped.onset, Tracer.known
+    onset, real = damped.onset, Tracer.branch_point
 
     def fails(*_arguments):
         raise Failure("no convergence")
@@ -101,7 +101,7 @@ def test_a_reason_is_kept_where_the_edge_fails(damped, monkeypatch):
         return found
 
     monkeypatch.setattr(Tracer, "small", fails)
-    monkeypatch.setattr(Tracer, "known", known)
+    monkeypatch.setattr(Tracer, "branch_point", known)
     branch = ss.cycles(damped.rig, between=(0.4 * onset.value, 1.1 * onset.value))
     assert branch.gaps[0] == 0
     assert "no small cycle was found" in branch.broken[0]

@@ -10,17 +10,17 @@ import steadyslip as ss
 from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.continuation import Failure, Point, Track
+from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.kicks.spans import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_module
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
-from steadyslip.nonlinear.orbits.ends import STANDING, retraces, stands, winds
-from steadyslip.nonlinear.orbits.flow import Flow, Runs
-from steadyslip.nonlinear.orbits.measure import measured
+from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
+from steadyslip.nonlinear.orbits.cycle_properties import cycle_data
+from steadyslip.nonlinear.orbits.end_reasons import STANDING, retraces, stands, winds
+from steadyslip.nonlinear.orbits.flow import Flow, FlowRunner
 from steadyslip.nonlinear.orbits.shooting import Shooting
-from steadyslip.nonlinear.orbits.special import Known, changes
+from steadyslip.nonlinear.orbits.special import BranchPoint, changes
 from steadyslip.nonlinear.orbits.tracer import Tracer
-from steadyslip.nonlinear.orbits.verify import cycle_near
 
 
 def started(a_rig, **initial):
@@ -28,7 +28,7 @@ def started(a_rig, **initial):
     one = np.ones(1)
     jobs = prepare(a_rig, None, 1.0, {}, initial, Options())
     jobs = replace(jobs, segments=constant_inputs(one, one * a_rig.drive.velocity, 0 * one, 0 * one, 0 * one))
-    state = np.zeros(Runs(jobs).size)
+    state = np.zeros(FlowRunner(jobs).size)
     state[0], state[2:] = jobs.initial[0][0], jobs.initial[0][2:]
     return jobs, state
 
@@ -38,13 +38,13 @@ def test_motion_is_on_a_cycle_only_if_there_is_one(mass, damped):
     """The cycle next to a motion is that of the branch; a motion that settles, or grows, is on none."""
     rigs = [unit_rig("slip", 0.5, kappa, damping=0 if mass else 1e-3, mass=mass) for kappa in (0.4, 1.4)]
     jobs, state = started(rigs[0], x=0.3)
-    found = cycle_near(Runs(jobs), state, patience=20)
+    found = cycle_near(FlowRunner(jobs), state, patience=20)
     (cycle,) = (damped if not mass else ss.cycles(rigs[0], doublings=0)).at(0.4 * A)
     assert found.period == pytest.approx(cycle.period, rel=1e-8)
     assert found.multipliers == pytest.approx(cycle.multipliers, rel=1e-5, abs=1e-8)
-    assert cycle_near(Runs(jobs), found._orbit.states[0]).period == pytest.approx(found.period, rel=1e-9)
+    assert cycle_near(FlowRunner(jobs), found._orbit.states[0]).period == pytest.approx(found.period, rel=1e-9)
     jobs, state = started(rigs[1], x=0.3)
-    assert cycle_near(Runs(jobs), state, patience=20) is None
+    assert cycle_near(FlowRunner(jobs), state, patience=20) is None
 
 
 def test_windings_that_close_in_on_a_value_are_an_end(damped):
@@ -102,7 +102,7 @@ def test_multipliers_are_not_read_where_the_parameter_stands_still(damped):
     def known(value, multiplier):
         cycle = replace(damped.cycles[-1], value=value, multipliers=(multiplier, 0.01))
         shooting = SimpleNamespace(flow=SimpleNamespace(size=3), multipliers=read)
-        return Known(Point(np.zeros(2), np.ones(2), 0.0, 1), shooting, cycle, np.zeros(2), np.zeros(2))
+        return BranchPoint(Point(np.zeros(2), np.ones(2), 0.0, 1), shooting, cycle, np.zeros(2), np.zeros(2))
 
     changes(known(1.0, -0.9), known(1.0 + 1e-13, -1.1), None, 1)
     assert not looked
@@ -120,7 +120,7 @@ def test_cycle_is_counted_once_round(damped):
         u = shooting.packed(replace(orbit, period=turns * orbit.period))
         residual, _ = shooting.equations(u)
         assert np.abs(residual).max() < 1e-7
-        assert measured(shooting, u).turns == {1: 1, 2: 2, 3: 3, 6: 2}[turns]
+        assert cycle_data(shooting, u).turns == {1: 1, 2: 2, 3: 3, 6: 2}[turns]
     tracer = Tracer(flow, damped.onset, (0.0, 1.0), 10)
     with pytest.raises(Failure, match="run through 2 times"):
         tracer.resumed(replace(orbit, period=2 * orbit.period), 1.0)
@@ -129,7 +129,7 @@ def test_cycle_is_counted_once_round(damped):
 def test_sheet_that_breaks_off_is_found_again_by_simulation(damped, monkeypatch):
     """What lies beyond is the same as without the break; the gap is said, and `at` simulates in it."""
     onset, broken = damped.onset, 0.8 * damped.onset.value
-    real = Tracer.known
+    real = Tracer.branch_point
 
     def known(self, shooting, point):
         found = real(self, shooting, point)
@@ -137,7 +137,7 @@ def test_sheet_that_breaks_off_is_found_again_by_simulation(damped, monkeypatch)
             raise Failure("a hole")
         return found
 
-    monkeypatch.setattr(Tracer, "known", known)
+    monkeypatch.setattr(Tracer, "branch_point", known)
     branch = ss.cycles(damped.rig, between=(0.3 * onset.value, 1.1 * onset.value))
     monkeypatch.undo()
     assert len(branch.gaps) == 1
@@ -174,7 +174,7 @@ def test_steps_are_long_where_equations_are_bent():
         off = x - 0.5 * p * p
         return np.array([np.expm1(1e4 * off)]), np.array([[1e4, -1e4 * p]]) * np.exp(1e4 * off)
 
-    curve, points = Track(steep), []
+    curve, points = SolutionCurve(steep), []
     first = curve.start(np.array([0.0, 0.0]), np.array([0.0, 1.0]))
     for point in curve.follow(first, 0.01, 1e-9, 0.5):
         points.append(point)
@@ -191,7 +191,7 @@ def test_what_lies_between_distant_neighbours_is_found_on_the_parabola_through_t
         off = u @ u - 1
         return np.array([np.expm1(40 * off)]), 80 * u[None] * np.exp(40 * off)
 
-    curve = Track(circle)
+    curve = SolutionCurve(circle)
     low = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     high = curve.corrected(np.array([np.cos(0.6), np.sin(0.6)]), low.tangent, np.sin(0.6))
     measure = lambda point: point.u[0] - np.cos(0.4)  # noqa: E731

@@ -29,7 +29,7 @@ from steadyslip.nonlinear.kicks.rest import Rest
 from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import BLOW_UP, CONTACT_LOST, INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
 from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.cycles import cycles
+from steadyslip.nonlinear.orbits.follow import cycles
 
 Array = np.ndarray
 POINTS = 81

@@ -1,6 +1,6 @@
 """Find closed orbits near the ends of many runs by Newton's method, and their stability from multipliers.
 
-Those of one slip event, or one turn, are looked for here; longer ones by `orbits.verify`, one run after another.
+Orbits of one slip event, or one turn, are searched here; longer ones by `orbits.cycle_from_motion`, run by run.
 
 The flow over one period and its derivative come from runs side by side: one from the state itself, two for each
 variable beside it (central differences). That is coarser than the variational equations of `flow`, enough to tell
@@ -18,8 +18,8 @@ import numpy as np
 from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.spans import Judged, advanced_runs, constant_inputs
-from steadyslip.nonlinear.orbits.flow import Runs as ConstantInputs
-from steadyslip.nonlinear.orbits.verify import cycle_near
+from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
+from steadyslip.nonlinear.orbits.flow import FlowRunner
 
 Array = np.ndarray
 BESIDE = 1e-4  # distance of the runs beside, in natural sizes
@@ -44,7 +44,7 @@ def on_long_cycle(runs: Judged, one: int, state: Array, unknowns: Array) -> bool
         np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which], rest.force[which]
     )  # fmt: skip
     jobs = replace(runs.repeated(one, 1).jobs, segments=inputs)
-    cycle = cycle_near(ConstantInputs(jobs, contact=rest.contact), state, unknowns=unknowns) if jobs.posed[0] else None
+    cycle = cycle_near(FlowRunner(jobs, contact=rest.contact), state, unknowns=unknowns) if jobs.posed[0] else None
     return cycle is not None and cycle.growth < 1 - ATTRACTS
 
 

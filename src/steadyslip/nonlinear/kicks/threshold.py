@@ -328,6 +328,7 @@ class _Search:
 
     def _outcomes(self, sizes: Array, effort: float) -> Array:
         """Simulate kicks of some sizes; outcomes as indices into `OUTCOMES`."""
+
         def advanced(count: int) -> None:
             self.tried += count
             if self.progress is not None:

@@ -33,7 +33,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, require_range
 from steadyslip.nonlinear.onset.coefficient import Cubic, coefficients
-from steadyslip.nonlinear.onset.digits import coefficient as in_digits
+from steadyslip.nonlinear.onset.high_precision import coefficient as in_digits
 
 Array = np.ndarray
 TRUSTED = 1e-6

@@ -26,7 +26,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, in_range
-from steadyslip.nonlinear.continuation import Failure, Point, Track, turned_round
+from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve, turned_round
 from steadyslip.nonlinear.onset.coefficient import coefficients
 from steadyslip.nonlinear.onset.hopf import onsets, parameter_along
 
@@ -160,7 +160,7 @@ def hopf_curve(
     edge = min(edges, key=lambda e: abs(e.value - own))
     plane.reference = edge.angular_frequency
     guess = plane.coordinates(float(rig.parameters()[names[0]].value), edge.value, edge.angular_frequency)  # type: ignore[arg-type]
-    curve = Track(plane.equations, tolerance=1e-12)
+    curve = SolutionCurve(plane.equations, tolerance=1e-12)
     try:
         start = curve.start(guess, np.array([1.0, 0.0, 0.0]))
     except Failure:
@@ -267,7 +267,7 @@ class _Plane:
         return ""
 
 
-def _followed(curve: Track, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
+def _followed(curve: SolutionCurve, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
     """Follow the curve one way: its points, and the reason for its end; the last lies on the limit of a range."""
     found: list[Point] = []
     here = start
@@ -288,7 +288,7 @@ def _followed(curve: Track, start: Point, plane: _Plane, spacing: float) -> tupl
     raise InternalError("a curve ended without a reason")
 
 
-def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
+def _on_the_limit(curve: SolutionCurve, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
     """Locate the point at which the curve leaves the range of a parameter; empty if that fails."""
     values = [plane.parameters(p.u) for p in (inside, outside)]
     for i, (low, high) in enumerate(plane.limits):
@@ -305,7 +305,7 @@ def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) ->
 
 
 def _described(
-    rig: Slider | Machine, plane: _Plane, curve: Track, points: list[Point], ends: tuple[str, str]
+    rig: Slider | Machine, plane: _Plane, curve: SolutionCurve, points: list[Point], ends: tuple[str, str]
 ) -> HopfCurve:
     """Build the result: kinds of onset along the points, and where they change."""
     u = np.array([point.u for point in points])

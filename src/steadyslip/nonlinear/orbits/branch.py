@@ -21,9 +21,9 @@ from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
+from steadyslip.nonlinear.orbits.at_value import CyclesAt, cycles_at, simulations
 from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
 from steadyslip.nonlinear.orbits.ranges import Stretch, checks_of, neighbours, stretches_of
-from steadyslip.nonlinear.orbits.values import CyclesAt, cycles_at, simulations
 
 Array = np.ndarray
 
@@ -47,11 +47,11 @@ class CycleBranch(Displayed):
         The cycles of twice the period that begin at the period doublings, of each of them in turn; its parts end at
         another doubling, or in words.
     gaps : tuple of int
-        Numbers of the cycles before which the branch is not continuous: a sheet broke off, and simulation found
+        Numbers of the cycles before which the branch is not continuous: a piece broke off, and simulation found
         another beyond it; 0 where nothing was found at the edge itself. Of doubled cycles: where those of another
         doubling begin.
     broken : tuple of str
-        For each gap, why the sheet before it was not followed any further.
+        For each gap, why the piece before it was not followed any further.
     steady : int
         Which steady sliding, where there are several.
     rtol : float or None
@@ -121,7 +121,7 @@ class CycleBranch(Displayed):
 
         Those of the branch come first, then those of twice the period and so on. If none of them attracts, motions are
         simulated at the value; the stable cycle that one comes to, if it does, is the last, and ``simulated`` of what
-        comes back says what each motion showed: cycles of several slip events may lie on sheets of their own, in
+        comes back says what each motion showed: cycles of several slip events may lie on branches of their own, in
         windows among irregular motion. ``between`` are the special cycles, or ends of a branch, that bound the window
         around the value, ``multiples`` tell cycles of twice the period, and ``missed`` says what could not be computed.
         """

@@ -1,7 +1,7 @@
 """Integrate the motion over given times, with its derivatives in the starting state and one parameter.
 
-Cycles are fixed points of this map. Inputs are constant: `Runs` takes them, and the rig, from prepared jobs, as they
-are; `Flow` leaves one parameter of a rig free, which is driven at its own velocity and not disturbed.
+Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes them, and the rig, from prepared jobs;
+`Flow` leaves one parameter free, of a rig that is driven at its own velocity and not disturbed.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class FlowSetting:
     varied: tuple[Array, Array]
 
 
-class Runs:
+class FlowRunner:
     """Integrates one rig under constant inputs.
 
     Parameters
@@ -176,7 +176,7 @@ class Runs:
         return slice(Setting.ATOL, Setting.ATOL + self.size)
 
     @property
-    def way(self) -> float:
+    def natural_slip(self) -> float:
         """Natural size of slip at the contact that is watched, m."""
         shares = np.abs(self.own.slip) > 0
         return float(np.min(self.scales[shares] / np.abs(self.own.slip[shares])))
@@ -184,7 +184,7 @@ class Runs:
     def _natural_time(self) -> float:
         """Natural time of the rig, s."""
         if self.reduction.model.is_single:
-            return self.way / self.own.speed
+            return self.natural_slip / self.own.speed
         return float(np.ravel(shortest_time(natural_scales(self.own.point, self.reduction)[0]))[0])
 
     # -- one rig
@@ -386,7 +386,7 @@ class Runs:
         return found
 
 
-class Flow(Runs):
+class Flow(FlowRunner):
     """Integrates a rig with one free parameter.
 
     Parameters
@@ -396,7 +396,7 @@ class Flow(Runs):
         Full name of the free parameter.
     branch : int
     rtol : float, optional
-        As for `Runs`.
+        As for `FlowRunner`.
     contact : str, optional
         Name of the contact of a machine that is watched; the first unless given.
     """
@@ -486,7 +486,7 @@ class Flow(Runs):
         shifts = self.setting(value).point.evaluate(_shifts(self.reduction))
         found = self.steady(value)
         for i, shift in enumerate(shifts):
-            found[i] -= ways * self.way / self._share * float(np.ravel(shift)[0])
+            found[i] -= ways * self.natural_slip / self._share * float(np.ravel(shift)[0])
         return found
 
     @property
@@ -495,7 +495,7 @@ class Flow(Runs):
         return self.own.speed / float(self.own.inputs[0])
 
 
-def states_between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
+def states_between(runs: FlowRunner, setting: FlowSetting, record: Array, at: Array) -> Array:
     """States at some times between recorded steps, by cubic Hermite interpolation."""
     time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
     i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
@@ -507,7 +507,7 @@ def states_between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -
     return np.asarray(value + first * s * (1 - s) ** 2 - last * s**2 * (1 - s))
 
 
-def passages(runs: Runs, setting: FlowSetting, record: Array) -> tuple[Array, Array]:
+def passages(runs: FlowRunner, setting: FlowSetting, record: Array) -> tuple[Array, Array]:
     """Times at which slip, accelerating, passes the load point's velocity in a recorded run; its acceleration there.
 
     Both by linear interpolation between steps.

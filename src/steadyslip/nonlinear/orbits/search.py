@@ -10,17 +10,17 @@ import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
-from steadyslip.nonlinear.orbits.special import Known, lies_between
-from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Sheet, Tracer, orbit_of
-from steadyslip.nonlinear.orbits.verify import cycle_near
+from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
+from steadyslip.nonlinear.orbits.special import BranchPoint, lies_between
+from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, BranchPiece, Tracer, orbit_of
 
 Array = np.ndarray
-SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a sheet broke off to the end of the range
+SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a piece broke off to the end of the range
 AHEAD = 2.0  # natural sizes of slip by which a motion begins beside steady sliding
 PATIENCE = 12  # stretches of motion within which it has to come to a cycle
 
 
-def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
+def search_on(tracer: Tracer, pieces: list[BranchPiece]) -> None:
     """Add pieces found by simulation, as long as the last one does not cross the unstable range."""
     low, high = tracer.limits
     onset = tracer.onset
@@ -28,10 +28,10 @@ def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
     if not np.isfinite(limit):
         limit = onset.value + np.sign(limit) * max(1.0, abs(onset.value))
     for share in SEEDS:
-        last = sheets[-1]
+        last = pieces[-1]
         if tracer.interrupted or _crossed(last, tracer):
             return
-        here = last.known[-1].cycle if last.known else None
+        here = last.points[-1].cycle if last.points else None
         start = onset.value
         if here is not None and (here.value - onset.value) * (limit - onset.value) > 0:
             start = here.value
@@ -41,20 +41,20 @@ def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
         except KeyboardInterrupt:
             tracer.interrupted = True
             return
-        if seed is not None and not met(sheets, seed):
-            _add_sheet(tracer, sheets, seed, np.sign(limit - onset.value))
+        if seed is not None and not met(pieces, seed):
+            _add_piece(tracer, pieces, seed, np.sign(limit - onset.value))
 
 
-def _crossed(sheet: Sheet, tracer: Tracer) -> bool:
+def _crossed(piece: BranchPiece, tracer: Tracer) -> bool:
     """True if a piece ends for a physical reason other than leaving the range on the stable side."""
-    if not sheet.whole or not sheet.known:
+    if not piece.whole or not piece.points:
         return False
-    if not sheet.end.startswith("end of the range"):
+    if not piece.end.startswith("end of the range"):
         return True
-    return (sheet.known[-1].cycle.value < tracer.onset.value) == (tracer.onset.stable == "above")
+    return (piece.points[-1].cycle.value < tracer.onset.value) == (tracer.onset.stable == "above")
 
 
-def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> Known | None:
+def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> BranchPoint | None:
     """Simulate from known cycles and from beside steady sliding; return the first cycle that is reached, or None."""
     try:
         starts = [orbit_of(cycle).states[0] for cycle in near] + [tracer.flow.ahead(value, AHEAD)]
@@ -70,38 +70,38 @@ def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> Known | None
     return None
 
 
-def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) -> None:
+def _add_piece(tracer: Tracer, pieces: list[BranchPiece], seed: BranchPoint, away: float) -> None:
     """Follow a cycle both ways: back to a known piece or the edge, and forward."""
     forth = seed if seed.point.tangent[-1] * away > 0 else replace(seed, point=turned_round(seed.point))
     back = replace(forth, point=turned_round(forth.point))
     step = 0.1 * LARGEST_STEP
-    behind = tracer.followed(back.shooting, back, step, met=lambda known: met(sheets, known))
-    ahead = Sheet()
+    behind = tracer.followed(back.shooting, back, step, met=lambda known: met(pieces, known))
+    ahead = BranchPiece()
     if not tracer.interrupted:
         ahead = tracer.followed(forth.shooting, forth, step)
     both = behind.reversed()
-    both.known.pop()  # the seed, which `ahead` begins with
-    both = both.joined(ahead) if ahead.known else behind.reversed()
-    near = behind.known[-1].cycle
+    both.points.pop()  # the seed, which `ahead` begins with
+    both = both.joined(ahead) if ahead.points else behind.reversed()
+    near = behind.points[-1].cycle
     if behind.end == "" and behind.whole:  # met
-        cut_back(sheets[-1], near)
-        sheets[-1] = sheets[-1].joined(both)
+        cut_back(pieces[-1], near)
+        pieces[-1] = pieces[-1].joined(both)
     elif behind.end.startswith("back") and abs(near.value / tracer.onset.value - 1) < 1e-3 and near.amplitude < 0.5:
         both.begins = End("onset", tracer.onset.value)
-        sheets[-1] = both
+        pieces[-1] = both
     else:
-        sheets.append(both)
+        pieces.append(both)
 
 
-def met(sheets: list[Sheet], known: Known) -> bool:
+def met(pieces: list[BranchPiece], known: BranchPoint) -> bool:
     """True if a cycle lies between two neighbours of a known piece."""
-    return any(lies_between(a.cycle, b.cycle, known.cycle) for sheet in sheets for a, b in pairwise(sheet.known))
+    return any(lies_between(a.cycle, b.cycle, known.cycle) for piece in pieces for a, b in pairwise(piece.points))
 
 
-def cut_back(sheet: Sheet, meeting: Cycle) -> None:
+def cut_back(piece: BranchPiece, meeting: Cycle) -> None:
     """Remove the cycles of a piece beyond the place at which another piece met it."""
-    for i in range(len(sheet.known) - 1):
-        if lies_between(sheet.known[i].cycle, sheet.known[i + 1].cycle, meeting):
-            del sheet.known[i + 1 :]
-            sheet.special = [point for point in sheet.special if point.index <= i]
+    for i in range(len(piece.points) - 1):
+        if lies_between(piece.points[i].cycle, piece.points[i + 1].cycle, meeting):
+            del piece.points[i + 1 :]
+            piece.special = [point for point in piece.special if point.index <= i]
             return

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.core.results import ReadOnly
-from steadyslip.nonlinear.continuation import Failure, Track
-from steadyslip.nonlinear.orbits.flow import Runs
+from steadyslip.nonlinear.continuation import Failure, SolutionCurve
+from steadyslip.nonlinear.orbits.flow import FlowRunner
 
 Array = np.ndarray
 ONE = np.ones(1)
@@ -37,11 +37,11 @@ class Orbit(ReadOnly):
 
 
 class Shooting:
-    """Shooting equations of a cycle, to be solved by `continuation.Track`.
+    """Shooting equations of a cycle, to be solved by `continuation.SolutionCurve`.
 
     Parameters
     ----------
-    flow : Runs
+    flow : FlowRunner
     fractions : ndarray (K,)
         Share of the period that each segment takes; they add up to one.
     logarithmic : bool
@@ -53,7 +53,7 @@ class Shooting:
     """
 
     def __init__(
-        self, flow: Runs, fractions: Array, logarithmic: bool, size: float, scales: Array | None = None
+        self, flow: FlowRunner, fractions: Array, logarithmic: bool, size: float, scales: Array | None = None
     ) -> None:  # fmt: skip
         self.flow, self.fractions = flow, fractions
         self.scales = flow.scales if scales is None else scales
@@ -61,7 +61,7 @@ class Shooting:
         self.amplitude = 1.0
         self._last: tuple[bytes, Array, Array] | None = None
 
-    def curve(self) -> Track:
+    def curve(self) -> SolutionCurve:
         """Build the continuation curve of these equations.
 
         Its lengths and angles count the first state, period and parameter only: further segments are the same cycle.
@@ -70,7 +70,7 @@ class Shooting:
         weights[self.flow.size : -2] = 0.0
         tolerance = max(1e-9, 100 * self.flow.noise / self.amplitude)
         rounding = min(ROUNDED * self.flow.rounding, KNOWN * self.amplitude)
-        return Track(self.equations, tolerance, most_turn=0.8, weights=weights, rounding=rounding)
+        return SolutionCurve(self.equations, tolerance, most_turn=0.8, weights=weights, rounding=rounding)
 
     @property
     def segments(self) -> int:
@@ -139,7 +139,7 @@ class Shooting:
         self._last = None
 
     def _run(self, u: Array) -> tuple[Array, Array]:
-        """Ends and sensitivities of the segments; those of the latest unknowns are cached."""
+        """EndRules and sensitivities of the segments; those of the latest unknowns are cached."""
         if self._last is None or self._last[0] != u.tobytes():
             orbit = self.orbit(u)
             times = self.fractions * orbit.period

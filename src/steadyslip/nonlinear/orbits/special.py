@@ -22,7 +22,7 @@ SMALL = 1e-2  # amplitude below which multipliers within rounding of one are jud
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class BranchPoint:
     """A point of a branch of cycles: solution vector, shooting equations, and the cycle with its properties.
 
     `half` is how far the state has moved after half a period, in natural sizes: zero where that was a whole one;
@@ -37,10 +37,10 @@ class Known:
     begin: Orbit | None = None
 
 
-Made = Callable[[Shooting, Point], Known]
+Made = Callable[[Shooting, Point], BranchPoint]
 
 
-def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCycle]:
+def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> list[SpecialCycle]:
     """Locate folds, doublings and tori between two neighbouring points with the same unknowns, in order.
 
     Where stability changes at none of these, as at cycles that are symmetric beyond a multiplier 1, the place is found
@@ -75,7 +75,7 @@ def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCy
     return sorted(found, key=lambda one: one._length)
 
 
-def may_return(earlier: Known, before: Known, now: Known) -> bool:
+def may_return(earlier: BranchPoint, before: BranchPoint, now: BranchPoint) -> bool:
     """True if a test function may have changed sign twice between two neighbours, so that none is seen.
 
     It may where it would change, had it gone on as from the cycle before them; where a multiplier comes closer to the
@@ -113,7 +113,7 @@ def _passing(cycle: Cycle) -> str:
 
 
 def _located(
-    kind: str, before: Known, now: Known, measure: Callable[[Point], float], made: Made, index: int
+    kind: str, before: BranchPoint, now: BranchPoint, measure: Callable[[Point], float], made: Made, index: int
 ) -> SpecialCycle | None:
     """Locate the zero of a test function between two points; None if that fails or is no bifurcation."""
     shooting = now.shooting

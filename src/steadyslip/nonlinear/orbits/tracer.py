@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from steadyslip.core.errors import InternalError
-from steadyslip.nonlinear.continuation import Failure, Point, Track
+from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.onset.hopf import Onset
+from steadyslip.nonlinear.orbits.cut_segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
-from steadyslip.nonlinear.orbits.ends import ENDS, RETRACED, SHRUNK, STANDING, Ends, retraces, stands, winds
+from steadyslip.nonlinear.orbits.cycle_properties import cycle_data
+from steadyslip.nonlinear.orbits.end_reasons import ENDS, RETRACED, SHRUNK, STANDING, EndRules, retraces, stands, winds
 from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
-from steadyslip.nonlinear.orbits.measure import measured
-from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
-from steadyslip.nonlinear.orbits.special import SMALL, Known, changes, may_return
+from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
 Array = np.ndarray
 LARGEST_STEP = 0.5
@@ -27,52 +27,58 @@ CREEP = 60  # so many steps without growing, below a thousandth of the largest, 
 SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # so many steps below this share of the largest, and not growing, are slow
 OF_RANGE = 3.0  # in what a state variable goes through: its measure then
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
-MOST_STEPS = 4_000_000  # of integration for all sheets of a branch: some seconds
+MOST_STEPS = 4_000_000  # of integration for all pieces of a branch: some seconds
 LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
 HIDDEN = 0.1  # share of a small cycle's distance from the edge that rounding may be
 INTERRUPTED = "interrupted by the user"
 
 
 @dataclass(eq=False)
-class Sheet:
+class BranchPiece:
     """Cycles in the order in which they were followed, and the bifurcations among them.
 
     `whole` tells an end that lies in the matter from one where the cycles could not be followed any further; `contact`
     is that of a machine which lifts off there, or is the fastest. `begins` and `stops` are both ends where they are not
-    the first and last cycle; `beyond` is a cycle past the end that is none of the sheet.
+    the first and last cycle; `beyond` is a cycle past the end that is none of the piece.
     """
 
-    known: list[Known] = field(default_factory=list)
+    points: list[BranchPoint] = field(default_factory=list)
     special: list[SpecialCycle] = field(default_factory=list)
     end: str = ""
     whole: bool = False
     contact: str = ""
     begins: End | None = None
     stops: End | None = None
-    beyond: Known | None = None
+    beyond: BranchPoint | None = None
 
     @property
     def bounds(self) -> tuple[End, End]:
         """First and last end of the piece."""
         ends = []
         for end, i in ((self.begins, 0), (self.stops, -1)):
-            if end is None and self.known:
-                end = End("last cycle", self.known[i].cycle.value, self.known[i].cycle)
+            if end is None and self.points:
+                end = End("last cycle", self.points[i].cycle.value, self.points[i].cycle)
             ends.append(end or self.begins or End("last cycle", np.nan))
         return ends[0], ends[1]
 
-    def reversed(self) -> Sheet:
+    def reversed(self) -> BranchPiece:
         """The piece with its cycles in reverse order."""
-        count = len(self.known)
+        count = len(self.points)
         special = [replace(one, index=count - one.index) for one in reversed(self.special)]
-        return Sheet(self.known[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
+        return BranchPiece(self.points[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
 
-    def joined(self, more: Sheet) -> Sheet:
+    def joined(self, more: BranchPiece) -> BranchPiece:
         """Join this piece and `more`, which begins where this one ends."""
-        count = len(self.known)
+        count = len(self.points)
         special = [replace(one, index=one.index + count) for one in more.special]
-        return Sheet(
-            self.known + more.known, self.special + special, more.end, more.whole, more.contact, self.begins, more.stops
+        return BranchPiece(
+            self.points + more.points,
+            self.special + special,
+            more.end,
+            more.whole,
+            more.contact,
+            self.begins,
+            more.stops,
         )
 
 
@@ -86,9 +92,9 @@ class Tracer:
     limits : tuple of float
         Range of the parameter.
     most : int
-        Limit of cycles on a sheet.
+        Limit of cycles on a piece.
     progress : callable, optional
-        Called with the number of cycles found on all sheets and the latest.
+        Called with the number of cycles found on all pieces and the latest.
     """
 
     def __init__(
@@ -96,7 +102,7 @@ class Tracer:
         progress: Callable[[int, Cycle], None] | None = None,
     ) -> None:  # fmt: skip
         self.flow, self.onset, self.limits, self.most, self.progress = flow, onset, limits, most, progress
-        self.ends = Ends(flow, onset)
+        self.ends = EndRules(flow, onset)
         self.logarithmic = flow.domain.low == 0 and onset.value > 0
         self.unit_of_value = abs(onset.value) or 1.0
         self.count, self.interrupted = 0, False
@@ -116,7 +122,7 @@ class Tracer:
         """Convert a parameter value (SI units) to the last unknown of the shooting equations."""
         return float(np.log(value / self.unit_of_value)) if self.logarithmic else value / self.unit_of_value
 
-    # -- where a sheet starts
+    # -- where a piece starts
 
     def small(self, amplitude: float) -> tuple[Shooting, Point]:
         """Solve for the cycle of a given small amplitude of ln v, starting from the critical eigenvector.
@@ -146,7 +152,7 @@ class Tracer:
             raise Failure("its distance from the edge is lost in rounding")
         return shooting, first
 
-    def doubled(self, cycle: Cycle, size: float) -> Known:
+    def doubled(self, cycle: Cycle, size: float) -> BranchPoint:
         """Solve for a cycle of twice the period, `size` (in unknowns) away along the eigenvector of multiplier −1.
 
         Raises
@@ -169,7 +175,7 @@ class Tracer:
         tangent[: flow.size] = aside[0] / np.hypot(shooting.scales, orbit.states[0])
         curve = shooting.curve()
         guess = shooting.packed(replace(orbit, states=states, period=2 * cycle.period))
-        return self.known(shooting, curve.start(guess, tangent / curve.size(tangent)))
+        return self.branch_point(shooting, curve.start(guess, tangent / curve.size(tangent)))
 
     def deviation(self, cycle: Cycle, multiplier: complex) -> tuple[Array, Array]:
         """Eigenvector (n,) of one multiplier at a cycle's start, and the sensitivities of the segments (K, n, n).
@@ -193,7 +199,9 @@ class Tracer:
         scales = flow.scales if orbit.scales is None else orbit.scales
         return vector / np.max(np.abs(vector / np.hypot(scales, orbit.states[0]))), pieces
 
-    def resumed(self, orbit: Orbit, amplitude: float, direction: Array | None = None, length: float = 0.0) -> Known:
+    def resumed(
+        self, orbit: Orbit, amplitude: float, direction: Array | None = None, length: float = 0.0
+    ) -> BranchPoint:
         """Solve for the cycle next to a known orbit; `direction` (first state, period, parameter) orients its tangent.
 
         Raises
@@ -209,14 +217,14 @@ class Tracer:
         tangent /= curve.size(tangent)
         if direction is not None and tangent[[*range(self.flow.size), -2, -1]] @ direction < 0:
             tangent = -tangent
-        return self.known(shooting, curve.corrected(u, tangent, length, 0.1 * amplitude))
+        return self.branch_point(shooting, curve.corrected(u, tangent, length, 0.1 * amplitude))
 
-    # -- the sheet
+    # -- the piece
 
     def followed(
-        self, shooting: Shooting, first: Point | Known, step: float, *, twice: bool = False,
-        met: Callable[[Known], bool] | None = None,
-    ) -> Sheet:  # fmt: skip
+        self, shooting: Shooting, first: Point | BranchPoint, step: float, *, twice: bool = False,
+        met: Callable[[BranchPoint], bool] | None = None,
+    ) -> BranchPiece:  # fmt: skip
         """Follow the cycles from a first one on, as far as possible.
 
         Parameters
@@ -224,69 +232,71 @@ class Tracer:
         twice : bool
             Whether these are cycles of twice a period, which end where that is halved.
         met : callable, optional
-            Says that a cycle is known already; the sheet ends before it.
+            Says that a cycle is known already; the piece ends before it.
         """
-        sheet = Sheet()
+        piece = BranchPiece()
         try:
-            start = self.known(shooting, first) if isinstance(first, Point) else first
-            self._add(sheet, start)
+            start = self.branch_point(shooting, first) if isinstance(first, Point) else first
+            self._add(piece, start)
             for before, here in self._points(start, step):
                 if met is not None and met(here):
-                    sheet.end, sheet.whole, sheet.beyond = "", True, here
-                    return sheet
-                sheet.end, keep = self.ends.finished(self.limits, before, here, sheet.known[0], twice)
-                if sheet.end == ENDS["steady"]:
-                    sheet.stops = self.ends.other_edge([known.cycle for known in sheet.known[-2:]])
-                if sheet.end.startswith("end of the range"):
+                    piece.end, piece.whole, piece.beyond = "", True, here
+                    return piece
+                piece.end, keep = self.ends.finished(self.limits, before, here, piece.points[0], twice)
+                if piece.end == ENDS["steady"]:
+                    piece.stops = self.ends.other_edge([known.cycle for known in piece.points[-2:]])
+                if piece.end.startswith("end of the range"):
                     here = self._at_limit(before, here)
-                    sheet.stops = End("range", here.cycle.value, here.cycle)
+                    piece.stops = End("range", here.cycle.value, here.cycle)
                 if keep:
-                    self._add_changes(sheet, before, here)
-                    self._add(sheet, here)
+                    self._add_changes(piece, before, here)
+                    self._add(piece, here)
                 else:
-                    sheet.beyond = here
-                if not sheet.end and winds(sheet.special):
-                    sheet.end = ENDS["winds"]
-                if not sheet.end and retraces([known.cycle for known in sheet.known]):
-                    sheet.end = ENDS["retraces"]
-                    del sheet.known[-RETRACED:]
-                    sheet.special = [one for one in sheet.special if one.index <= len(sheet.known)]
-                if not sheet.end and stands([known.cycle for known in sheet.known[-STANDING:]]):
-                    sheet.end = ENDS["stands"]
-                if sheet.end:
+                    piece.beyond = here
+                if not piece.end and winds(piece.special):
+                    piece.end = ENDS["winds"]
+                if not piece.end and retraces([known.cycle for known in piece.points]):
+                    piece.end = ENDS["retraces"]
+                    del piece.points[-RETRACED:]
+                    piece.special = [one for one in piece.special if one.index <= len(piece.points)]
+                if not piece.end and stands([known.cycle for known in piece.points[-STANDING:]]):
+                    piece.end = ENDS["stands"]
+                if piece.end:
                     break
-                if len(sheet.known) >= self.most:
-                    sheet.end = f"most_points = {self.most} reached"
+                if len(piece.points) >= self.most:
+                    piece.end = f"most_points = {self.most} reached"
                     break
                 if self.flow.steps > self.most_steps:
-                    sheet.end = f"{(self.most_steps - self.begun) / 1e6:.3g} million steps of integration taken, all "
-                    sheet.end += "that are spent on this part; ask for the rest with between=(low, high)"
+                    piece.end = f"{(self.most_steps - self.begun) / 1e6:.3g} million steps of integration taken, all "
+                    piece.end += "that are spent on this part; ask for the rest with between=(low, high)"
                     break
             lost = {ENDS["retraces"], ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
-            lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}
-            sheet.whole = sheet.end not in lost
+            lost |= set() if piece.points[-1].cycle.stable else {ENDS["precision"]}
+            piece.whole = piece.end not in lost
         except KeyboardInterrupt:
-            sheet.end, sheet.whole, self.interrupted = INTERRUPTED, True, True
+            piece.end, piece.whole, self.interrupted = INTERRUPTED, True, True
         except FlowFailure as failure:
-            sheet.end = self.ends.words(failure.status, failure.contact) or f"broke off: {failure}"
-            sheet.whole, sheet.contact = failure.status == "contact lost", failure.contact
+            piece.end = self.ends.words(failure.status, failure.contact) or f"broke off: {failure}"
+            piece.whole, piece.contact = failure.status == "contact lost", failure.contact
         except (Failure, np.linalg.LinAlgError) as failure:
-            sheet.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
-        return sheet
+            piece.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
+        return piece
 
-    def _add_changes(self, sheet: Sheet, before: Known, here: Known) -> None:
+    def _add_changes(self, piece: BranchPiece, before: BranchPoint, here: BranchPoint) -> None:
         """Append the bifurcations between two neighbouring cycles; of several, with a cycle between each two."""
-        earlier = sheet.known[-2] if len(sheet.known) > 1 else before
-        for one in self._changes(earlier, before, here, len(sheet.known), HALVINGS):
-            last = sheet.special[-1] if sheet.special else None
-            if last is not None and last.index == len(sheet.known):
+        earlier = piece.points[-2] if len(piece.points) > 1 else before
+        for one in self._changes(earlier, before, here, len(piece.points), HALVINGS):
+            last = piece.special[-1] if piece.special else None
+            if last is not None and last.index == len(piece.points):
                 with suppress(Failure):
-                    self._add(sheet, self._on_the_way(before, here, 0.5 * (last._length + one._length)))
-            sheet.special.append(replace(one, index=len(sheet.known)))
+                    self._add(piece, self._on_the_way(before, here, 0.5 * (last._length + one._length)))
+            piece.special.append(replace(one, index=len(piece.points)))
 
-    def _changes(self, earlier: Known, before: Known, here: Known, index: int, halvings: int) -> list[SpecialCycle]:
+    def _changes(
+        self, earlier: BranchPoint, before: BranchPoint, here: BranchPoint, index: int, halvings: int
+    ) -> list[SpecialCycle]:
         """Bifurcations between two neighbouring cycles; halves the step where two of one kind may cancel."""
-        found = changes(before, here, self.known, index)
+        found = changes(before, here, self.branch_point, index)
         if found or halvings == 0 or not may_return(earlier, before, here):
             return found
         try:
@@ -296,7 +306,7 @@ class Tracer:
         first = self._changes(earlier, before, middle, index, halvings - 1)
         return first + self._changes(before, middle, here, index, halvings - 1)
 
-    def _on_the_way(self, before: Known, here: Known, length: float) -> Known:
+    def _on_the_way(self, before: BranchPoint, here: BranchPoint, length: float) -> BranchPoint:
         """Solve for the cycle at an arclength between those of two neighbours.
 
         Raises
@@ -310,16 +320,16 @@ class Tracer:
 
         ends = measure(before.point), measure(here.point)
         point = here.shooting.curve().located(before.point, here.point, measure, *ends, width=np.inf)[1]
-        return self.known(here.shooting, point)
+        return self.branch_point(here.shooting, point)
 
-    def _add(self, sheet: Sheet, known: Known) -> None:
+    def _add(self, piece: BranchPiece, known: BranchPoint) -> None:
         """Append a point to the piece and report progress."""
-        sheet.known.append(known)
+        piece.points.append(known)
         self.count += 1
         if self.progress is not None:
             self.progress(self.count, known.cycle)
 
-    def _points(self, here: Known, step: float) -> Iterator[tuple[Known, Known]]:
+    def _points(self, here: BranchPoint, step: float) -> Iterator[tuple[BranchPoint, BranchPoint]]:
         """Yield pairs of consecutive points of the piece, both in the same unknowns.
 
         Cycles are cut into segments anew where they are too unstable, where deviations grow and shrink again so much
@@ -329,11 +339,11 @@ class Tracer:
         limit, error, again, idle = MOST_GROWTH, LOST, True, 0
         steps: list[float] = []
         while True:
-            made: dict[int, Known] = {}
+            made: dict[int, BranchPoint] = {}
             curve = self._curve(here)
 
-            def accept(point: Point, shooting: Shooting = here.shooting, made: dict[int, Known] = made) -> None:
-                made[0] = self.known(shooting, point)
+            def accept(point: Point, shooting: Shooting = here.shooting, made: dict[int, BranchPoint] = made) -> None:
+                made[0] = self.branch_point(shooting, point)
                 if made[0].cycle.amplitude > SHRUNK and self.ends.slows(made[0]):
                     raise Failure("the cycle begins where slip slows down")
 
@@ -370,11 +380,11 @@ class Tracer:
             if finer is not None:
                 here = finer
 
-    def _rescaled(self, known: Known) -> Known | None:
+    def _rescaled(self, known: BranchPoint) -> BranchPoint | None:
         """Restate a point with states measured by their range in the cycle; None if that changes the scales little.
 
         Beside a body that sticks another may ring on and be anywhere in its small oscillation when slip begins, by
-        turns ahead and behind as the parameter changes. Measured by natural sizes that makes the branch wriggle.
+        turns ahead and behind as the parameter changes. CycleData by natural sizes that makes the branch wriggle.
         """
         shooting, count = known.shooting, self.flow.size
         scales = np.maximum(self.flow.scales, OF_RANGE * known.extent)
@@ -389,7 +399,7 @@ class Tracer:
         except (Failure, np.linalg.LinAlgError):
             return None
 
-    def _begun_anew(self, known: Known) -> Known | None:
+    def _begun_anew(self, known: BranchPoint) -> BranchPoint | None:
         """Restate a point with the start of the cycle at a steeper passage; None if there is none."""
         if known.begin is None:
             return None
@@ -399,13 +409,13 @@ class Tracer:
         except (Failure, np.linalg.LinAlgError):
             return None
 
-    def _curve(self, known: Known) -> Track:
+    def _curve(self, known: BranchPoint) -> SolutionCurve:
         """Continuation curve through a point, with a Newton tolerance that suits its rounding errors."""
         curve = known.shooting.curve()
         curve.tolerance = max(curve.tolerance, min(1e-6, 0.01 * abs(known.cycle.trivial - 1)))
         return curve
 
-    def _finer(self, known: Known) -> Known | None:
+    def _finer(self, known: BranchPoint) -> BranchPoint | None:
         """Restate a point with more shooting segments; None if more are of no use."""
         try:
             orbit = cut(known.shooting, known.point.u)
@@ -416,7 +426,7 @@ class Tracer:
         except (Failure, np.linalg.LinAlgError):
             return None
 
-    def known(self, shooting: Shooting, point: Point) -> Known:
+    def branch_point(self, shooting: Shooting, point: Point) -> BranchPoint:
         """Derive the cycle and its properties from a solution of the shooting equations.
 
         Raises
@@ -427,15 +437,15 @@ class Tracer:
         orbit = shooting.orbit(point.u)
         away = np.abs(orbit.states - self.flow.steady(orbit.value)) / self.flow.scales
         shooting.amplitude = float(min(1.0, away.max()))
-        found = measured(shooting, point.u)
+        found = cycle_data(shooting, point.u)
         if self.flow.led and found.cycle.multiplier_error > LOST:  # may be for one trial that the motion leads
             self.flow.led = False
             shooting.forget()
-            found = measured(shooting, point.u)
+            found = cycle_data(shooting, point.u)
         if found.turns > 1:
             raise Failure(f"a shorter cycle, run through {found.turns} times")
         cycle = replace(found.cycle, stable=self._attracts(found.cycle))
-        return Known(point, shooting, cycle, found.half, found.extent, found.begin)
+        return BranchPoint(point, shooting, cycle, found.half, found.extent, found.begin)
 
     def _attracts(self, cycle: Cycle) -> bool:
         """True if all multipliers lie inside the unit circle; where that is too close, decided by the kind of onset."""
@@ -445,7 +455,7 @@ class Tracer:
             return self.onset.kind == "supercritical"
         return cycle.growth < 1
 
-    def _at_limit(self, inside: Known, outside: Known) -> Known:
+    def _at_limit(self, inside: BranchPoint, outside: BranchPoint) -> BranchPoint:
         """Solve for the cycle at the limit of the parameter's range, between two neighbours."""
         low, high = self.limits
         try:
@@ -453,7 +463,7 @@ class Tracer:
         except Failure:
             return outside
 
-    def between(self, near: Known, far: Known, value: float) -> Known:
+    def between(self, near: BranchPoint, far: BranchPoint, value: float) -> BranchPoint:
         """Solve for the cycle at a parameter value between those of two neighbours with the same unknowns.
 
         Raises
@@ -475,7 +485,7 @@ class Tracer:
         point = curve.corrected(guess, np.eye(len(guess))[-1], close.length, 0.1 * shooting.amplitude)
         if point.tangent @ (curve.weights * close.tangent) < 0:
             point = replace(point, tangent=-point.tangent)
-        return self.known(shooting, point)
+        return self.branch_point(shooting, point)
 
 
 def orbit_of(cycle: Cycle) -> Orbit:

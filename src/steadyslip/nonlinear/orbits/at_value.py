@@ -13,11 +13,11 @@ from steadyslip.core.format import format_quantity
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle
+from steadyslip.nonlinear.orbits.cycle_from_motion import motion_from
 from steadyslip.nonlinear.orbits.flow import Flow
 from steadyslip.nonlinear.orbits.ranges import Neighbour
 from steadyslip.nonlinear.orbits.search import AHEAD, PATIENCE
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
-from steadyslip.nonlinear.orbits.verify import motion_from
 
 Array = np.ndarray
 MOST_STEPS_BETWEEN = 40
@@ -168,7 +168,7 @@ def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
     curve = here.shooting.curve()
     step = min(LARGEST_STEP, float(np.linalg.norm(ends[1] - ends[0])))
     for _, point in zip(range(MOST_STEPS_BETWEEN), curve.follow(here.point, step, 1e-9, LARGEST_STEP), strict=False):
-        now = tracer.known(here.shooting, point)
+        now = tracer.branch_point(here.shooting, point)
         if (here.cycle.value - value) * (now.cycle.value - value) <= 0:
             return tracer.between(here, now, value).cycle
         here = now

@@ -18,12 +18,12 @@ from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
-from steadyslip.nonlinear.orbits.doublings import doubled_sheets
+from steadyslip.nonlinear.orbits.doublings import doubled_pieces
 from steadyslip.nonlinear.orbits.flow import Flow
 from steadyslip.nonlinear.orbits.ranges import is_open, is_undecided
 from steadyslip.nonlinear.orbits.search import search_on
 from steadyslip.nonlinear.orbits.special import SMALL
-from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, Sheet, Tracer, orbit_of
+from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, BranchPiece, Tracer, orbit_of
 
 Array = np.ndarray
 SMALLEST = 1e-12  # amplitude that differs from none by more than rounding
@@ -96,38 +96,38 @@ def cycles(
     Pseudo-arclength continuation of shooting equations, with the variational equations integrated beside the
     motion; several shooting segments where one period is too unstable. A point is accepted only as the continuation
     of the one before, and as a primitive cycle, which does not return earlier. Where the branch from the edge breaks
-    off before it has crossed the unstable range (canards, sheets behind a subcritical onset), motions are simulated
-    there; from the cycle that one comes to, if Newton's method confirms it, another sheet is followed both ways, and
+    off before it has crossed the unstable range (canards, pieces behind a subcritical onset), motions are simulated
+    there; from the cycle that one comes to, if Newton's method confirms it, another piece is followed both ways, and
     joined if it meets the first (`CycleBranch.gaps`). Cycles of twice the period are entered at each doubling along the
     eigenvector of the multiplier −1, and followed to the doubling at which they end or until they cannot be followed.
     """
     onset = hopf(rig, along, branch=branch)
     flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol, onset.contact)
     tracer = Tracer(flow, onset, _limits(rig, onset, between), most_points, progress)
-    sheets = [_from_the_edge(tracer, amplitude)]
-    search_on(tracer, sheets)
-    return _branch(tracer, sheets, rtol, doublings)
+    pieces = [_from_the_edge(tracer, amplitude)]
+    search_on(tracer, pieces)
+    return _branch(tracer, pieces, rtol, doublings)
 
 
-def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: int) -> CycleBranch:
+def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doublings: int) -> CycleBranch:
     """Join the pieces of a branch, follow the cycles of twice the period, and build the result."""
-    whole, gaps, ends = sheets[0], [], [sheets[0].end]
-    for sheet in sheets[1:]:
-        gaps.append(len(whole.known))
-        ends.append(sheet.end)
-        whole = whole.joined(sheet)
+    whole, gaps, ends = pieces[0], [], [pieces[0].end]
+    for piece in pieces[1:]:
+        gaps.append(len(whole.points))
+        ends.append(piece.end)
+        whole = whole.joined(piece)
     doubled = None
     flips = [point.cycle for point in whole.special if point.kind == "period doubling"]
     if flips and doublings > 0 and not tracer.interrupted:
-        further = doubled_sheets(tracer, flips)
-        doubled = _branch(tracer, further, rtol, doublings - 1) if further[0].known or not tracer.interrupted else None
+        further = doubled_pieces(tracer, flips)
+        doubled = _branch(tracer, further, rtol, doublings - 1) if further[0].points or not tracer.interrupted else None
     if tracer.interrupted and doubled is None:
         ends[-1] = INTERRUPTED
     onset, flow = tracer.onset, tracer.flow
-    found, repeated = _repeated(tracer, [known.cycle for known in whole.known])
+    found, repeated = _repeated(tracer, [known.cycle for known in whole.points])
     return CycleBranch(
         onset.rig, onset.along, onset.unit, onset, tuple(found), tuple(whole.special), ends[-1], doubled,
-        tuple(gaps), tuple(ends[:-1]), flow.branch, rtol, whole.contact, tuple(sheet.bounds for sheet in sheets),
+        tuple(gaps), tuple(ends[:-1]), flow.branch, rtol, whole.contact, tuple(piece.bounds for piece in pieces),
         repeated,
     )  # fmt: skip
 
@@ -153,34 +153,34 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
     return found, repeated
 
 
-def _from_the_edge(tracer: Tracer, amplitude: float | None) -> Sheet:
+def _from_the_edge(tracer: Tracer, amplitude: float | None) -> BranchPiece:
     """Follow the branch piece that begins at the edge of stability.
 
     Where small cycles drown in rounding, as next to an almost degenerate onset, it begins at larger ones.
     """
     smallest = max(1e-6, 1e9 * tracer.flow.noise)
-    tried: list[Sheet] = []
+    tried: list[BranchPiece] = []
     for size in (smallest, *(size for size in LARGER if size > smallest)) if amplitude is None else (amplitude,):
         tried.append(_of_amplitude(tracer, size))
-        known = tried[-1].known
+        known = tried[-1].points
         if tried[-1].whole or tracer.interrupted or (known and known[-1].cycle.amplitude > SMALL):
             break
-    return max(tried, key=lambda sheet: sheet.known[-1].cycle.amplitude if sheet.known else 0.0)
+    return max(tried, key=lambda piece: piece.points[-1].cycle.amplitude if piece.points else 0.0)
 
 
-def _of_amplitude(tracer: Tracer, amplitude: float) -> Sheet:
+def _of_amplitude(tracer: Tracer, amplitude: float) -> BranchPiece:
     """Follow the branch piece that begins at the edge with the cycle of a given small amplitude of ln v."""
     onset = End("onset", tracer.onset.value)
     try:
         shooting, first = tracer.small(amplitude)
     except np.linalg.LinAlgError:
         why = "broke off: no small cycle was found at the edge, where numbers leave floating point"
-        return Sheet(end=why, begins=onset)
+        return BranchPiece(end=why, begins=onset)
     except Failure as failure:
-        return Sheet(end=f"broke off: no small cycle was found at the edge ({failure})", begins=onset)
-    sheet = tracer.followed(shooting, first, amplitude)
-    sheet.begins = onset
-    return sheet
+        return BranchPiece(end=f"broke off: no small cycle was found at the edge ({failure})", begins=onset)
+    piece = tracer.followed(shooting, first, amplitude)
+    piece.begins = onset
+    return piece
 
 
 def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) -> tuple[float, float]:

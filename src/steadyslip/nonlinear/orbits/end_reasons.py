@@ -15,7 +15,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow
-from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, Known, lies_between
+from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, BranchPoint, lies_between
 
 WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
 STANDING = 12  # so many cycles within a twentieth of each other, at one value but for rounding, are no progress
@@ -46,14 +46,14 @@ ENDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class EndRules:
     """Criteria for the end of a branch piece, for one rig and onset."""
 
     flow: Flow
     onset: Onset
 
     def finished(
-        self, limits: tuple[float, float], before: Known, now: Known, first: Known, twice: bool
+        self, limits: tuple[float, float], before: BranchPoint, now: BranchPoint, first: BranchPoint, twice: bool
     ) -> tuple[str, bool]:
         """Reason for which a piece ends at this cycle (empty if it goes on); True if the cycle still belongs to it."""
         low, high = limits
@@ -92,7 +92,7 @@ class Ends:
         head, colon, reason = ENDS[status].format(**words).partition(": ")
         return f"{head} at {contact}{colon}{reason}" if contact else head + colon + reason
 
-    def slows(self, now: Known) -> bool:
+    def slows(self, now: BranchPoint) -> bool:
         """True if slip decelerates where the cycle starts: the continuation has passed a cycle of zero size.
 
         With mass rounding in the state is most of the acceleration; what is carried round once is true.

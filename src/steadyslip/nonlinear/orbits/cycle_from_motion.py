@@ -17,8 +17,8 @@ from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle
-from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs, passages, states_between
-from steadyslip.nonlinear.orbits.measure import amplitude, measured
+from steadyslip.nonlinear.orbits.cycle_properties import amplitude, cycle_data
+from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowRunner, FlowSetting, passages, states_between
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
@@ -34,14 +34,14 @@ MOST_STEPS = 40_000
 
 
 def cycle_near(
-    runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
+    runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
     unknowns: Array | None = None,
 ) -> Cycle | None:  # fmt: skip
     """Cycle that a motion is on or approaches, or None.
 
     Parameters
     ----------
-    runs : Runs
+    runs : FlowRunner
     state : ndarray (n,)
         The kernel's state variables (``outcome.state[row]``), anywhere near the suspected cycle.
     value : float
@@ -63,7 +63,7 @@ def cycle_near(
 
 
 def motion_from(
-    runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
+    runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
     unknowns: Array | None = None,
 ) -> Simulated:  # fmt: skip
     """Simulate from a state: the cycle that the motion approaches, or a description of what it does instead.
@@ -112,7 +112,7 @@ class _Stretch:
 
 
 def _stretches(
-    runs: Runs, setting: FlowSetting, state: Array, unknowns: Array | None, patience: int
+    runs: FlowRunner, setting: FlowSetting, state: Array, unknowns: Array | None, patience: int
 ) -> Iterator[_Stretch]:
     """Yield the motion in parts of some returns each."""
     span, spent = FIRST_SPAN * runs.time, 0
@@ -168,14 +168,14 @@ def _ends(speeds: list[Array]) -> tuple[float, float]:
     return float(min(one.min() for one in speeds)), float(max(one.max() for one in speeds))
 
 
-def _candidates(runs: Runs, seen: _Stretch) -> Array:
+def _candidates(runs: FlowRunner, seen: _Stretch) -> Array:
     """Numbers of returns that a period may have: those after which the motion was close to its present place."""
     places = np.arcsinh(seen.states / runs.scales)
     away = np.abs(places[-2::-1] - places[-1]).max(axis=1)
     return 1 + np.flatnonzero(away < CLOSE * min(1.0, seen.extent))[:MOST_TRIES]
 
 
-def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None:
+def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle | None:
     """Solve for the cycle next to the last return, with `back` returns per period; None if there is none."""
     shooting = Shooting(runs, np.ones(1), False, abs(value) or 1.0)
     shooting.amplitude = min(1.0, seen.extent)
@@ -186,7 +186,7 @@ def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None
     still = np.eye(len(guess))[-1]  # the parameter stays
     try:
         point = shooting.curve().corrected(guess, still, 0.0, NEAR * shooting.amplitude)
-        seen_once = measured(shooting, point.u)
+        seen_once = cycle_data(shooting, point.u)
     except (Failure, np.linalg.LinAlgError):
         return None
     cycle = seen_once.cycle

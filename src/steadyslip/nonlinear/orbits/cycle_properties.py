@@ -9,7 +9,7 @@ import numpy as np
 from steadyslip.kernels.layout import Recorded, Sampled
 from steadyslip.motion.engine import Outcome
 from steadyslip.nonlinear.orbits.cycle import Cycle, CycleRange
-from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, passages, states_between
+from steadyslip.nonlinear.orbits.flow import FlowFailure, FlowRunner, passages, states_between
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
 Array = np.ndarray
@@ -34,14 +34,14 @@ def _range(velocity: Array, normal: Array, pull: Array) -> CycleRange:
     )  # fmt: skip
 
 
-def _start(flow: Runs, seen: dict[str, Array]) -> dict[str, float]:
+def _start(flow: FlowRunner, seen: dict[str, Array]) -> dict[str, float]:
     """Initial values, by variable name (SI units), with which a simulation starts on the cycle."""
     variables = [item.name for item in flow.reduction.model.variables]
     return {name: float(seen[name][0]) for name in (*variables, *(["v"] if "v" in seen else []))}
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class CycleData:
     """A cycle with its properties, computed by integrating it over one period.
 
     Attributes
@@ -67,7 +67,7 @@ class Measured:
     begin: Orbit | None = None
 
 
-def measured(shooting: Shooting, u: Array) -> Measured:
+def cycle_data(shooting: Shooting, u: Array) -> CycleData:
     """Compute the cycle that a solution vector `u` of the shooting equations stands for, and its properties.
 
     Raises
@@ -125,7 +125,7 @@ def measured(shooting: Shooting, u: Array) -> Measured:
         _orbit=orbit,
     )
     extent = np.asarray(np.ptp(np.vstack(visited), axis=0))
-    return Measured(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0], extent, beginning.orbit)
+    return CycleData(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0], extent, beginning.orbit)
 
 
 class _Begin:

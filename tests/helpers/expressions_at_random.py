@@ -176,7 +176,7 @@ def wrong(seed, count=20, depth=3, refused=0.02):
     while len(found) < count:
         try:
             e = sp.sympify(drawn.expression(depth))
-        except (ValueError, TypeError):  # SymPy compares nothing complex, nor what has branches without an end
+        except (ValueError, TypeError, NotImplementedError):  # SymPy cannot make it: compares nothing complex, say
             continue
         if e.has(sp.I, sp.zoo, sp.nan) or not e.free_symbols:
             continue

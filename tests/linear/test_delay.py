@@ -11,7 +11,7 @@ import steadyslip as ss
 from command import run
 from delays import some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
-from steadyslip.linear import quasi, windows
+from steadyslip.linear import quasipolynomial as quasi, windows
 from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.waves import Waves
@@ -387,15 +387,15 @@ def test_roots_followed_through_their_crossings_are_those_that_are_counted(monke
         p[0, -1] = abs(p[0, -1])
         p[1:, -1] = q[:, -1] = 0.0
         h = np.append(0.0, 10.0 ** chance.uniform(-1, 1, size=2))
-        fast = float(np.max(windows._fastest(p, q, np.geomspace(0.2, 5.0, 9))))
+        fast = float(np.max(windows._frequency_bound(p, q, np.geomspace(0.2, 5.0, 9))))
         found = windows._candidates(p, q, h, 0.2, 5.0, fast) if fast < 50 else None
         if found is None or len(found[0]) < 3:
             continue
         ends = np.concatenate([[0.2], found[0], [5.0]])
         each = p, q, h, *found, np.sqrt(ends[:-1] * ends[1:])
-        own = windows._right(*each)
+        own = windows._count_each(*each)
         monkeypatch.setattr(windows, "count_right", lambda c, h: (asked.append(len(c)), counts(c, h))[1])
-        assert np.array_equal(windows._right_by_crossings(*each), own)
+        assert np.array_equal(windows._count_by_crossings(*each), own)
         monkeypatch.undo()
         cells += len(own)
     assert sum(asked) < 0.5 * cells  # the few ends of rows of crossings; wrong directions would have all counted

@@ -1,7 +1,7 @@
-"""The argument principle for sums of polynomials times exp(−sh): how often they turn along the imaginary axis.
+"""Count of roots right of the imaginary axis of sums of polynomials times exp(−sh), by the argument principle.
 
-Where one term outweighs all others the sum turns with it, however long the delays are; so it is but near the few
-frequencies at which two terms are alike.
+Where one term is larger than all others together, the argument of the sum follows that of the term, however long the
+delays are. The axis needs to be resolved only near the few frequencies at which two terms are equal in size.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from steadyslip.linear.roots import Array, ComplexArray, evaluate
 
-UNKNOWN = -2
-_MOST = 400_000  # pieces of the axis that are neither short enough nor led by one term, at a time, of all rigs
-_NEAR = 1e-13  # relative length of a piece that is not cut any more: a root is on it
+UNKNOWN = -2  # count of roots where counting takes too long
+_MOST = 400_000  # unresolved pieces of the axis, of all rigs together, before counting is given up; by trial: memory
+_NEAR = 1e-13  # relative length at which a piece is not cut further (rounding): a root lies on it
 
 
 def bound_on_axis(c: Array) -> float:
-    """A size that no root to the right of the imaginary axis has (Fujiwara), delayed terms at their largest."""
+    """Upper bound (Fujiwara) of |s| of roots right of the imaginary axis, for coefficients c (m, n+1) of one rig."""
     size = np.abs(c)
     top = int(np.flatnonzero(np.any(size > 0, axis=0))[-1])
     if top == 0:
@@ -63,7 +63,7 @@ class SumsOnAxis:
     h: Array
 
     def at(self, row: NDArray[np.int64], omega: Array) -> tuple[ComplexArray, ComplexArray]:
-        """All terms without e^(−sh), (m, places), and the sum."""
+        """Terms at iω without their factors exp(−sh), (m, frequencies), and the sum with these factors."""
         terms = np.array([evaluate(self.c[row, j], 1j * omega) for j in range(self.c.shape[1])])
         late = (p * np.exp(-1j * self.h[row, j + 1] * omega) for j, p in enumerate(terms[1:]))
         return terms, np.asarray(terms[0] + sum(late))
@@ -80,16 +80,16 @@ class SumsOnAxis:
         return _Pieces(row[:, 1:].ravel(), *both)
 
     def cut(self, old: _Pieces) -> _Pieces:
-        """All in two."""
+        """Pieces cut into halves."""
         middle = 0.5 * (old.omega[0] + old.omega[1])
         parts = zip((old.omega, old.terms, old.total), (middle, *self.at(old.row, middle)), strict=True)
         both = (np.concatenate([np.stack([own[0], new]), np.stack([new, own[1]])], axis=-1) for own, new in parts)
         return _Pieces(np.tile(old.row, 2), *both)
 
-    def settled(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
-        """Pieces, with the place of the term that leads on each, −1 where none does.
+    def resolved_pieces(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
+        """Pieces on which the change of argument is known, with the index of the dominant term, −1 where none is.
 
-        A rig that has too many ends with some that are `UNKNOWN`.
+        For a rig that needs too many pieces, the last ones come with `UNKNOWN` instead.
         """
         sizes = np.abs(self.c)
         steep = np.sum(sizes[..., 1:] * np.arange(1, self.c.shape[-1]), axis=1)
@@ -110,10 +110,10 @@ class SumsOnAxis:
             yield pieces.where(~done & ~few[row]), np.full(np.count_nonzero(~done & ~few[row]), UNKNOWN)
             pieces = self.cut(pieces.where(~done & few[row]))
 
-    def turned(self) -> Array:
-        """By which angle each of the sums turns in all, (rows,); NaN where pieces are too many."""
+    def change_of_argument(self) -> Array:
+        """Change of argument (rad) of each sum along the whole axis, (rows,); NaN where pieces are too many."""
         total = np.zeros(len(self.c))
-        for pieces, leader in self.settled():
+        for pieces, leader in self.resolved_pieces():
             which = np.maximum(leader, 0)
             lead = np.take_along_axis(pieces.terms, which[None, None], axis=1)[:, 0]
             late = self.h[pieces.row, which]
@@ -126,9 +126,10 @@ class SumsOnAxis:
 
 
 def count_by_argument(c: Array, h: Array) -> NDArray[np.int64]:
-    """Roots to the right by the argument principle: n/2 less the turns of the sums (rows, m, n+1) along the axis.
+    """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m).
 
-    `UNKNOWN` where these are too many.
+    `UNKNOWN` where counting takes too long. By the argument principle the number is n/2 minus the change of argument
+    along the positive imaginary axis over π.
     """
     axis = SumsOnAxis(c, h)
     present = np.any(c != 0, axis=1)
@@ -137,5 +138,5 @@ def count_by_argument(c: Array, h: Array) -> NDArray[np.int64]:
     rows = np.arange(len(c))
     last = axis.at(rows, end[:, 0])[1]
     beyond = np.angle(1j ** (top % 4) * c[rows, 0, top] / last)  # there the highest power leads by less than π/2
-    found = top / 2 - (axis.turned() + beyond) / np.pi
+    found = top / 2 - (axis.change_of_argument() + beyond) / np.pi
     return np.asarray(np.where(np.isnan(found), UNKNOWN, np.rint(found)), dtype=np.int64)

@@ -14,22 +14,22 @@ from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial
 
-_FAR = 1e12  # times such a size, and its inverse, beyond which rounding decides where a parameter has an edge
-_FACTORS = np.array([1 / APART, 1.0, APART])  # of a size of the parameter, at which its polynomial is asked for
-_SIZES = 3  # tried of a parameter, until one is near that at which its part of the polynomial is like the rest
-_WINDOWS = 8  # of a rig with delay that arrays of them have room for
+_FAR = 1e12  # edges beyond this factor from the size of a parameter, up or down, are rounding of infinity or zero
+_FACTORS = np.array([1 / APART, 1.0, APART])  # multiples of that size at which the polynomial is evaluated
+_SIZES = 3  # attempts at a size at which p and f q have coefficients of similar size; by trial
+_WINDOWS = 8  # stable intervals kept per rig with delay in arrays; by trial: memory against completeness
 
 
-def not_linear(name: str) -> NotAvailable:
-    """The error that says so."""
+def not_linear_error(name: str) -> NotAvailable:
+    """Error for a parameter on which the characteristic equation does not depend linearly."""
     return NotAvailable(
         f"the equations do not depend on {name} linearly, so that its stable set has no exact form; boundary(rig, "
         f"{name!r}) scans for its edges"
     )
 
 
-def too_late(name: str) -> NotAvailable:
-    """The error of a rig whose own oscillations turn thousands of times during the delay."""
+def too_many_windows_error(name: str) -> NotAvailable:
+    """Error for a rig with a delay of so many periods that its stable windows cannot be listed."""
     return NotAvailable(
         f"the delay is so long for this rig that the windows of {name} are too many to be listed; boundary(rig, "
         f"{name!r}) finds those next to its own value"
@@ -37,19 +37,19 @@ def too_late(name: str) -> NotAvailable:
 
 
 def most_values(point: OperatingPoint) -> int:
-    """How many intervals `sets_of` has room for."""
+    """Largest number of intervals per rig that `sets_of` returns."""
     return _WINDOWS if point.model.delays else most_intervals(characteristic(point).shape[-1] - 1)
 
 
 def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Array:
-    """Stable intervals of one parameter for arrays of rigs, (..., m, 2), NaN padded.
+    """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), NaN padded.
 
-    `size` (...) takes the place of the values of rigs with delay, where these need not be positive.
+    `size` (...) are positive values to search around for rigs with delay; by default the rigs' own values.
 
     Raises
     ------
     NotAvailable
-        If it does not enter linearly.
+        If the parameter does not enter linearly.
     """
     most = most_values(point)
     found = np.full((*point.shape, most, 2), np.nan)
@@ -65,19 +65,19 @@ def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Arra
         alone = one.with_arguments([np.reshape(a, -1)[0] for a in one.arguments], ())
         own = linear_set(alone, name, None if sizes is None else float(sizes[i]))
         if own is None:
-            raise not_linear(name) if size is None else too_late(name)
+            raise not_linear_error(name) if size is None else too_many_windows_error(name)
         count = min(len(own.intervals), most)
         flat[i, :count] = own.intervals[:count]
     return found
 
 
 def linear_sets(point: OperatingPoint, name: str) -> StableSet:
-    """The stable sets of one parameter for arrays of rigs without delay, whatever value of it these have.
+    """Stable sets of one parameter for arrays of rigs without delay; they do not depend on the rigs' own values of it.
 
     Raises
     ------
     NotAvailable
-        If it does not enter linearly.
+        If the parameter does not enter linearly.
     """
     place = list(point.model.parameters).index(name)
     own = np.broadcast_to(np.asarray(point.arguments[place], dtype=float), point.shape)
@@ -89,26 +89,26 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
         known = np.all(np.isfinite(c), axis=(0, -1))
         p, q, bent = _split(c)
         if np.any(known & (bent | ~np.any(q, axis=-1))):
-            raise not_linear(name)
-        factor = np.where(known, _alike(p, q), 1.0)
+            raise not_linear_error(name)
+        factor = np.where(known, _balancing_factor(p, q), 1.0)
         far = (factor < 1 / APART) | (factor > APART)
         if not np.any(far):
             break
         size = np.where(far, size * factor, size)
-    found, unit = _resolved(stable_set(p, q)), size[..., None]
+    found, unit = _with_far_edges_removed(stable_set(p, q)), size[..., None]
     intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
     return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
 
 
 def _split(c: Array) -> tuple[Array, Array, Array]:
-    """p and q of p + f q from values at three factors f, first axis; and where these do not lie on a line."""
+    """p and q of p + f q from coefficients `c` (3, ...) at the factors f `_FACTORS`; True where they are not linear."""
     low, own, high = (columns(one) for one in c)
     p, q, straight = linear_split(low, own, high)
     return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
 
 
-def _resolved(found: StableSet) -> StableSet:
-    """A set in units of the parameter's own value, with edges that are rounding of zero or infinity as these."""
+def _with_far_edges_removed(found: StableSet) -> StableSet:
+    """Stable set with edges beyond the factor `_FAR` moved to 0 or infinity; edges are multiples of a size near 1."""
     ends = np.where(found.intervals < 1 / _FAR, 0.0, np.where(found.intervals > _FAR, np.inf, found.intervals))
     ends = np.where((ends[..., :1] < ends[..., 1:]), ends, np.nan)
     order = np.argsort(np.isnan(ends[..., 0]), axis=-1, kind="stable")  # empty intervals last
@@ -121,10 +121,10 @@ def _resolved(found: StableSet) -> StableSet:
 def linear_set(
     point: OperatingPoint, name: str, size: float | None = None, reach: tuple[float, float] | None = None
 ) -> StableSet | None:
-    """The stable set of one parameter of a single rig; None where it does not enter linearly, or is not positive.
+    """Stable set of one parameter of a single rig, SI units; None if it does not enter linearly or is not positive.
 
-    With a `size` of the parameter its own value does not matter. Windows of rigs with delay are looked for up to a
-    factor of a million from there, or as far as `reach`.
+    `size` is the value to start from, by default the rig's own. Windows of rigs with delay are searched up to a factor
+    of a million from it, or in the range `reach` if that is wider.
     """
     value = float(point.named()[name]) if size is None else size
     symbol = point.model.parameters[name]
@@ -141,7 +141,7 @@ def linear_set(
         low, high = (1 / APART, APART) if reach is None else (reach[0] / value, reach[1] / value)
         windows = linear_windows(p, q, h, min(low, 1 / APART), max(high, APART))
     else:
-        windows = _resolved(stable_set(p[0], q[0]))
+        windows = _with_far_edges_removed(stable_set(p[0], q[0]))
     return (
         None
         if windows is None
@@ -152,9 +152,10 @@ def linear_set(
 def _split_around(
     point: OperatingPoint, name: str, size: float, again: bool
 ) -> tuple[Array, Array, Array, float] | None:
-    """P, Q and delays of P + f Q for a single rig, f times a size being the parameter, and that size.
+    """P, Q, delays and size for a single rig with characteristic function P + f Q, the parameter being f times size.
 
-    `again` the size is changed to one at which both are alike, which does not depend on the value of the parameter.
+    With `again` the size is changed until P and Q have coefficients of similar size, so that the result does not depend
+    on the value of the parameter. None if the parameter does not enter linearly.
     """
     place, found = list(point.model.parameters).index(name), None
     for _ in range(_SIZES if again else 1):
@@ -166,22 +167,22 @@ def _split_around(
         if np.any(bent) or not np.any(q):
             break
         found = p, q, h[1], size
-        factor = float(_alike(p[0], q[0]))
+        factor = float(_balancing_factor(p[0], q[0]))
         if 1 / APART <= factor <= APART:
             break
         size = size * factor
     return found
 
 
-def _alike(p: Array, q: Array) -> Array:
-    """The factor f at which p and f q are alike in size, of polynomials (..., n+1); 1 where they share no power."""
+def _balancing_factor(p: Array, q: Array) -> Array:
+    """Factor f that makes p and f q (..., n+1) similar in size (geometric mean); 1 where they share no power."""
     both = (p != 0) & (q != 0)
     ratios = np.sum(np.where(both, np.log(np.abs(p)) - np.log(np.abs(q)), 0.0), axis=-1)
     return np.asarray(np.exp(ratios / np.maximum(np.sum(both, axis=-1), 1)))
 
 
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
-    """That of a delay that no term has twice; None elsewhere."""
+    """Stable set of a delay; None if a term contains it more than once or coefficients are not finite."""
     delays = delays_of_terms(point.model)
     c, h = quasipolynomial(point)
     if not np.all(np.isfinite(c)):
@@ -196,5 +197,5 @@ def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
 
 
 def name_of(point: OperatingPoint, symbol: sp.Symbol) -> str:
-    """The dotted name of a parameter."""
+    """Dotted name of the parameter with a symbol."""
     return next(name for name, own in point.model.parameters.items() if own == symbol)

@@ -19,7 +19,7 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.digits import matrix_entries, precise_eigenvalues, precise_root
-from steadyslip.linear.quasi import in_own_time, outweighed
+from steadyslip.linear.quasipolynomial import delayed_terms_dominate, nondimensional
 from steadyslip.linear.roots import Array, ComplexArray
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.model import Model
@@ -161,8 +161,8 @@ def _count(point: OperatingPoint) -> int:
     """Growing roots by the argument principle, −1 where that takes too long."""
     c, h = quasipolynomial(point)
     with np.errstate(all="ignore"):
-        scaled, own, _ = in_own_time(c[None], h[None])
-        if outweighed(scaled)[0] or not np.all(np.isfinite(scaled)):
+        scaled, own, _ = nondimensional(c[None], h[None])
+        if delayed_terms_dominate(scaled)[0] or not np.all(np.isfinite(scaled)):
             return -1
         return max(int(count_by_argument(scaled, own)[0]), -1)
 

@@ -1,7 +1,7 @@
-"""The values at which a scan looks at a parameter.
+"""Sample values of a parameter for the scan for edges.
 
-They follow from the parameter's domain, its value and its natural size, never from the range that somebody asks for:
-a range adds samples beyond the usual ones and moves none, so that edges within it are the same whatever it is.
+Samples follow from the parameter's domain, value and natural size. A requested range only adds samples beyond the usual
+ones and moves none, so that the edges found do not depend on the range.
 """
 
 from __future__ import annotations
@@ -14,17 +14,21 @@ from steadyslip.core.domains import Domain
 Array = NDArray[np.float64]
 
 DECADES = 6
-"""Decades to each side of a value, and of the natural size, that are searched unless more is asked for."""
+"""Decades to each side of a value, and of the natural size, that are searched by default."""
+# Densities of samples, chosen by trial: computing time against narrow windows that fall between two samples.
 _PER_DECADE = 40
-_FURTHER = 10  # samples a decade beyond those: what is so far off is of less use
-_LINEAR = 721  # a quarter of a degree between angles
-_TOWARDS = 4  # samples a decade of the distance to an end of the domain, or to an edge
-_NEAREST = 1e-9  # share of the size of an edge, nearer than which rounding may decide
-_LARGEST = 300  # decades from one: products with what is larger leave the range of floating point
+_FURTHER = 10  # samples per decade beyond `DECADES`
+_LINEAR = 721  # samples between the two ends of a domain: a quarter of a degree for angles from −90 to 90 degrees
+_TOWARDS = 4  # samples per decade of the distance to an end of the domain or to an edge
+_NEAREST = 1e-9  # distance from an edge, relative to its size, below which rounding may decide the status
+_LARGEST = 300  # largest exponent of ten of a sample: doubles end at 308
 
 
 def bounded(domain: Domain, share: int) -> Array:
-    """Samples of a parameter with two ends: evenly spaced, and ever closer towards either end."""
+    """Samples of a parameter with a bounded domain: evenly spaced, and geometrically closer towards both ends.
+
+    `share` divides the number of samples.
+    """
     width = domain.high - domain.low
     near = _NEAREST * width
     low = domain.low if domain.low_allowed else domain.low + near
@@ -34,9 +38,9 @@ def bounded(domain: Domain, share: int) -> Array:
 
 
 def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float, share: int) -> Array:
-    """Samples by decades around a size, down to `least` and up to `most`, of both signs where these are allowed.
+    """Samples spaced geometrically around `size`, from `least` to `most`, of both signs if the domain has both.
 
-    `zero` says whether that is one of them.
+    With `zero` the value 0 is included; `share` divides the number of samples.
     """
     middle = np.linspace(-DECADES, DECADES, 2 * DECADES * _PER_DECADE // share + 1)
     with np.errstate(all="ignore"):
@@ -56,7 +60,10 @@ def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float
 
 
 def towards(edge: float, other: float, near: float = 0.0, share: int = 1) -> Array:
-    """Samples between an edge and another value, ever closer to the edge, as near as `near` or what rounding allows."""
+    """Samples between an edge and another value, geometrically closer to the edge, up to the distance `near`.
+
+    By default up to the distance that rounding allows; `share` divides the number of samples.
+    """
     distance = abs(other - edge)
     least = near or _NEAREST * max(abs(edge), distance)
     if not distance > least:

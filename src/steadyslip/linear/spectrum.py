@@ -1,4 +1,4 @@
-"""Eigenvalues and stability of operating points, whether their equation is a polynomial or, with delays, a sum."""
+"""Eigenvalues and stability of operating points, without delay (polynomial) and with delays (quasi-polynomial)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.questions import question
-from steadyslip.linear import crossing, quasi as sums
+from steadyslip.linear import crossing, quasipolynomial as with_delays
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz
 from steadyslip.linear.roots import Array, ComplexArray, roots
@@ -16,59 +16,62 @@ from steadyslip.model.linearisation import delays_of_terms, is_written_out
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial
 
-_ONE_CROSSING = 2  # roots that lie right of the axis just beyond an edge, at most
+_ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the axis: a conjugate pair
 
 
 def spectrum(point: OperatingPoint) -> ComplexArray:
-    """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost, n that without."""
+    """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost.
+
+    n is the number of eigenvalues of the rig with all delays zero.
+    """
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else eigenvalues_of(point)
     c, h = quasipolynomial(point)
-    return sums.rightmost(c, h, c.shape[-1] - 1)
+    return with_delays.rightmost(c, h, c.shape[-1] - 1)
 
 
 def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Whether all roots lie left of the axis and the equations are well posed."""
+    """True where all roots lie left of the imaginary axis and the equations are well posed."""
     if not point.model.delays:
         return is_hurwitz(characteristic(point))
     return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
 
 
 def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Where roots to the right can be counted: everywhere but under several delays of absurd length."""
+    """True where roots right of the axis can be counted: always, except with several very long delays."""
     return np.asarray(_counts(point) != UNKNOWN) if point.model.delays else np.ones(point.shape, dtype=bool)
 
 
 @question
 def _counts(point: OperatingPoint) -> NDArray[np.int64]:
-    return sums.counted_right(*quasipolynomial(point))
+    return with_delays.count_right_if_feasible(*quasipolynomial(point))
 
 
 @question
 def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
-    """How many roots lie right of the axis, of points with delays; `quasi.INFINITE` of them, or −1 where unknown."""
-    return _counts(point) if np.all(can_be_counted(point)) else sums.count_right(*quasipolynomial(point))
+    """Number of roots right of the axis, for points with delays; `quasipolynomial.INFINITE`, or −1 if not finite."""
+    return _counts(point) if np.all(can_be_counted(point)) else with_delays.count_right(*quasipolynomial(point))
 
 
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3).
+    """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3).
 
-    With delays also where what is delayed outweighs what acts at once, in the highest derivative: then disturbances
-    grow the faster, the shorter the delay.
+    With delays also where in the highest derivative the delayed terms outweigh the undelayed one: then ever faster
+    oscillations grow.
     """
     if not point.model.delays:
         return ill_posed(characteristic(point))
     c, _ = quasipolynomial(point)
-    return np.asarray(ill_posed(c[..., 0, :]) | (_counts(point) == sums.INFINITE))
+    return np.asarray(ill_posed(c[..., 0, :]) | (_counts(point) == with_delays.INFINITE))
 
 
 def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
-    """Names of the delays by which a single rig is ill-posed; none where it is not, or would be without them.
+    """Dotted names of the delays that make a single rig ill-posed; empty if it is well posed, or ill-posed anyway.
 
-    Of the highest derivative, that of bodies without mass, what is delayed outweighs what acts at once.
+    A delay does so where, on a body without mass, the delayed terms outweigh those that act at once.
     """
     c, _ = quasipolynomial(point)
-    if not point.model.delays or ill_posed(c[0]) or _counts(point) != sums.INFINITE:
+    if not point.model.delays or ill_posed(c[0]) or _counts(point) != with_delays.INFINITE:
         return ()
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
     late = [delay for delay, own in zip(delays_of_terms(point.model), c[:, top], strict=True) if own != 0]
@@ -78,12 +81,12 @@ def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
 
 
 def ill_posed(c: Array) -> NDArray[np.bool_]:
-    """The same of polynomials (..., n+1)."""
+    """True where polynomials (..., n+1) are ill-posed: highest coefficient < 0, or 0 with the second <= 0."""
     return np.asarray(crossing.is_ill_posed((c[..., -2], c[..., -1])))
 
 
 def static_sum(point: OperatingPoint) -> Array:
-    """The static stiffness: the value of the characteristic function at s = 0."""
+    """Static stiffness: value of the characteristic function at s = 0, (...)."""
     return (
         characteristic(point)[..., 0] if not point.model.delays else np.sum(quasipolynomial(point)[0][..., 0], axis=-1)
     )
@@ -91,36 +94,36 @@ def static_sum(point: OperatingPoint) -> Array:
 
 @question
 def nearness(point: OperatingPoint) -> Array:
-    """Two functions of rigs, (2, ...), that pass through zero where a root crosses the axis, in pairs or alone."""
+    """Two measures, (2, ...), that change sign where a root crosses the imaginary axis: in pairs, or alone."""
     if not point.model.delays:
         return damping_measures(spectrum(point))
-    return sums.nearness(*quasipolynomial(point))
+    return with_delays.nearness(*quasipolynomial(point))
 
 
 def crossing_frequency(point: OperatingPoint) -> float:
     """Imaginary part (rad/s) of the root nearest to the axis, of a single rig on an edge; 0 without oscillation."""
     if point.model.delays:
         c, h = quasipolynomial(point)
-        return sums.nearest_to_axis(c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0]).imag
+        return with_delays.nearest_to_axis(c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0]).imag
     found = spectrum(point).ravel()
     found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]
     return float(np.abs(found[np.argmax(found.real)].imag)) if found.size else 0.0
 
 
 def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
-    """Whether an oscillation is undamped to within a share, of the leading roots."""
+    """True where the leading oscillation has a damping ratio (with delays a phase) of at most `share` in size."""
     if not point.model.delays:
         return np.asarray(np.abs(0.5 * nearness(point)[0]) <= share)
     return np.asarray((np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING))
 
 
 def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
-    """Whether a disturbance grows by more than a share, whatever a root on the axis does; or at once.
+    """True where a root grows with Re s > `share` |s|, or the equations are ill-posed; roots on the axis do not count.
 
     Parameters
     ----------
     neutral : bool or ndarray of bool
-        Where one root is zero to within rounding: it does not count.
+        True where one root is zero to within rounding; the smallest root is then left out.
     """
     s = spectrum(point)
     with np.errstate(all="ignore"):

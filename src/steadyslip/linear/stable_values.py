@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
-from steadyslip.linear.linear_sets import linear_set, not_linear, sets_of
+from steadyslip.linear.linear_sets import linear_set, not_linear_error, sets_of
 from steadyslip.linear.roots import Array
 from steadyslip.linear.stiffness import STIFFNESS, critical_stiffness, in_chunks, own_safety_factor, stable_stiffness
 from steadyslip.machine.machine import Machine
@@ -65,7 +65,7 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     require_range(point)
     own = linear_set(point, full)
     if own is None:
-        raise not_linear(full)
+        raise not_linear_error(full)
     return np.asarray(own.intervals[np.isfinite(own.intervals[:, 0])])
 
 

@@ -22,7 +22,7 @@ from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic
-from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_late
+from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_many_windows_error
 from steadyslip.linear.pencil import best_spectrum
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
@@ -286,7 +286,7 @@ def set_of_one(point: OperatingPoint) -> StableSet:
     if point.model.delays:
         found = linear_set(point, STIFFNESS, float(_size(point)))
         if found is None:
-            raise too_late(STIFFNESS)
+            raise too_many_windows_error(STIFFNESS)
         return found
     if not has_closed_form(point.model):
         return general_set(point)

@@ -1,9 +1,9 @@
-"""Real functions of frequency, f(ω) = Σ_d a_d(ω) cos ωd + b_d(ω) sin ωd with polynomials a and b, and all their zeros.
+"""All zeros of functions f(ω) = Σ_d a_d(ω) cos ωd + b_d(ω) sin ωd, with polynomials a and b.
 
-What happens on the imaginary axis with delays is such a function: where P(iω)/Q(iω) is real, or |A(iω)| = |B(iω)|. What
-cancels between products is taken out of the coefficients, so that bounds of the derivatives are close. Zeros are
-enclosed: with |f''| ≤ K on an interval of half width r about m there is none where |f(m)| > |f'(m)| r + K r²/2, and
-one at most where |f'(m)| > K r; intervals that are neither are halved.
+For rigs with delays the conditions "P(iω)/Q(iω) is real" and "|A(iω)| = |B(iω)|" have this form. Terms that cancel are
+removed from the coefficients, so that bounds of the derivatives are tight. Zeros are enclosed by bisection: with
+|f''| ≤ K on an interval of half width r about m there is none where |f(m)| > |f'(m)| r + K r²/2, and one at most where
+|f'(m)| > K r; all other intervals are halved.
 """
 
 from __future__ import annotations
@@ -15,50 +15,53 @@ import numpy as np
 from steadyslip.linear.roots import Array, ComplexArray, evaluate
 
 _EPS = float(np.finfo(float).eps)
-_ROUNDING = 64 * _EPS  # of the sizes of all terms, in their sum
-_CANCELLED = 8 * _EPS  # of the sizes of products, in their sum: what is left of it is nothing
-_NARROW = 1e-13  # relative width of an interval that is not halved any more: a zero is there, or two,
-_MOST = 400_000  # and how many there may be at a time
-_OCTAVES = 60  # below the highest frequency, down to which zeros are looked for
+_ROUNDING = 64 * _EPS  # rounding of a value f(ω), relative to the sum of the sizes of its terms
+_CANCELLED = 8 * _EPS  # coefficients below this, relative to the sizes of the products added, are set to zero
+_NARROW = 1e-13  # relative width at which halving ends: what is left is one zero, or two that nearly coincide
+_MOST = 400_000  # intervals at a time before the search gives up; by trial: memory against how long a delay may be
+_OCTAVES = 60  # zeros are searched down to 2**-60 of the highest frequency, beyond the digits of a double
 
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Such a function; `shift` d (k,), its cosines a and sines b (k, r), lowest power first."""
+    """Function f(ω) of the module, as delays `shift` d (k,) and coefficients `cosine` a and `sine` b (k, r).
+
+    Coefficients are in powers of ω, lowest first.
+    """
 
     shift: Array
     cosine: Array
     sine: Array
 
     def __call__(self, x: Array) -> Array:
-        """Values at frequencies of any shape."""
+        """Values at frequencies `x` of any shape."""
         return np.asarray(sum(
             evaluate(a, x) * np.cos(d * x) + evaluate(b, x) * np.sin(d * x)
             for d, a, b in zip(self.shift, self.cosine, self.sine, strict=True)
         ))  # fmt: skip
 
     def derivative(self) -> Waves:
-        """That in ω."""
+        """Derivative with respect to ω."""
         powers = np.arange(1, self.cosine.shape[1])
         a, b = (np.pad(one[:, 1:] * powers, ((0, 0), (0, 1))) for one in (self.cosine, self.sine))
         d = self.shift[:, None]
         return Waves(self.shift, a + d * self.sine, b - d * self.cosine)
 
     def largest(self, x: Array) -> Array:
-        """A size that it has nowhere between zero and x."""
+        """Upper bound of |f| on [0, x]."""
         return np.asarray(evaluate(np.sum(np.abs(self.cosine) + np.abs(self.sine), axis=0), x))
 
     def stretched(self, unit: float) -> Waves:
-        """With frequency in some unit, and coefficients of one at most."""
+        """Function of ω/unit, scaled so that its largest coefficient is one."""
         powers = float(unit) ** np.arange(self.cosine.shape[1])
         a, b = self.cosine * powers, self.sine * powers
         size = max(float(np.max(np.abs(a))), float(np.max(np.abs(b)))) or 1.0
         return Waves(self.shift * unit, a / size, b / size)
 
     def zeros(self, highest: float) -> tuple[Array, Array] | None:
-        """All zeros above 0 and up to `highest`, rising, and whether it rises (1) or falls (−1) through zero there.
+        """All zeros in (0, `highest`], rising, and the sign of the slope at each; None if too many to separate.
 
-        0 where it is within rounding of touching zero. None where they are too many to be told apart.
+        The sign is 0 where the function touches zero within rounding.
         """
         f = self.stretched(highest)
         with np.errstate(all="ignore"):
@@ -76,7 +79,7 @@ class Waves:
 
 
 def _enclosed(f: Waves) -> tuple[Array, Array, Array] | None:
-    """Ends of intervals in (0, 1] with one zero each, and its direction."""
+    """Ends of intervals in (0, 1] with one zero each, and the sign of the slope there; None if they are too many."""
     slope = f.derivative()
     bend = slope.derivative()
     begin = _first(f, slope, bend)
@@ -106,14 +109,14 @@ def _enclosed(f: Waves) -> tuple[Array, Array, Array] | None:
 
 
 def _first(f: Waves, slope: Waves, bend: Waves) -> float:
-    """A frequency up to which there is no zero but at 0 itself."""
+    """Frequency below which the only possible zero is 0 itself."""
     zero = np.zeros(1)
     start, rate = abs(float(f(zero)[0])), abs(float(slope(zero)[0]))
     for x in 0.5 ** np.arange(1, _OCTAVES + 1):
         at = np.array([x])
         if start > _ROUNDING * float(f.largest(zero)[0]):
             free = start > float(slope.largest(at)[0]) * x
-        else:  # zero at 0, as what is odd is
+        else:  # f(0) = 0, as for every odd function
             free = rate > float(bend.largest(at)[0]) * x
         if free:
             return float(x)
@@ -121,7 +124,7 @@ def _first(f: Waves, slope: Waves, bend: Waves) -> float:
 
 
 def _products(p: Array, hp: Array, q: Array, hq: Array) -> list[tuple[float, ComplexArray, Array]]:
-    """Delay, coefficients of the product, and their sizes before anything cancels, of the terms of P(iω) Q(iω)*."""
+    """Terms of P(iω) Q(iω)*, each as delay, coefficients in ω, and sizes of these before terms cancel."""
     turn = 1j ** np.arange(max(p.shape[1], q.shape[1]))
     found = []
     for own, late in zip(p, hp, strict=True):
@@ -131,8 +134,8 @@ def _products(p: Array, hp: Array, q: Array, hq: Array) -> list[tuple[float, Com
     return found
 
 
-def _gathered(terms: list[tuple[float, Array, Array, Array]]) -> Waves:
-    """Terms (delay, cosine, sine, size) with what is of one delay put together."""
+def _sum_of_terms(terms: list[tuple[float, Array, Array, Array]]) -> Waves:
+    """Sum of terms (delay, cosine, sine, size); those of one delay are added, and cancelled coefficients removed."""
     width = max(len(cosine) for _, cosine, _, _ in terms)
     shifts = np.array([abs(delay) for delay, *_ in terms])
     unique: list[float] = []
@@ -150,14 +153,14 @@ def _gathered(terms: list[tuple[float, Array, Array, Array]]) -> Waves:
     return Waves(np.array(unique), cosine, sine)
 
 
-def where_real(p: Array, q: Array, h: Array) -> Waves:
-    """Im P(iω) Q(iω)*, zero where P/Q is real; P and Q (m, n+1) with delays h (m,)."""
-    return _gathered([(d, z.imag, -z.real, size) for d, z, size in _products(p, h, q, h)])
+def im_of_product(p: Array, q: Array, h: Array) -> Waves:
+    """Function Im P(iω) Q(iω)*, zero where P/Q is real; P and Q are (m, n+1) with delays h (m,)."""
+    return _sum_of_terms([(d, z.imag, -z.real, size) for d, z, size in _products(p, h, q, h)])
 
 
-def where_alike(a: Array, ha: Array, b: Array, hb: Array) -> Waves:
-    """|A(iω)|² − |B(iω)|²."""
-    return _gathered(
+def difference_of_squares(a: Array, ha: Array, b: Array, hb: Array) -> Waves:
+    """Function |A(iω)|² − |B(iω)|², zero where A and B are equal in size; a, b (m, n+1) with delays ha, hb (m,)."""
+    return _sum_of_terms(
         [(d, z.real, z.imag, size) for d, z, size in _products(a, ha, a, ha)]
         + [(d, -z.real, -z.imag, size) for d, z, size in _products(b, hb, b, hb)]
     )

@@ -2,7 +2,7 @@
 
 Of θ in P(s) + θ Q(s), both with delays, edges are θ = −P(iω)/Q(iω) where that is real, as without delay; ω follows from
 a function that oscillates, so that there are ever more of them and the set is one of windows (theory 4, 10). Its zeros
-are enclosed (`waves`), so that none is missed; between two neighbours one count of roots holds.
+are enclosed (`waves`), so that none is missed; between two neighbours the count of unstable roots is constant.
 
 Of one delay θ among several, A(s) + B(s) exp(−sθ), roots are on the axis only at the ω with |A(iω)| = |B(iω)|, enclosed
 in the same way, and cross to the right where |A| − |B| rises with ω.
@@ -17,66 +17,69 @@ from numpy.typing import NDArray
 
 from steadyslip.linear.argument import bound_on_axis
 from steadyslip.linear.polynomials import StableSet
-from steadyslip.linear.quasi import (
+from steadyslip.linear.quasipolynomial import (
     count_right,
     crossing_delays,
-    in_own_time,
-    outweighed,
-    repeated,
+    delayed_terms_dominate,
+    list_crossing_delays,
+    nondimensional,
     slope,
     value,
 )
 from steadyslip.linear.roots import Array, quietly, roots
-from steadyslip.linear.waves import where_alike, where_real
+from steadyslip.linear.waves import difference_of_squares, im_of_product
 
-_TURNS = 100  # of an oscillation during the delay, beyond which windows are not looked for any more,
-_PLAIN = 1e-6  # share of a root's speed that leads it across the axis, below which it may as well run along it
-_STEPS = 8  # a decade, at which it is asked where that begins
-_MANY = 20_000  # where the rig itself has none so fast
+# Limits of the search, chosen by trial: computing time against how many windows are found.
+_TURNS = 100  # periods of an oscillation during the longest delay beyond which windows are not searched
+_STEPS = 8  # values of θ per decade at which the fastest possible oscillation is estimated
+_MANY = 20_000  # such periods of the rig itself beyond which the search is refused
+_PLAIN = 1e-6  # share of ds/dθ across the axis below which a root may run along it, so that roots are counted anew
 
 
-def none() -> StableSet:
-    """No edge and no stable interval."""
+def empty_set() -> StableSet:
+    """Stable set without edges and without stable intervals."""
     return StableSet(np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0, dtype=bool))
 
 
 @quietly
 def delay_set(p: Array, q: Array) -> StableSet:
-    """Every delay h > 0 at which p(s) + q(s) exp(−sh) is stable."""
+    """Stable set of the delay h > 0 (s) of p(s) + q(s) exp(−sh), for one rig."""
     top = int(np.flatnonzero((p != 0) | (q != 0))[-1])
     if abs(q[top]) >= abs(p[top]) or p[0] + q[0] == 0 or p[top] <= 0 or top < len(p) - 2:
-        return none()
+        return empty_set()
     delays, frequencies, directions = crossing_delays(p, q)
     right = np.sum(roots((p + q)[None])[0].real > 0) + np.concatenate([[0], np.cumsum(2 * directions)])
-    return _of_cells(delays, frequencies, right == 0)
+    return _set_of_cells(delays, frequencies, right == 0)
 
 
 @quietly
 def delay_set_among(c: Array, h: Array, late: NDArray[np.bool_]) -> StableSet | None:
-    """Every value above zero of one delay, at which a sum with other delays is stable.
+    """Stable set of one delay θ > 0 (s) of a rig with several; None where its edges are too many to separate.
 
-    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the other delays, `late` (m,) says where the one
-    that is sought comes on top of them. None where its edges cannot be told apart.
+    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `late` (m,) is True for
+    the terms that θ delays too.
     """
-    (scaled,), (others,), (rate,) = in_own_time(c[None], h[None])
+    (scaled,), (others,), (rate,) = nondimensional(c[None], h[None])
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
-    if outweighed(scaled[None])[0] or np.sum(c[:, 0]) == 0 or c[0, top] <= 0 or top < c.shape[1] - 2:
-        return none()
+    if delayed_terms_dominate(scaled[None])[0] or np.sum(c[:, 0]) == 0 or c[0, top] <= 0 or top < c.shape[1] - 2:
+        return empty_set()
     start = int(count_right(scaled, others))
     parts = [(scaled[which], others[which]) for which in (~late, late)]
-    zeros = where_alike(*parts[0], *parts[1]).zeros(bound_on_axis(scaled))
+    zeros = difference_of_squares(*parts[0], *parts[1]).zeros(bound_on_axis(scaled))
     if zeros is None:
         return None
     omega, direction = (one[zeros[1] != 0] for one in zeros)
     at_once, delayed = (value(*part, 1j * omega) for part in parts)
     phase = np.mod(np.angle(-delayed / at_once), 2 * np.pi)
-    delays, frequencies, ways = repeated(omega[::-1], direction[::-1], np.where(phase == 0, 2 * np.pi, phase)[::-1])
+    delays, frequencies, ways = list_crossing_delays(
+        omega[::-1], direction[::-1], np.where(phase == 0, 2 * np.pi, phase)[::-1]
+    )
     right = start + np.concatenate([[0], np.cumsum(2 * ways)])
-    return _of_cells(delays / rate, frequencies * rate, right == 0)
+    return _set_of_cells(delays / rate, frequencies * rate, right == 0)
 
 
-def _of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -> StableSet:
-    """Cells between candidates for edges, and whether each is stable, as a set."""
+def _set_of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -> StableSet:
+    """Stable set from candidate edges (e,) with their frequencies, and stability of the cells between, (e + 1,)."""
     changes = stable[1:] != stable[:-1]
     edges, frequencies = edges[changes], frequencies[changes]
     ends = np.concatenate([[0.0] if stable[0] else [], edges, [np.inf] if stable[-1] else []])
@@ -85,15 +88,15 @@ def _of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -> St
 
 @quietly
 def linear_windows(p: Array, q: Array, h: Array, low: float, high: float) -> StableSet | None:
-    """Where P + θ Q is stable for θ from `low` to `high`, in between of which is the rig's own one.
+    """Stable set of θ in P + θ Q between `low` and `high`; the rig's own value is θ = 1.
 
     P and Q are (m, n+1), with delays h (m,). The range is cut where there may be windows without end, at the same
-    places whatever it is. An interval that begins at `low`, or ends at an uncut `high`, is given as from zero, or to
-    infinity. None where the delay is so long for the rig itself that its windows are too many.
+    places whatever the range. An interval that begins at an uncut `low` is given as from zero, one that ends at an
+    uncut `high` as to infinity. None where the delay is so long for the rig itself that its windows are too many.
     """
     scale = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(scale[0]), float(scale[-1])
-    bound = _fastest(p, q, scale)
+    bound = _frequency_bound(p, q, scale)
     turn = 2 * np.pi / max(float(np.max(h)), 1e-300)
     own = float(np.interp(0.0, np.log(scale), bound))
     most = turn * max(_TURNS, 2 * own / turn)
@@ -117,20 +120,20 @@ def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float)
     theta, beta = candidates
     ends = np.concatenate([[low], theta, [high]])
     probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours nothing crosses the axis
-    count = _right if len(h) <= 2 else _right_by_crossings  # with one delay a count takes no time
-    return _of_cells(theta, beta, (count(p, q, h, theta, beta, probes) == 0) & _posed(p, q, probes))
+    count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay a count takes no time
+    return _set_of_cells(theta, beta, (count(p, q, h, theta, beta, probes) == 0) & _is_well_posed(p, q, probes))
 
 
-def _right(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
-    """Roots to the right, counted at every probe."""
+def _count_each(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
+    """Number of roots right of the axis at every probe θ; `theta` and `beta` are not used."""
     return count_right(p + probes[:, None, None] * q, h)
 
 
-def _right_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
-    """The same from few counts: what crosses the axis between two probes does so as ds/dθ = −Q/(P' + θ Q') says.
+def _count_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
+    """Number of roots right of the axis at every probe θ, from few counts and the directions of the crossings between.
 
-    Where that is no plain crossing, roots are counted anew, and so they are at the last probe before: a row of
-    crossings that does not lead from one count to the next is counted throughout.
+    A root crosses the axis at (theta, i beta) with ds/dθ = −Q/(P' + θ Q'). Where it may run along the axis instead,
+    roots are counted on both sides. If the crossings between two counts do not add up, every probe there is counted.
     """
     s = 1j * np.where(np.isinf(beta), np.nan, beta)
     speed = -value(q, h, s) / (slope(p, h, s) + theta * slope(q, h, s))
@@ -140,24 +143,24 @@ def _right_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array,
     last = np.append(first[1:] - 1, len(theta))
     ends = np.unique(np.concatenate([first, last]))
     counted = np.full(len(probes), -1, dtype=np.int64)
-    counted[ends] = _right(p, q, h, theta, beta, probes[ends])
+    counted[ends] = _count_each(p, q, h, theta, beta, probes[ends])
     for a, b in zip(first, last, strict=True):
         found = counted[a] + np.concatenate([[0], np.cumsum(steps[a:b])])
         if found[-1] == counted[b] and np.all(found >= 0):
             counted[a : b + 1] = found
         else:
-            counted[a : b + 1] = _right(p, q, h, theta, beta, probes[a : b + 1])
+            counted[a : b + 1] = _count_each(p, q, h, theta, beta, probes[a : b + 1])
     return counted
 
 
-def _posed(p: Array, q: Array, theta: Array) -> NDArray[np.bool_]:
-    """Whether the undelayed part has a positive highest coefficient and has lost no more than its inertia."""
+def _is_well_posed(p: Array, q: Array, theta: Array) -> NDArray[np.bool_]:
+    """True where the undelayed polynomial has a positive highest coefficient, or a zero one and a positive second."""
     c = p[0] + theta[:, None] * q[0]
     return np.asarray(np.where(c[:, -1] == 0, c[:, -2] > 0, c[:, -1] > 0))
 
 
-def _fastest(p: Array, q: Array, theta: Array) -> Array:
-    """For each θ a frequency that no root on the axis exceeds (Fujiwara); that of others where there is none."""
+def _frequency_bound(p: Array, q: Array, theta: Array) -> Array:
+    """Upper bound (Fujiwara) of frequencies of roots on the axis, for each θ; where there is no bound, the largest."""
     size = np.abs(p + theta[:, None, None] * q)
     top = int(np.flatnonzero(np.any(size > 0, axis=(0, 1)))[-1])
     left = size[:, 0, top] - np.sum(size[:, 1:, top], axis=-1)
@@ -168,15 +171,15 @@ def _fastest(p: Array, q: Array, theta: Array) -> Array:
 
 
 def _candidates(p: Array, q: Array, h: Array, low: float, high: float, fast: float) -> tuple[Array, Array] | None:
-    """Values of θ at which a root may be on the axis, rising, and the frequencies: zero, or infinite at the top."""
-    zeros = where_real(p, q, h).zeros(fast)
+    """Values of θ at which a root may be on the axis, rising, and its frequency: 0 at s = 0, inf at infinite s."""
+    zeros = im_of_product(p, q, h).zeros(fast)
     if zeros is None:
         return None
     beta = zeros[0]
     above, below = value(p, h, 1j * beta), value(q, h, 1j * beta)
     theta = -(above * np.conj(below)).real / np.abs(below) ** 2
     static = -np.sum(p[:, 0]) / np.sum(q[:, 0])
-    late = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(p) - 1)))  # signs of what is delayed, in the highest
+    late = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(p) - 1)))  # signs of the delayed highest coefficients
     tops = -(p[0, -1] + late @ p[1:, -1]) / (q[0, -1] + late @ q[1:, -1])
     theta = np.concatenate([theta, [static], tops])
     beta = np.concatenate([beta, [0.0], np.full(len(tops), np.inf)])

@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.polynomials import is_hurwitz, routh_column
-from steadyslip.linear.quasi import INFINITE
+from steadyslip.linear.quasipolynomial import INFINITE
 from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint

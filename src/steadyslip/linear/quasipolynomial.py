@@ -1,4 +1,4 @@
-"""Quasi-polynomials Σ p_j(s) exp(−s h_j): how many roots lie right of a line, and the rightmost ones (theory 11).
+"""Count of roots right of a line, and the rightmost roots, of quasi-polynomials Σ p_j(s) exp(−s h_j) (theory 11).
 
 Coefficients are (..., m, n+1), lowest power first, delays (..., m) with h_0 = 0; the leading axes are rigs. Nothing is
 approximated by rational functions. With one delay roots are counted from where they are without it: they cross the
@@ -25,20 +25,20 @@ from steadyslip.linear.polynomials import even_odd, product
 from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly, roots
 
 INFINITE = 2**62
-_HALVINGS = 60  # of a bracket of a real part
-_TOGETHER = 40  # rigs with several delays whose roots are counted at a time
-_TURNS = 5000  # of the fastest crossing, after which delays are not looked at any more
-_LOST = 1e10  # turns of the fastest crossing during one delay, of which rounding leaves no angle to rely on
+_HALVINGS = 60  # largest number of bisections of a real part: more than the 53 bits of a double
+_BATCH = 40  # rigs with several delays counted at a time; chosen by trial: memory against speed
+_MOST_PERIODS = 5000  # crossing delays are listed up to so many periods of the fastest; by trial: length of the list
+_LOST = 1e10  # periods within one delay beyond which rounding leaves fewer than six digits of the phase
 
 
 def value(c: Array, h: Array, s: Any) -> Any:
-    """Σ p_j(s) exp(−s h_j) of one rig, for `s` of any shape."""
+    """Value Σ p_j(s) exp(−s h_j) of the quasi-polynomial of one rig, for `s` of any shape."""
     s = np.asarray(s, dtype=complex)
     return sum(evaluate(p, s) * np.exp(-s * delay) for p, delay in zip(c, h, strict=True))
 
 
 def slope(c: Array, h: Array, s: Any) -> Any:
-    """Its derivative."""
+    """Derivative with respect to s of Σ p_j(s) exp(−s h_j) of one rig, for `s` of any shape."""
     powers = np.arange(1, c.shape[-1])
     inner = ((evaluate(p[1:] * powers, s) - d * evaluate(p, s)) * np.exp(-s * d) for p, d in zip(c, h, strict=True))
     return sum(inner)
@@ -46,7 +46,7 @@ def slope(c: Array, h: Array, s: Any) -> Any:
 
 @quietly
 def shifted(c: Array, h: Array, shift: Array) -> Array:
-    """Coefficients with s + shift in place of s; `shift` (...)."""
+    """Coefficients of the quasi-polynomial in s of which `c` gives the value at s + shift; `shift` (...)."""
     out = np.array(np.broadcast_to(c, np.broadcast_shapes(c.shape, (*np.shape(shift), 1, 1))), dtype=float)
     step = np.asarray(shift, dtype=float)[..., None]
     n = c.shape[-1] - 1
@@ -58,9 +58,11 @@ def shifted(c: Array, h: Array, shift: Array) -> Array:
 
 
 @quietly
-def in_own_time(c: Array, h: Array) -> tuple[Array, Array, Array]:
-    """The same for time in units in which lowest and highest coefficients are alike, largest coefficient one; that
-    unit's inverse (1/s) comes last."""
+def nondimensional(c: Array, h: Array) -> tuple[Array, Array, Array]:
+    """Coefficients, delays and rate (1/s) of quasi-polynomials made dimensionless: s = rate times the new s.
+
+    The rate makes lowest and highest coefficients equal in size; then the largest coefficient is made one.
+    """
     size = np.max(np.abs(c), axis=-2)
     present = size > 0
     low, high = np.argmax(present, axis=-1), size.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
@@ -73,41 +75,44 @@ def in_own_time(c: Array, h: Array) -> tuple[Array, Array, Array]:
 
 
 def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
-    """How many roots have a real part above `shift`, (...); −1 where coefficients are no numbers.
+    """Number of roots with real part above `shift`, (...); −1 where coefficients are not finite.
 
     Raises
     ------
     NotAvailable
         If there are several delays, so long that roots cannot be counted.
     """
-    found = counted_right(c, h, shift, alone=True)
+    found = count_right_if_feasible(c, h, shift, alone=True)
     if np.any(found == UNKNOWN):
         with np.errstate(all="ignore"):
-            scaled, own, _ = in_own_time(c, h)
+            scaled, own, _ = nondimensional(c, h)
         fast = [bound_on_axis(one) for one in scaled.reshape(-1, *scaled.shape[-2:])]
         raise _too_long(float(np.nanmax(fast) * np.max(own)) / (2 * np.pi))
     return found
 
 
 @quietly
-def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = False) -> NDArray[np.int64]:
-    """The same, `UNKNOWN` where they cannot be counted: with little effort, as in scans, or with all, each `alone`."""
+def count_right_if_feasible(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = False) -> NDArray[np.int64]:
+    """Number of roots with real part above `shift`, (...); −1 where coefficients are not finite, or `UNKNOWN`.
+
+    `UNKNOWN` marks rigs whose count takes too long; with `alone` these are tried again one by one.
+    """
     lead = np.broadcast_shapes(c.shape[:-2], np.shape(shift))
-    c, h, rate = in_own_time(c, h)
+    c, h, rate = nondimensional(c, h)
     if np.any(shift):
         c = shifted(c, h, np.asarray(shift) / rate)
     c = np.broadcast_to(c, (*lead, *c.shape[-2:])).reshape(-1, *c.shape[-2:])
     h = np.broadcast_to(h, (*lead, h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full(len(c), -1, dtype=np.int64)
     good = np.all(np.isfinite(c), axis=(-2, -1)) & np.all(np.isfinite(h), axis=-1)
-    ahead = good & outweighed(c) & np.any(h[:, 1:] > 0, axis=-1)
+    ahead = good & delayed_terms_dominate(c) & np.any(h[:, 1:] > 0, axis=-1)
     found[ahead] = INFINITE
     rows = np.flatnonzero(good & ~ahead)
     if c.shape[-2] <= 2 and rows.size:
         q = c[rows, 1] if c.shape[-2] == 2 else np.zeros_like(c[rows, 0])
         found[rows] = _count_by_crossings(c[rows, 0], q, h[rows, -1])
     elif rows.size:
-        for some in np.array_split(rows, -(-len(rows) // _TOGETHER)):
+        for some in np.array_split(rows, -(-len(rows) // _BATCH)):
             found[some] = count_by_argument(c[some], h[some])
         for one in rows[found[rows] == UNKNOWN] if alone else ():
             found[one] = count_by_argument(c[[one]], h[[one]])[0]
@@ -116,8 +121,8 @@ def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = F
     return found.reshape(lead)
 
 
-def outweighed(c: Array) -> NDArray[np.bool_]:
-    """Whether the highest derivative is delayed as much as it is not, or more."""
+def delayed_terms_dominate(c: Array) -> NDArray[np.bool_]:
+    """True where the delayed terms of the highest power of s are together at least as large as the undelayed one."""
     present = np.any(c != 0, axis=-2)
     top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
     highest = np.abs(np.take_along_axis(c, top[..., None, None], axis=-1)[..., 0])
@@ -125,8 +130,11 @@ def outweighed(c: Array) -> NDArray[np.bool_]:
 
 
 def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Where |p(iω)| = |q(iω)|: ω rising to the last, +1 or −1 as roots cross there to the right or left, and the phase
-    φ in (0, 2π] at which they do, ω h = φ + 2πk; NaN padded, ω falling."""
+    """Frequencies ω with |p(iω)| = |q(iω)|, falling, NaN padded; directions; and phases, each (rigs, n).
+
+    As the delay h grows, a pair of roots of p + q exp(−sh) crosses the axis at ±iω whenever ω h = φ + 2πk, with the
+    phase φ in (0, 2π]; the direction is +1 if it crosses to the right, −1 if to the left.
+    """
     squares = np.zeros((len(p), p.shape[-1]))
     size = np.zeros_like(squares)
     for polynomial, sign in ((p, 1.0), (q, -1.0)):
@@ -147,7 +155,7 @@ def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
-    """Of p + q exp(−sh): roots to the right without the delay, and what crosses as it grows to h."""
+    """Number of roots of p + q exp(−sh) right of the axis: those at h = 0 plus those that cross as h grows."""
     start = np.sum(roots(p + q).real > 0, axis=-1)
     omega, direction, phase = crossings(p, q)
     times = np.maximum(np.ceil((omega * h[:, None] - phase) / (2 * np.pi)), 0.0)
@@ -164,14 +172,14 @@ def _too_long(turns: float) -> NotAvailable:
 
 @quietly
 def rightmost(c: Array, h: Array, count: int) -> ComplexArray:
-    """The rightmost roots, (..., count), sorted by falling real part; NaN where there are infinitely many to the right.
+    """Rightmost roots, (..., count), by falling real part; NaN where infinitely many lie right of the axis.
 
-    A line is moved, by halves, until as many roots lie right of it; Newton's method on the function itself follows.
+    Real parts are bisected on the number of roots right of a line; Newton's method then refines each root.
     """
     flat = c.reshape(-1, *c.shape[-2:])
     delays = np.broadcast_to(h, (*c.shape[:-2], h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full((len(flat), count), np.nan + 0j, dtype=complex)
-    scaled, own, rate = in_own_time(flat, delays)
+    scaled, own, rate = nondimensional(flat, delays)
     good = (count_right(scaled, own) < INFINITE) & np.all(np.isfinite(scaled), axis=(-2, -1))
     for row in np.flatnonzero(good):
         found[row] = rate[row] * _rightmost_of_one(scaled[row], own[row], count)
@@ -179,7 +187,7 @@ def rightmost(c: Array, h: Array, count: int) -> ComplexArray:
 
 
 def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
-    if not np.any(c[1:]):  # no delayed term is left: a polynomial
+    if not np.any(c[1:]):  # all delayed coefficients are zero
         exact = roots(np.sum(c, axis=0))
         return np.append(exact, np.full(count, np.nan + 0j))[:count]
     if len(c) == 2:
@@ -212,13 +220,13 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
 
 @quietly
 def nearest_to_axis(c: Array, h: Array) -> complex:
-    """The root of one rig nearest to the imaginary axis, with imaginary part zero or positive."""
-    (scaled,), (own,), (rate,) = in_own_time(c[None], h[None])
+    """Root of one rig nearest to the imaginary axis (1/s), with imaginary part zero or positive."""
+    (scaled,), (own,), (rate,) = nondimensional(c[None], h[None])
     return complex(rate * _root_on(scaled, own, 0.0))
 
 
 def _root_on(c: Array, h: Array, real: float) -> complex:
-    """The root with imaginary part zero or positive that lies on a line, found again by Newton's method."""
+    """Root nearest to the line Re s = `real`, with imaginary part zero or positive, by Newton's method."""
     moved = shifted(c, h, np.asarray(real))
     starts = real + 1j * np.array([0.0, *_near_axis(moved, h)])
     s = starts.astype(complex)
@@ -232,16 +240,16 @@ def _root_on(c: Array, h: Array, real: float) -> complex:
 
 
 def _size(c: Array, h: Array, s: Any) -> Any:
-    """The sum of the sizes of all terms."""
+    """Sum of the absolute values of all terms at s, never zero."""
     return sum(evaluate(np.abs(p), np.abs(s)) * np.exp(-s.real * d) for p, d in zip(c, h, strict=True)) + 1e-300
 
 
 def _near_axis(c: Array, h: Array) -> Iterator[float]:
-    """Frequencies at which a root may be on the imaginary axis."""
+    """Frequencies near which a root may lie on the imaginary axis, starting values for Newton's method."""
     if len(c) == 2:
         yield from (float(one) for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one))
         return
-    own = [pieces.omega[0][leader < 0] for pieces, leader in SumsOnAxis(c[None], h[None]).settled()]
+    own = [pieces.omega[0][leader < 0] for pieces, leader in SumsOnAxis(c[None], h[None]).resolved_pieces()]
     omega = np.sort(np.concatenate(own))
     size = np.abs(value(c, h, 1j * omega)) / _size(c, h, 1j * omega)
     around = np.concatenate([[np.inf], size, [np.inf]])
@@ -251,14 +259,15 @@ def _near_axis(c: Array, h: Array) -> Iterator[float]:
 
 @quietly
 def nearness(c: Array, h: Array) -> Array:
-    """Two functions of rigs (..., ) that pass through zero where a root crosses the axis, (2, ...); with one delay.
+    """Two measures, (2, ...), that change sign where a root crosses the imaginary axis.
 
-    The phase by which the delay misses the nearest crossing, and H(0) as a share of its terms. NaN where there is none.
+    First the phase (rad) between the delay and the nearest crossing of a pair; NaN without crossing and for several
+    delays. Second the value at s = 0 over the sum of the sizes of its terms.
     """
     static = np.sum(c[..., 0], axis=-1) / np.sum(np.abs(c[..., 0]), axis=-1)
     if c.shape[-2] != 2:
         return np.stack([np.full(c.shape[:-2], np.nan), static])
-    scaled, own, _ = in_own_time(c, h)
+    scaled, own, _ = nondimensional(c, h)
     p, q, late = scaled[..., 0, :].reshape(-1, c.shape[-1]), scaled[..., 1, :].reshape(-1, c.shape[-1]), own[..., 1]
     good = np.all(np.isfinite(p), axis=-1) & np.all(np.isfinite(q), axis=-1)
     phase = np.full(len(p), np.nan)
@@ -272,28 +281,31 @@ def nearness(c: Array, h: Array) -> Array:
 
 @quietly
 def crossing_delays(p: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Every delay (s) at which a root of p + q exp(−sh) crosses the axis before it is unstable for good, rising, the
-    frequencies, and +1 where it crosses to the right, −1 to the left; of one rig.
+    """Delays (s), rising, at which roots of p + q exp(−sh) cross the axis; frequencies (rad/s); directions (±1).
 
-    Crossings to the right have the higher frequencies and so come more often: beyond some delay they are always ahead.
-    Where two frequencies nearly agree, that is far off, and delays of more than `_TURNS` oscillations are left out.
+    For one rig. Crossings to the right (+1) have the higher frequencies and so come more often: beyond some delay the
+    rig is unstable for good, and the list ends. Where two frequencies nearly agree that delay is very long; then the
+    list ends after `_MOST_PERIODS` periods of the fastest crossing.
     """
-    (scaled,), _, (rate,) = in_own_time(np.stack([p, q])[None], np.zeros((1, 2)))
+    (scaled,), _, (rate,) = nondimensional(np.stack([p, q])[None], np.zeros((1, 2)))
     omega, direction, phase = (one[0] for one in crossings(scaled[:1], scaled[1:]))
     known = np.isfinite(omega)
     omega, direction, phase = omega[known], direction[known], phase[known]
-    delays, frequencies, ways = repeated(omega, direction, phase)
+    delays, frequencies, ways = list_crossing_delays(omega, direction, phase)
     return delays / rate, frequencies * rate, ways
 
 
-def repeated(omega: Array, direction: Array, phase: Array) -> tuple[Array, Array, Array]:
-    """Delays (φ + 2πk)/ω of crossings, ω falling, up to where there are roots to the right for good; rising, with ω
-    and the direction of each.
+def list_crossing_delays(omega: Array, direction: Array, phase: Array) -> tuple[Array, Array, Array]:
+    """Delays (φ + 2πk)/ω, k = 0, 1, ..., of crossings with falling ω; rising, with ω and direction of each.
+
+    The list ends where the rig is unstable at all longer delays, or after `_MOST_PERIODS` periods.
     """
     if not omega.size:
         return np.empty(0), np.empty(0), np.empty(0, dtype=int)
     ahead = float(np.sum(direction * omega))  # > 0
-    longest = min(2 * math.pi * (len(omega) + 1) / ahead if ahead > 0 else math.inf, _TURNS * 2 * math.pi / omega[0])
+    longest = min(
+        2 * math.pi * (len(omega) + 1) / ahead if ahead > 0 else math.inf, _MOST_PERIODS * 2 * math.pi / omega[0]
+    )
     delays, at, way = [], [], []
     for w, angle, sign in zip(omega, phase, direction, strict=True):
         times = np.arange(int(np.ceil(w * longest / (2 * math.pi))) + 1)

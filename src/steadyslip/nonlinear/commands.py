@@ -77,7 +77,7 @@ def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) ->
     Raises
     ------
     NotAvailable
-        If the ending is none of these, or the file cannot be written.
+        If the ending is another one, or the file cannot be written.
     """
     writers = {
         ".nc": lambda p: write_dataset(branch.to_xarray(), p),
@@ -155,7 +155,7 @@ def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = N
     Raises
     ------
     NotAvailable
-        If the ending is none of these, or the file cannot be written.
+        If the ending is another one, or the file cannot be written.
     """
     writers = {".html": lambda p: write_page(thresholds, p, "Kicks", source=source)}
     write_by_ending(path, writers, lambda: thresholds.basin.plot())
@@ -200,7 +200,7 @@ def write_answers(found: FrequencyResponse | FrozenVerdicts, path: Path, title: 
     Raises
     ------
     NotAvailable
-        If the ending is none of these, or the file cannot be written.
+        If the ending is another one, or the file cannot be written.
     """
     writers = {".csv": found.to_csv, ".html": lambda p: write_page(found, p, title, source=source)}
     write_by_ending(path, writers, lambda: found.plot()[0])

@@ -14,9 +14,9 @@ import numpy as np
 Array = np.ndarray
 Equations = Callable[[Array], tuple[Array, Array]]
 """u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
-MOST_ITERATIONS = 10
-ASIDE = 10.0  # so many times farther than the end of Newton's method its way there may lead
-NEARLY = 1e-5  # size of a Newton step below which a larger one may follow once
+MOST_ITERATIONS = 10  # of Newton's method for one point
+ASIDE = 10.0  # factor of `reach` by which intermediate Newton iterates may be farther away
+NEARLY = 1e-5  # Newton step below which one larger step may follow
 GROW, FASTER, SHRINK = 1.4, 2.0, 0.4
 
 

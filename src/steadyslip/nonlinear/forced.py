@@ -33,23 +33,23 @@ PIECES: dict[str, type[Harmonic]] = {
 OF_SLIDERS = {
     "drive-velocity": "load_velocity", "normal-stress": "normal_disturbance", "push": "disturbance",
 }  # fmt: skip
-SAMPLES = 256  # a period: harmonics up to the 127th are told apart
+SAMPLES = 256  # per period: harmonics up to the 127th are resolved
 LEAST_PERIODS, MOST_PERIODS = 10, 2560  # waited for; twice as many each time
-SETTLED = 1e-7  # two periods that differ by less, of the range of the output, are the same
-FAINT = 1e-5  # the same for an output that swings as little as errors of the integration, and after the most periods
-ROUGHLY = 1e-4  # the same for limits, which are told to a twentieth
-DEPARTED = 0.05  # a gain this far from that of small amplitudes is no longer linear
-MOST_FADED = 700.0  # e-folds that floating point can tell
-IRREGULARLY = 1e-2  # of the range: periods that differ by more for ever do so by themselves
+SETTLED = 1e-7  # difference of two periods, in ranges of the output, below which they are equal
+FAINT = 1e-5  # that difference for outputs as small as integration errors, and after the most periods
+ROUGHLY = 1e-4  # that difference for limits, which are found to a twentieth
+DEPARTED = 0.05  # relative deviation from the small-amplitude gain at which the gain counts as nonlinear
+MOST_FADED = 700.0  # e-folds within the range of floating point
+IRREGULARLY = 1e-2  # difference of periods, in ranges, above which lasting differences count as irregular motion
 TIGHTER, TIGHTEST = 100, 1e-12  # share and least of the tolerance, where errors of the integration hide the answer
-MOST_SHARE = 0.99  # of the steady value, tried for limits: just before it changes sign
-DECADES = 3  # of amplitude, tried downwards of that, and once more where that is not enough
-HALVINGS = 7  # of the logarithm of amplitude over that range: limits are right to 6 %
+MOST_SHARE = 0.99  # largest amplitude tried for limits, in steady values: just below a change of sign
+DECADES = 3  # of amplitude searched below that, and once more where needed
+HALVINGS = 7  # bisections of the logarithm of amplitude over that range: limits are right to 6 %
 RISING = Tested(
     "numbers > 0 that rise, in s", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0))
 )
 SIZES = Tested("numbers > 0, in SI units", lambda given: np.size(given) == 0 or _positive(given))
-COMPARED = 5  # periods at the end that are compared: repetition up to every 4th is seen
+COMPARED = 5  # last periods that are compared: repetition up to every 4th is found
 
 
 @checked(periods=RISING, amplitudes=SIZES, input=NAME, output=NAME, on=NAME, limits=FLAG)
@@ -241,7 +241,7 @@ class _Forced:
         return 1 / float(np.expm1(min(-self.decay * time, MOST_FADED))) if self.decay < 0 else 0.0
 
     def _run(self, amplitude: float, period: float, count: int, rtol: float) -> tuple[dict[str, Array], str]:
-        """Observables over the period before the middle of so many and over the last ones, and how the run ended."""
+        """Observables over the period before the middle of `count` and over the last `COMPARED`; status of the run."""
         first = np.array([count // 2 - 1, *range(count - COMPARED, count)])
         times = period * (first[:, None] + np.arange(SAMPLES) / SAMPLES).ravel()
         run = simulate(

@@ -19,7 +19,7 @@ from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
 PERIODIC, NOT_SETTLED, IRREGULAR = "periodic", "not settled", "irregular"
-MOST_TOLD = 4  # resonances, in words
+MOST_TOLD = 4  # resonances listed in the text
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,10 +33,10 @@ from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import pack
 
 Array = np.ndarray
-MOMENTS = 1000  # at which the verdict is asked, besides those at which something jumps
-REFINED = 100  # moments between two of these, at which it is asked again where they differ
-DEPARTED = 2.0  # so many times as fast as asked slip must be for a slip event too
-ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # what ends steady sliding and the motion
+MOMENTS = 1000  # times of evaluation, besides those at jumps
+REFINED = 100  # times of evaluation between two successive ones with different verdicts
+DEPARTED = 2.0  # ratio of slip rate to that asked for above which motion counts as departed, as for a slip event
+ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # statuses that end both steady sliding and the motion
 
 
 @dataclass(frozen=True, eq=False)

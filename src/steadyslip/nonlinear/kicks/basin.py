@@ -33,7 +33,7 @@ from steadyslip.nonlinear.orbits.follow import cycles
 
 Array = np.ndarray
 POINTS = 81
-STEPS = 2e9  # of integration, of all motions of a basin
+STEPS = 2e9  # integration steps for all motions of a basin
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,8 @@ from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
 Array = np.ndarray
-COARSE = 48  # sizes of the first scan of each rig
-WIDE = 0.1  # relative width of an undecided bracket beyond which its middle is no threshold
+COARSE = 48  # sizes in the first scan of each rig
+WIDE = 0.1  # relative width above which the middle of an undecided bracket is no threshold
 BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding",
           "out of range")  # fmt: skip
 """What limits the kicks of a rig: what comes of the smallest that fails, why there is no size, or another reason;

@@ -22,15 +22,15 @@ from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
 Array = np.ndarray
-BESIDE = 1e-4  # distance of the runs beside, in natural sizes
-ROUNDS = 8  # of Newton's method
-CLOSED = 1e-6  # distance after a period, in natural sizes, below which an orbit is closed,
+BESIDE = 1e-4  # distance of neighbouring runs for differences, natural sizes
+ROUNDS = 8  # Newton iterations
+CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes,
 LOOSE = 1e3  # or this many integration tolerances
-ATTRACTS = 1e-3  # distance of multipliers from one that finite differences can tell
-WORTH = 0.1  # error of the multiplier of the motion itself beyond which they tell nothing
-ON = 0.05  # distance of the run from the orbit, in sizes of the orbit, at which its multipliers speak for the run
-PRECISE = 0.01  # error of the orbit, in sizes of it, that is allowed
-AWAY = 1e-3  # distance from steady sliding below which a closed orbit is not told from it
+ATTRACTS = 1e-3  # distance of multipliers from 1 that finite differences resolve
+WORTH = 0.1  # error of the trivial multiplier above which the others are not used
+ON = 0.05  # distance of the run from the orbit, in sizes of the orbit, up to which its multipliers apply
+PRECISE = 0.01  # allowed error of the orbit, as a share of its size
+AWAY = 1e-3  # distance from steady sliding below which a closed orbit cannot be told from it
 DONE = STATUSES.index("done")
 
 

@@ -14,8 +14,8 @@ from steadyslip.motion.single import areas as areas_of
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
 Array = np.ndarray
-ROUNDING = 1e-14  # of stresses, in the normal stress
-BALANCED = 12  # rounds of Newton's method for the balance of forces
+ROUNDING = 1e-14  # relative rounding error of stresses, in units of the normal stress
+BALANCED = 12  # largest number of Newton iterations for the balance of forces
 
 
 @question

@@ -12,11 +12,11 @@ from steadyslip.nonlinear.kicks.field import field_of
 from steadyslip.nonlinear.kicks.rest import Rest
 
 Array = np.ndarray
-REACH = 60.0  # of ln(velocity/drive), to both sides, within which a fold is looked for,
-COUNT = 2401  # at so many velocities first
-BISECTIONS = 60
-NEAR = 1e-7  # force that is missing, as a share of the normal stress, at a state that has come to a fold,
-CLOSE = 1e-3  # and difference of ln(velocity/drive), where its own velocity is known
+REACH = 60.0  # range of ln(velocity/drive), to both sides, in which a fold is searched for,
+COUNT = 2401  # at this many velocities first
+BISECTIONS = 60  # halve 2 REACH/COUNT down to rounding
+NEAR = 1e-7  # largest residual force, as a share of the normal stress, at a state on a fold,
+CLOSE = 1e-3  # and largest difference of ln(velocity/drive), where the state's own velocity is known
 
 
 def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:

@@ -29,7 +29,7 @@ from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, Judged, StepBudget, continuous_at
 
 Array = np.ndarray
-PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself
+PATIENCE = 5.0  # factor of time, against that in a scan, for which single motions are followed
 
 
 @dataclass(frozen=True)

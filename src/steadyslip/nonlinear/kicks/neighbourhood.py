@@ -25,11 +25,11 @@ from steadyslip.nonlinear.kicks.rest import Rest
 
 Array = np.ndarray
 LARGEST, SMALLEST = 4.0, 1e-12  # radius, in natural sizes of the weakest mode
-SHRINK = 0.6
-LONG = 30.0  # natural sizes of slip per natural size of all else, beyond which a mode is measured by all else
+SHRINK = 0.6  # factor between successive trial radii
+LONG = 30.0  # ratio of slip to all else, in natural sizes, above which a mode is scaled by all else
 SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
-INNER = (0.75, 0.5, 0.25, 0.1)  # shells inside the ball that are looked at too
-MARGIN = 0.5  # share of the linear decay of V that is asked for
+INNER = (0.75, 0.5, 0.25, 0.1)  # radii of inner shells that are checked too, as shares of the ball's
+MARGIN = 0.5  # required share of the linear decay of V
 
 
 class Neighbourhood:

@@ -4,7 +4,7 @@ A motion returns once it is in a computed neighbourhood of steady sliding that i
 oscillates once it is on a closed orbit that was found and attracts (`closed_orbits`); blow-up and loss of contact are
 seen, and so is that a motion has no continuous solution any further (`fold`). Where steady sliding is unstable nothing
 returns to it, and irregular motion that has gone on for dozens of peaks, none of them higher than those before,
-oscillates too. Whatever is none of these runs on, and after a stated time it is *undecided*, for a reason in `DOUBTS`.
+oscillates too. Any other motion runs on, and after a limit of time it is *undecided*, for a reason in `DOUBTS`.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ from steadyslip.nonlinear.kicks.spans import (
 )
 
 Array = np.ndarray
-MOST_STEPS = 400_000  # by which a motion is undecided, times its effort
+MOST_STEPS = 400_000  # integration steps, times the effort, after which a motion is undecided
 EARLY, HALFWAY = (
     0.05,
     0.4,
 )  # share of the time allowed after which longer cycles are looked for; where sliding is stable
-ALIKE = 1e-2  # relative change of the time between slip events from span to span below which a cycle is looked for
-PEAKS = 40  # of velocity in the last span of irregular motion,
-HIGHER = 0.01  # by this share of ln(velocity/drive) they may be higher than all before,
-LEFT = 30.0  # and so many growth times of unstable steady sliding it has gone on for
+ALIKE = 1e-2  # relative change of the time between slip events below which a cycle is searched for
+PEAKS = 40  # velocity peaks in the last span that irregular motion must have,
+HIGHER = 0.01  # share of ln(velocity/drive) by which these may exceed all before,
+LEFT = 30.0  # growth times of unstable steady sliding for which it must have lasted
 CODE = {word: number for number, word in enumerate(STATUSES)}
 
 
@@ -58,7 +58,7 @@ def outcomes_of(
 ) -> Array:
     """Simulate motions and return outcomes, indices into `OUTCOMES` (m,); from states `start` (m, n) if given.
 
-    `advanced` is told now and then how many more have been decided.
+    `advanced` is called now and then with the number of further motions decided.
     """
     return _Course(runs, threads, start).run(advanced)
 

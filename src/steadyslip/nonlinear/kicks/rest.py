@@ -15,7 +15,7 @@ from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales
 
 Array = np.ndarray
-NEUTRAL = 1e-8  # growth per radian below which small motions neither grow nor decay
+NEUTRAL = 1e-8  # growth per radian below which small motions count as neither growing nor decaying
 
 
 @dataclass(frozen=True, eq=False)

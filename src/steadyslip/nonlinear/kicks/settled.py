@@ -27,7 +27,7 @@ Array = np.ndarray
 S = inner_symbol("s", positive=True)
 """The normal stress sought, apart from the rig's own steady one."""
 STEPS = 8  # from the rig's own inputs to the new ones, where the normal stress has no closed form
-ROUNDS = 40  # of Newton's method at most
+ROUNDS = 40  # largest number of Newton iterations
 SETTLED = 1e-9  # change of the state, in natural sizes, at the end of the search for steady sliding of a machine,
 ROUNDED = 1e-5  # or less than this, where rounding keeps it from falling any further
 

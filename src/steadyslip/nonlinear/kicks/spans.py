@@ -36,15 +36,15 @@ CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 """Outcomes that are not a return."""
 OPEN = -1
 
-USUAL = 3  # variables of a slider, by which the work of a step is measured
-STIFF = "rodas4"  # the method for stiff motions, among them those that an explicit one needs too many steps for
-LOADING = 40.0  # natural lengths that the load point moves at least, to take up what a kick has let go,
+USUAL = 3  # state variables of a slider, the unit of the work of a step
+STIFF = "rodas4"  # method for stiff motions, and for those for which the explicit method needs too many steps
+LOADING = 40.0  # smallest advance of the load point, natural lengths, to take up what a kick has released,
 TURNS = 3.0  # natural periods,
 DECAYS = 6.0  # and decay times in the first span of a run; each span is twice as long as the one before
 MOST_TURNS = 1000.0  # natural periods, and
 MOST_LOADING = 4000.0  # natural lengths after which a motion is undecided
-RELOAD = 1.5  # so many times the time in which the load point catches up with the block is no motion to wait for
-NEUTRAL_TURNS = 100.0  # where small motions neither grow nor decay: what stays bounded so long counts as returned
+RELOAD = 1.5  # factor on the time in which the load point catches up with the block, without motion to wait for
+NEUTRAL_TURNS = 100.0  # natural periods of bounded motion that count as a return where sliding is neutrally stable
 
 
 def doubt_of(outcome: int) -> str:
@@ -60,7 +60,7 @@ class StepBudget:
 
     @classmethod
     def of(cls, steps: float, variables: int) -> StepBudget:
-        """Budget of `steps` for a slider, fewer in proportion to the number of variables."""
+        """Budget of `steps` for a slider; less for more variables, by the square of their number."""
         return cls(steps * min(1.0, (USUAL / variables) ** 2))
 
 

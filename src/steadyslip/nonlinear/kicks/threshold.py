@@ -33,11 +33,11 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
 
 Array = np.ndarray
-COARSE = 240  # sizes of the first scan of a single rig,
-BLOCK = 48  # so many at a time
-FINE = 47  # sizes between the ends of a bracket, at each step of narrowing
-STEPS = 1e9  # of integration, of all motions of one threshold
-BEYOND = 1.01  # edges over this: where it is looked what happens beyond
+COARSE = 240  # sizes in the first scan of a single rig
+BLOCK = 48  # sizes simulated at a time
+FINE = 47  # sizes between the ends of a bracket in each round of narrowing
+STEPS = 1e9  # integration steps for all motions of one threshold
+BEYOND = 1.01  # factor on the size of an edge at which the outcome beyond is simulated
 
 
 @dataclass(frozen=True)

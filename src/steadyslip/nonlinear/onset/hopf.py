@@ -181,8 +181,8 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
     ----------
     rig : Slider or Machine
     along : str, optional
-        Dotted name, or unique last part, of the parameter whose edge is meant; of a machine with several stiffnesses
-        it has to be said.
+        Dotted name, or unique last part, of the parameter whose edge is meant; required for a machine with
+        several stiffnesses.
     branch : int, optional
         Which steady sliding, by rising normal stress, where a rig has several.
 

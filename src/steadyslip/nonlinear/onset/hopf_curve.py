@@ -31,8 +31,8 @@ from steadyslip.nonlinear.onset.coefficient import coefficients
 from steadyslip.nonlinear.onset.hopf import onsets, parameter_along
 
 Array = np.ndarray
-DECADES = 6.0
-SMALLEST_FREQUENCY = 1e-4  # of the one at the start; below, the edge has become one of divergence
+DECADES = 6.0  # default range of a parameter to each side
+SMALLEST_FREQUENCY = 1e-4  # ratio to the frequency at the start below which the edge counts as one of divergence
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ def _followed(curve: SolutionCurve, start: Point, plane: _Plane, spacing: float)
                 return found, "too many points; give ranges with between="
     except Failure as failure:
         return found, str(failure)
-    raise InternalError("a curve ended without a reason")
+    raise InternalError("following the oscillatory edge stopped without a reason; this is a bug, please report it")
 
 
 def _on_the_limit(curve: SolutionCurve, inside: Point, outside: Point, plane: _Plane) -> list[Point]:

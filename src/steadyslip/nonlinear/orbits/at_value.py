@@ -20,8 +20,8 @@ from steadyslip.nonlinear.orbits.search import AHEAD, PATIENCE
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 
 Array = np.ndarray
-MOST_STEPS_BETWEEN = 40
-ASIDE = 1e-2  # of the unknowns: how far from an unstable cycle a motion begins
+MOST_STEPS_BETWEEN = 40  # continuation steps between two neighbours on a branch
+ASIDE = 1e-2  # distance, in unknowns, from an unstable cycle at which a motion begins
 
 
 def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:

@@ -12,9 +12,9 @@ from steadyslip.kernels.layout import Recorded
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
-NODES = 48  # places at which a cut is considered
-MOST_GROWTH = 1e3  # of deviations within a segment
-QUICK = 30.0  # speed, in units of the mean along the cycle, beyond which it is not cut
+NODES = 48  # candidate places of a cut
+MOST_GROWTH = 1e3  # largest growth of deviations within a segment
+QUICK = 30.0  # speed, in units of the mean along the cycle, above which no cut is made
 
 
 def cut(shooting: Shooting, u: Array) -> Orbit | None:

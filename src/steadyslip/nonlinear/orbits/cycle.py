@@ -26,9 +26,9 @@ def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
     return {name.replace("stress", "force"): (name, unit.replace("Pa", "N")) for name, unit in UNITS.items()}
 
 
-OPEN = 1e-4  # share of a cycle's size by which a motion may miss its start: an order below what Newton's method leaves
-IMPRECISE = 1e-3  # error of the multiplier along the motion beyond which a cycle is not believed
-UNCERTAIN = 3.0  # errors of multipliers other than the one along the motion are taken to be up to so many times larger
+OPEN = 1e-4  # largest allowed closing error, as a share of the cycle's size; Newton's method leaves an order less
+IMPRECISE = 1e-3  # error of the trivial multiplier beyond which a cycle is rejected
+UNCERTAIN = 3.0  # assumed ratio of the errors of other multipliers to that of the trivial one
 
 
 @dataclass(frozen=True)

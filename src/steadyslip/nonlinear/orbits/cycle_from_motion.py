@@ -23,14 +23,14 @@ from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
 BEGINS = LOG_KINDS.index("slip begins")  # of a slip event: the block, speeding up, is as fast as the load point
-RINGS = 8  # passages for each slip event, rings after it among them, beyond which no more events are waited for
-RETURNS = 17  # so many returns are compared: cycles with up to 16 of them in a period are found
-NEAR = 0.1  # distance, as a share of the cycle's size, to which Newton's method may go from the motion
-CLOSE = 0.05  # distance within which a return may be one to the same place
-SMALLEST = 1e-5  # range, in natural sizes, below which a motion is not told from steady sliding
-MOST_TRIES = 4
-FIRST_SPAN = 60.0  # natural times
-MOST_STEPS = 40_000
+RINGS = 8  # passages per slip event, ringing included, beyond which no more events are waited for
+RETURNS = 17  # returns that are compared: cycles with up to 16 returns per period are found
+NEAR = 0.1  # largest distance from the motion to the solution, as a share of the cycle's size
+CLOSE = 0.05  # distance below which two returns may be at one place of a cycle
+SMALLEST = 1e-5  # range, in natural sizes, below which a motion counts as steady sliding
+MOST_TRIES = 4  # numbers of returns per period that are tried
+FIRST_SPAN = 60.0  # length of the first simulation, natural times
+MOST_STEPS = 40_000  # integration steps per stretch of motion
 
 
 def cycle_near(
@@ -49,7 +49,7 @@ def cycle_near(
     patience : int
         How many stretches of some returns each to go on for, as long as no cycle is close enough.
     attracts : bool
-        Whether to pass by cycles that are not stable.
+        True to skip cycles that are not stable.
     unknowns : ndarray (u,), optional
         Of the balances at `state`, where they are known.
 
@@ -158,7 +158,7 @@ class _Returns:
 
 
 def _enough(slips: _Returns, passes: _Returns) -> bool:
-    """Whether returns can be compared: begins of slip events, or where there are few of these, all passages."""
+    """True if there are enough returns to compare: starts of slip events, or all passages if events are few."""
     few = len(passes.times) >= RETURNS and len(slips.times) < 2
     return len(slips.times) >= RETURNS or few or len(passes.times) >= RINGS * RETURNS
 

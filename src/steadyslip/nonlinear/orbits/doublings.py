@@ -13,7 +13,7 @@ from steadyslip.nonlinear.orbits.search import cut_back, met
 from steadyslip.nonlinear.orbits.special import MET, looks
 from steadyslip.nonlinear.orbits.tracer import BranchPiece, Tracer
 
-SIZES = (1e-3, 1e-2, 1e-4, 1e-1)  # of the first cycle's distance from the doubling, in unknowns, one after another
+SIZES = (1e-3, 1e-2, 1e-4, 1e-1)  # distances of the first cycle from the doubling, in unknowns, tried in this order
 
 
 def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:

@@ -17,12 +17,12 @@ from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle, End, SpecialCycl
 from steadyslip.nonlinear.orbits.flow import Flow
 from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, BranchPoint, lies_between
 
-WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
-STANDING = 12  # so many cycles within a twentieth of each other, at one value but for rounding, are no progress
-RETRACED = 4  # so many cycles in a row between neighbours that are known are the way back
+WINDINGS = 6  # folds, each closer to the next, after which a branch counts as winding round one value
+STANDING = 12  # cycles alike within 5 %, at one parameter value but for rounding, after which the branch stands still
+RETRACED = 4  # consecutive cycles between known neighbours after which the branch has turned back
 TOO_UNSTABLE = 1e8
 SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
-LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
+LARGE = 1e6  # peak velocity, in units of the drive's, beyond which a cycle grows without bound
 ENDS = {
     "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the {block} a mass or {damping} to "
     "follow the cycles further",

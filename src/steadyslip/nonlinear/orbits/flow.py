@@ -37,19 +37,19 @@ from steadyslip.protocol.segments import Segments
 Array = np.ndarray
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
-STIFF = "rodas5p"  # of the Rosenbrock methods the one of order 5: tolerances are tight
-MOST_STEPS = 100_000  # of one run, some tenths of a second; and where runs have been shorter,
-FAR_MORE, FEW_STEPS = 20, 5_000  # so many times those of the last that succeeded, but no fewer than these
-UNHEARD = 1e12  # by which errors allowed of sensitivities grow where they have no say in the steps
-NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
-KINDS_EACH = len(LOG_KINDS) - 2  # numbers of kinds of events at a contact
-DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
+STIFF = "rodas5p"  # Rosenbrock method of order 5, as tolerances are tight
+MOST_STEPS = 100_000  # of one run: some tenths of a second
+FAR_MORE, FEW_STEPS = 20, 5_000  # limit of a run: factor on the steps of the last one, and the least
+UNHEARD = 1e12  # factor of the tolerances of sensitivities where they are not to affect the steps
+NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are reused
+KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
+DIFFERENCE = 1e-5  # relative step of the parameter for central differences of the constants
 
 
 class FlowFailure(Failure):
     """An integration that stopped before its end.
 
-    `status` says why, in the words of `steadyslip.motion.status`, `contact` at which contact of a machine.
+    `status` is the reason, a word of `steadyslip.motion.status`; `contact` names the contact of a machine concerned.
     """
 
     def __init__(self, status: str, contact: str = "") -> None:
@@ -135,7 +135,7 @@ class FlowRunner:
     rounding : float
         Size of the error that rounding of forces makes in a state, in natural sizes, where it is known.
     led : bool
-        Whether the motion alone leads the steps, whatever the errors of sensitivities.
+        True where step sizes follow the error of the motion alone, not that of the sensitivities.
 
     Raises
     ------

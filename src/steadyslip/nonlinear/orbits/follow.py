@@ -26,10 +26,10 @@ from steadyslip.nonlinear.orbits.special import SMALL
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, BranchPiece, Tracer, orbit_of
 
 Array = np.ndarray
-SMALLEST = 1e-12  # amplitude that differs from none by more than rounding
-FINER, FINEST = 1e-2, 1e-13  # share of the errors per step at which cycles are computed again; rounding allows no less
-MOST_REPEATED = 20  # cycles computed again: where more fail their checks, smaller errors per step are to be asked for
-LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes to begin with where smaller cycles cannot be followed
+SMALLEST = 1e-12  # smallest amplitude of ln v: some thousand roundings of the velocity
+FINER, FINEST = 1e-2, 1e-13  # factor of rtol for recomputed cycles, and the smallest rtol above rounding
+MOST_REPEATED = 20  # largest number of recomputed cycles: where more fail, the user should ask for a smaller rtol
+LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes of ln v to begin with where smaller cycles cannot be followed
 
 
 @checked(
@@ -58,8 +58,8 @@ def cycles(
     ----------
     rig : Slider or Machine
     along : str, optional
-        Dotted name, or unique last part, of the parameter that is varied; of a machine with several stiffnesses it
-        has to be said.
+        Dotted name, or unique last part, of the parameter that is varied; required for a machine with several
+        stiffnesses.
     between : (low, high), optional
         Range in which to follow, SI units or text; by default a factor of a thousand to each side of the edge
         for positive parameters, the whole domain for others.
@@ -67,15 +67,15 @@ def cycles(
         Of ln(v/v0) at which the branch starts; 1e-6, with mass 1e-4, unless given, and more where no branch of such
         small cycles can be followed.
     doublings : int, optional
-        How many period doublings to follow onto the branch of twice the period, one after another.
+        Number of successive period doublings to follow onto the branch of twice the period.
     most_points : int, optional
         Limit of cycles on a branch. Four million steps of integration are the limit of work on it, and as many on its
-        cycles of twice the period, of which each doubling may take half of what is left: what was found until then is
-        kept, and ``end`` says so.
+        cycles of twice the period, of which each doubling may take half of what is left: cycles found until then
+        are kept, and ``end`` gives this reason.
     rtol : float, optional
         Error allowed per step of integration; 1e-10, with mass 1e-9, unless given.
     branch : int, optional
-        Which steady sliding, where there are several. The result remembers it, and `rtol`.
+        Index of the steady sliding, where there are several. The result stores it, and `rtol`.
     progress : callable, optional
         Called with the number of cycles found and the latest one. Ctrl-C (or KeyboardInterrupt from here) returns
         what there is.

@@ -16,8 +16,8 @@ from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, BranchPiece, Tracer
 
 Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a piece broke off to the end of the range
-AHEAD = 2.0  # natural sizes of slip by which a motion begins beside steady sliding
-PATIENCE = 12  # stretches of motion within which it has to come to a cycle
+AHEAD = 2.0  # initial displacement of a motion beside steady sliding, natural sizes of slip
+PATIENCE = 12  # stretches of motion within which it has to reach a cycle
 
 
 def search_on(tracer: Tracer, pieces: list[BranchPiece]) -> None:

@@ -18,8 +18,8 @@ from steadyslip.nonlinear.orbits.flow import FlowRunner
 
 Array = np.ndarray
 ONE = np.ones(1)
-ROUNDED = 300.0  # so many times the rounding of a state, Newton's method may step where it is at its end,
-KNOWN = 1e-3  # but no farther than this share of a cycle's size
+ROUNDED = 300.0  # allowed last Newton step, in roundings of the state, where steps no longer shrink,
+KNOWN = 1e-3  # but at most this share of the cycle's size
 
 
 @dataclass(frozen=True, eq=False)

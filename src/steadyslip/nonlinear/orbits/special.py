@@ -12,13 +12,13 @@ from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
-NOISE = 3e-9  # relative differences of the parameter that cannot be told from rounding near the onset
-MET = 2e-3  # difference of logarithms of period and velocities within which cycles are the same
-BLURRED = 10.0  # so many times what a last step of Newton's method was
-ROUNDING = 1e-11  # such differences that are rounding anywhere
-FOLDED = 0.9  # largest multiplier below which no fold is believed: there it is one
-REAL = 1e-3  # share of its size that the imaginary part of a multiplier may be, of two that have just met
-SMALL = 1e-2  # amplitude below which multipliers within rounding of one are judged by the kind of onset
+NOISE = 3e-9  # relative difference of parameter values below which they agree within rounding, near the onset
+MET = 2e-3  # difference of the logarithms of period and velocities below which cycles are the same
+BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the parameter; chosen by trial
+ROUNDING = 1e-11  # relative difference of parameter values that is rounding anywhere
+FOLDED = 0.9  # growth below which a fold is rejected: at a true fold a multiplier is 1
+REAL = 1e-3  # largest relative imaginary part of a multiplier that counts as real: two that have just met differ by it
+SMALL = 1e-2  # amplitude of ln v below which multipliers equal to 1 within rounding are decided by the kind of onset
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ Made = Callable[[Shooting, Point], BranchPoint]
 def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> list[SpecialCycle]:
     """Locate folds, doublings and tori between two neighbouring points with the same unknowns, in order.
 
-    Where stability changes at none of these, as at cycles that are symmetric beyond a multiplier 1, the place is found
+    Where stability changes at no such cycle, as at cycles that are symmetric beyond a multiplier 1, the place is found
     by the size of the largest multiplier. Where both have the same value of the parameter but for rounding, as in a
     canard, multipliers are rounding too; they change by factors from one point to the next, and no doublings or tori
     are read from them.
@@ -51,7 +51,7 @@ def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> li
     Parameters
     ----------
     made : callable
-        What derives everything from a point.
+        Makes a `BranchPoint` from shooting equations and a solution.
     index : int
         Place in the branch of the later point.
     """
@@ -144,7 +144,7 @@ def doubling(multipliers: Array) -> float:
 def torus(multipliers: Array) -> float:
     """Test function of a torus: positive where a complex pair lies outside the unit circle; −1 without such a pair.
 
-    Next to one a pair cannot be told from two real multipliers.
+    A pair next to 1 or −1 may be two real multipliers that have just met.
     """
     pairs = multipliers[np.abs(multipliers.imag) > REAL * np.abs(multipliers)]
     return float(np.max(np.abs(pairs) - 1, initial=-1.0))

@@ -20,16 +20,16 @@ from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
 Array = np.ndarray
-LARGEST_STEP = 0.5
-HALVINGS = 3  # of a step in which something may change twice: to an eighth, a sixteenth of a natural size
-SMALLEST_STEP = 1e-9
-CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
-SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # so many steps below this share of the largest, and not growing, are slow
-OF_RANGE = 3.0  # in what a state variable goes through: its measure then
-UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
-MOST_STEPS = 4_000_000  # of integration for all pieces of a branch: some seconds
-LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
-HIDDEN = 0.1  # share of a small cycle's distance from the edge that rounding may be
+LARGEST_STEP = 0.5  # largest step of arclength; unknowns are logarithms, so about a factor 1.6 of a state
+HALVINGS = 3  # halvings of a step in which a test function may vanish twice: down to 1/8, 1/16 of a natural size
+SMALLEST_STEP = 1e-9  # smallest step of arclength, the order of the Newton tolerance
+CREEP = 60  # steps in a row without growth, below 1e-3 of the largest, after which the branch counts as stuck
+SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # slow: steps in a row below this share of the largest, growing less
+OF_RANGE = 3.0  # scale of a state variable, in units of its range in the cycle, after rescaling
+UNRESOLVED = 1e-7  # distance from 1 of a small cycle's multiplier below which it does not decide stability
+MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: some seconds
+LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
+HIDDEN = 0.1  # largest share of rounding in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
 
 
@@ -37,9 +37,9 @@ INTERRUPTED = "interrupted by the user"
 class BranchPiece:
     """Cycles in the order in which they were followed, and the bifurcations among them.
 
-    `whole` tells an end that lies in the matter from one where the cycles could not be followed any further; `contact`
-    is that of a machine which lifts off there, or is the fastest. `begins` and `stops` are both ends where they are not
-    the first and last cycle; `beyond` is a cycle past the end that is none of the piece.
+    `whole` is False where the cycles could not be followed any further, and True for an end with a physical reason.
+    `contact` names the contact of a machine that lifts off at the end, or is the fastest. `begins` and `stops` are the
+    ends where these are not the first and last cycle; `beyond` is the next cycle past the end, not part of the piece.
     """
 
     points: list[BranchPoint] = field(default_factory=list)
@@ -140,7 +140,7 @@ class Tracer:
         roots, vectors = np.linalg.eig(jacobian[0] * ratio)
         i = int(np.argmin(np.abs(roots - 1j * onset.angular_frequency)))
         vector = vectors[:, i] * flow.scales
-        # unit amplitude of v/v0 where slip is watched, in phase
+        # unit amplitude of v/v0 at the watched contact, in phase
         size = setting.speed / 2 / (1j * onset.angular_frequency * complex(setting.slip @ vector))
         start = 2 * (size * vector).imag  # a quarter of a period before the peak
         shooting = self.shooting(amplitude=amplitude)
@@ -158,7 +158,7 @@ class Tracer:
         Raises
         ------
         Failure
-            If there is none, or it cannot be told from the cycle gone round twice.
+            If there is none, or it is the cycle itself, run through twice.
         """
         flow, (vector, pieces) = self.flow, self.deviation(cycle, -1.0)
         orbit = orbit_of(cycle)
@@ -230,9 +230,9 @@ class Tracer:
         Parameters
         ----------
         twice : bool
-            Whether these are cycles of twice a period, which end where that is halved.
+            True for cycles of twice a period, which end where their period is halved.
         met : callable, optional
-            Says that a cycle is known already; the piece ends before it.
+            True for a cycle that is known already; the piece ends before it.
         """
         piece = BranchPiece()
         try:
@@ -491,5 +491,5 @@ class Tracer:
 def orbit_of(cycle: Cycle) -> Orbit:
     """States and period from which a cycle was computed."""
     if cycle._orbit is None:
-        raise InternalError("a cycle without its orbit; please report it")
+        raise InternalError("a cycle has no solution of its equations to start from; this is a bug, please report it")
     return cycle._orbit

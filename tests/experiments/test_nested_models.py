@@ -40,7 +40,7 @@ def test_two_states_and_one(seed):
 
 def test_a_search_that_ends_badly_is_led_on_by_the_simpler_model(monkeypatch):
     """Searches find the best minimum of all records tried here by themselves; one is made to miss it."""
-    record, whole = made(lab.STEP), search._Search.polished
+    record, whole = made(lab.STEP), search._Search.refine_best
 
     def missed(self):
         found = whole(self)
@@ -48,7 +48,7 @@ def test_a_search_that_ends_badly_is_led_on_by_the_simpler_model(monkeypatch):
             return found
         return replace(found, coordinates=found.coordinates + 0.05, ssq=100 * found.ssq)
 
-    monkeypatch.setattr(search._Search, "polished", missed)
+    monkeypatch.setattr(search._Search, "refine_best", missed)
     assert ss.fit(two(), record, starts=8).ssq <= ss.fit(ss.lab_rig(), record).ssq * ALLOWED
 
 

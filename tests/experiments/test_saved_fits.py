@@ -57,8 +57,8 @@ def made(rig, records, chance, **options):
         (coordinates - chance.uniform(size=count), coordinates + 1), "0.0.7",
     )  # fmt: skip
     samples = sum(map(len, plan.records))
-    ramps = (refit.Ramped(0.1, 1 / 7, {"friction.a": 0.1}),)
-    memories = (refit.Remembered("normal_memory = 'linker-dieterich'", 1 / 9, {"friction.a": 0.2}),)
+    ramps = (refit.RampFit(0.1, 1 / 7, {"friction.a": 0.1}),)
+    memories = (refit.MemoryFit("normal_memory = 'linker-dieterich'", 1 / 9, {"friction.a": 0.2}),)
     fit.__dict__.update(
         model=chance.standard_normal(samples), as_measured={"friction.a": 1 / 3}, as_ramps=ramps, with_memories=memories
     )  # fmt: skip

@@ -45,7 +45,7 @@ def once_more(function, times):
 
 
 def test_half_of_the_runs_of_a_fit_are_no_fit(monkeypatch):
-    monkeypatch.setattr(search, "FIRST", 16)  # more than one thread runs at once
+    monkeypatch.setattr(search, "FIRST_STARTS", 16)  # more than one thread runs at once
     monkeypatch.setattr(forward, "run_many", lambda *arguments, **options: False)  # as it answers Ctrl-C
     with pytest.raises(KeyboardInterrupt):
         ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, 0))

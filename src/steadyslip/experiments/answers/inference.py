@@ -1,4 +1,4 @@
-"""Draws for ArviZ; the one place that knows the package."""
+"""Convert draws to ArviZ; the only module that imports the package."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ def inference_data(
     statistics: Mapping[str, Array] | None = None,
     members: Sequence[str] = (),
 ) -> Any:
-    """Draws as ArviZ takes them.
+    """Convert draws to the data type of ArviZ.
 
     Parameters
     ----------
     values : mapping of str to ndarray (m,) or (m, members)
-        SI units, chains one after another and equally long.
-    units : mapping of str to str
-    chains : int
+        Draws in SI units, one chain after another, all of equal length.
+        units : mapping of str to str
+            Unit of each quantity.
+        chains : int
+            Number of chains.
     statistics : mapping of str to ndarray (m,), optional
-        For the group ``sample_stats``.
+        Quantities of the group ``sample_stats``.
     members : sequence of str, optional
         Labels of the experiments.
 

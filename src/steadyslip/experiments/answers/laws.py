@@ -1,4 +1,4 @@
-"""Which law do the records speak for?"""
+"""Compare friction laws by fits to the same records, information criteria and cross-validation."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
-WIDTH = 100
-FIRST = 0.1  # of the effort: all laws get so much, those that promise to be the best the rest
-HOPELESS = 2.0  # times the least sum of squares: no longer search would make such a law the best
-TELLS = 6.0  # difference of BIC that is called strong (Kass & Raftery 1995)
-TWICE = 2.0  # sums of squares beyond which the ratio is told, not the difference
+WIDTH = 100  # characters of a line of text
+SCREENING_EFFORT = 0.1  # share of the effort for each law; the full effort is for those that may be the best
+MAX_SSQ_RATIO = 2.0  # laws above this multiple of the least sum of squares cannot become the best by a longer search
+STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass & Raftery 1995)
+MIN_SHOWN_RATIO = 2.0  # ratio of sums of squares above which text gives the ratio, below the percentage
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +36,16 @@ class LawComparison(Displayed):
     Attributes
     ----------
     fits : dict of str to Fit
-        By label.
+        Fits by label.
     criteria : dict of str to (float, float)
-        AIC and BIC, with the same number of independent samples for all.
+        AIC and BIC by label, with the same number of independent samples for all.
     left_out : tuple of str
-        Models that were not fitted before Ctrl-C.
+        Labels of models that were not fitted before Ctrl-C.
     refused : tuple of str
-        Models that cannot follow the records from any start.
+        Labels of models that cannot follow the records from any start.
     predicted : dict of str to float
-        Root mean square error of predicting samples that were left out, see `cross_validate`; of models that are not
-        far from the best, and empty unless asked for.
+        Root mean square error of predicting samples that were left out, see `cross_validate`, by label; only of models
+        near the best, and empty unless computed.
     """
 
     fits: dict[str, Fit]
@@ -56,17 +56,17 @@ class LawComparison(Displayed):
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C came before all were fitted."""
+        """True if Ctrl-C came before all models were fitted."""
         return bool(self.left_out)
 
     @property
     def best(self) -> str:
-        """Label of the model with the least BIC: a parameter more must be worth more than chance makes of it."""
+        """Label of the model with the least BIC, which penalises additional parameters."""
         return next(iter(self.fits))
 
     @property
     def weights(self) -> dict[str, float]:
-        """Schwarz weights: how probable each model is if all were as probable before."""
+        """Schwarz weights: probability of each model, by label, if all have the same prior probability."""
         least = min(bic for _, bic in self.criteria.values())
         raw = {label: float(np.exp(-0.5 * (bic - least))) for label, (_, bic) in self.criteria.items()}
         return {label: value / sum(raw.values()) for label, value in raw.items()}
@@ -92,15 +92,17 @@ class LawComparison(Displayed):
 
     @property
     def verdict(self) -> str:
-        """Which model is best, and by how much, in a sentence."""
+        """Sentence that names the best model and its lead over the next; empty for a single model."""
         best, *others = self.fits
         if not others:
             return ""
         own, next_best = self.fits[best], self.fits[others[0]]
         ahead = self.criteria[others[0]][1] - self.criteria[best][1]
         times = next_best.ssq / own.ssq
-        less = f"{times:.3g} times the sum of squares" if times > TWICE else f"a sum of squares {times - 1:+.2%}"
-        if ahead < TELLS:
+        less = (
+            f"{times:.3g} times the sum of squares" if times > MIN_SHOWN_RATIO else f"a sum of squares {times - 1:+.2%}"
+        )
+        if ahead < STRONG_EVIDENCE:
             return (
                 f"The records hardly tell '{best}' from '{others[0]}', which has {less} "
                 f"and is {ahead:.1f} behind in BIC; what both agree on may be relied on."
@@ -108,7 +110,7 @@ class LawComparison(Displayed):
         return f"'{best}' it is: '{others[0]}', the next, has {less} and is {ahead:.1f} behind in BIC."
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the laws by how much worse than the best they are.
+        """Draw each law's difference from the best.
 
         Returns
         -------
@@ -121,8 +123,8 @@ class LawComparison(Displayed):
 def compare(fits: Mapping[str, Fit]) -> LawComparison:
     """Compare fits to the same records by information criteria.
 
-    Samples count as many times as they are independent. How many that is, the residuals of the fit with the least sum
-    of squares say, for all of them: a model that leaves more structure in its residuals must not be excused by it.
+    Samples count by the number of independent ones, which the residuals of the fit with the least sum of squares give
+    for all fits: a model that leaves more structure in its residuals must not profit from it.
 
     Parameters
     ----------
@@ -193,13 +195,13 @@ def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, *
 
     try:
         for label in rigs:
-            fitted(label, FIRST * effort)
+            fitted(label, SCREENING_EFFORT * effort)
         if not fits:
             raise NotAvailable(f"none of the laws can follow these records from any start: {'; '.join(refused)}")
         fits |= {label: refit_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
-        for label in [label for label in _near(fits) if fits[label].search.cut]:
+        for label in [label for label in _candidates(fits) if fits[label].search.cut]:
             fitted(label, effort)
-        predicted = {label: cross_validate(fits[label]).rms for label in _near(fits)}
+        predicted = {label: cross_validate(fits[label]).rms for label in _candidates(fits)}
     except KeyboardInterrupt:
         if len(fits) < 2:
             raise
@@ -207,14 +209,14 @@ def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, *
     return replace(_in_order(fits), left_out=left_out, refused=tuple(refused), predicted=predicted)
 
 
-def _near(fits: Mapping[str, Fit]) -> list[str]:
-    """Fits that a longer search might still make the best."""
+def _candidates(fits: Mapping[str, Fit]) -> list[str]:
+    """Labels of the fits that a longer search might still make the best."""
     least = min(one.ssq for one in fits.values())
-    return [label for label, one in fits.items() if one.ssq <= HOPELESS * least]
+    return [label for label, one in fits.items() if one.ssq <= MAX_SSQ_RATIO * least]
 
 
 def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
-    """The labels compared by default: with all that changes of the normal stress can decide, where there are any."""
+    """Labels compared by default; with every memory of normal stress if the normal stress changes in a record."""
     law = rig.friction
     imposed = rig.contact.is_imposed() or rig.contact.has_pores()
     if not (imposed and any(record.stress_changes for record in records)):
@@ -223,18 +225,18 @@ def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
 
 
 def _options_of(rig: Slider, other: Slider, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of a fit to the rig as they are for one with another law."""
+    """Options of a fit adapted from one rig to another with a different law: names it lacks out, new ones free."""
     before, after = (set(can_be_free(each)) for each in (rig, other))
     found = dict(options)
     for key in ("free", "fixed", "separate"):
         if options.get(key) is not None:
-            found[key] = [name for name in options[key] if _full(name, before) not in before - after]
+            found[key] = [name for name in options[key] if _full_name(name, before) not in before - after]
     if options.get("free") is not None:
         found["free"] += sorted(after - before)
     return found
 
 
-def _full(name: str, known: Iterable[str]) -> str:
+def _full_name(name: str, known: Iterable[str]) -> str:
     try:
         return resolve(name, dict.fromkeys(known))
     except UnknownNameError:
@@ -242,7 +244,7 @@ def _full(name: str, known: Iterable[str]) -> str:
 
 
 def with_law(rig: Slider, label: str) -> Slider:
-    """The rig with the friction law, of those that its own names as alternatives, that a label names."""
+    """Rig with the alternative to its friction law that a label names, such as ``"aging, two states"``."""
     known = rig.friction.alternatives()
     if not known:
         raise ParameterError(

@@ -1,7 +1,7 @@
-"""Several experiments on one rock: what each says, with the others' help, and what the rock is like.
+"""Hierarchical (partially pooled) analysis of several experiments on one rock.
 
-Every experiment has parameters of its own, drawn from a population whose mean and spread are not known either. Those
-that say little are drawn towards the others (partial pooling); how much follows from how much the experiments differ.
+Every experiment has parameters of its own, drawn from a population with unknown mean and spread. Parameters that an
+experiment determines poorly are drawn towards the others, the more so the less the experiments differ.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ _COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class Population(ReadOnly):
-    """What several experiments say together.
+    """Population that several experiments are members of, with draws from its posterior.
 
     Attributes
     ----------
     fits : dict of str to Fit
-        By label.
+        Fits of the experiments, by label.
     names : tuple of str
-        Parameters.
+        Names of the parameters.
     conditions : dict of str to ndarray (experiments,)
-        What the means may depend on, by name.
+        Conditions on which the means may depend, by name.
     scale : float
-        Of the half-normal prior of the spreads, e-folds or natural sizes.
+        Scale of the half-normal prior of the spreads, e-folds or natural sizes.
     unknowns : tuple of Unknown
-        How coordinates become values, in the order of the names.
+        Conversion from coordinates to values, in the order of the names.
     draws : Pooled
-        From the posterior, in coordinates: logarithms of parameters that must be positive, else natural sizes.
+        Draws from the posterior, in coordinates: logarithms of positive parameters, natural sizes of others.
     """
 
     fits: Mapping[str, Fit]
@@ -70,31 +70,31 @@ class Population(ReadOnly):
     draws: Pooled = field(repr=False)
 
     def index(self, name: str) -> int:
-        """Place of a parameter, which may leave out leading parts of its name."""
+        """Index of a parameter; leading parts of its name may be left out."""
         return self.names.index(resolve(name, dict.fromkeys(self.names)))
 
     def mean(self, name: str) -> Estimate:
-        """The mean of the population (of a positive parameter the median), at mean conditions."""
+        """Mean of the population (for a positive parameter its median), at mean conditions."""
         p = self.index(name)
         return self._estimate(p, self.draws.mean[:, p, 0])
 
     def experiment(self, label: str, name: str) -> Estimate:
-        """One experiment's parameter, with the help of the others."""
+        """Parameter of one experiment, estimated together with the others."""
         if label not in self.fits:
             raise ParameterError([Problem("label", f"got {label!r}; allowed: {', '.join(map(repr, self.fits))}")])
         p = self.index(name)
         return self._estimate(p, self.draws.members[:, list(self.fits).index(label), p])
 
     def another(self, name: str, seed: int = 0) -> Estimate:
-        """What another experiment on this rock, at mean conditions, would have: mean, spread and their uncertainty."""
+        """Parameter predicted for a new experiment on this rock at mean conditions, with all uncertainties."""
         p = self.index(name)
         noise = np.random.default_rng(seed).standard_normal(len(self.draws.spread))
         return self._estimate(p, self.draws.mean[:, p, 0] + self.draws.spread[:, p] * noise)
 
     def spread(self, name: str, level: float = 0.95) -> tuple[float, float, float]:
-        """How much experiments differ: median, and ends of an interval that leaves the same outside on both sides.
+        """Standard deviation between experiments: median and ends of its central interval of probability `level`.
 
-        One standard deviation: of the logarithm where a parameter must be positive, else in SI units.
+        Of the logarithm of a positive parameter, else in SI units.
         """
         p = self.index(name)
         one = self.unknowns[p]
@@ -103,7 +103,7 @@ class Population(ReadOnly):
         return float(middle), float(low), float(high)
 
     def slope(self, name: str, condition: str) -> tuple[float, float, float]:
-        """How the mean changes per unit of a condition: median and 95 % interval, as `spread` counts."""
+        """Change of the mean per unit of a condition: median and 95 % interval, in the units of `spread`."""
         if condition not in self.conditions:
             allowed = ", ".join(map(repr, self.conditions)) or "none were given"
             raise ParameterError([Problem("condition", f"got {condition!r}; allowed: {allowed}")])
@@ -141,7 +141,7 @@ class Population(ReadOnly):
         return "\n".join(lines)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything, fits and their records included, to a netCDF file; `load_population` reads it back.
+        """Write the population, its fits and their records to a netCDF file; `load_population` reads it back.
 
         Raises
         ------
@@ -163,7 +163,7 @@ class Population(ReadOnly):
         write_table(path, POPULATION, table, [store.to_dataset(one) for one in self.fits.values()])
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw every parameter of every experiment, alone and with the others, and the population.
+        """Draw every parameter of every experiment, fitted alone and pooled, and of the population.
 
         Returns
         -------
@@ -172,7 +172,7 @@ class Population(ReadOnly):
         return draw(self, ax=ax)
 
     def to_arviz(self) -> Any:
-        """The draws for ArviZ, chain by chain, values in SI units.
+        """Convert the draws, in SI units, to ArviZ.
 
         Returns
         -------
@@ -198,7 +198,7 @@ class Population(ReadOnly):
         return inference_data(found, units, self.draws.chains, members=list(self.fits))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units."""
+        """Convert to a dict of JSON-ready data, SI units."""
         ends = ("median", "low", "high")
         parameters = {
             name: {
@@ -228,7 +228,7 @@ def _spread_words(found: tuple[float, float, float], one: Unknown) -> str:
 
 
 def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str, values: Array) -> str:
-    """How much the mean changes from the least to the largest of the conditions."""
+    """Text of the change of the mean from the least to the largest value of a condition."""
     ends = (float(np.min(values)), float(np.max(values)))
     whole = " to ".join(format_quantity(x, "Pa") if condition == STRESS else f"{x:.4g}" for x in ends)
     middle, low, high = (x * (ends[1] - ends[0]) for x in found)
@@ -247,7 +247,7 @@ def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str
 def load_population(path: str | PathLike[str]) -> Population:
     """Read a population that `Population.save` wrote.
 
-    Nothing in the file is executed; damage is found, whatever it is.
+    Nothing in the file is executed; a damaged file is refused.
 
     Raises
     ------
@@ -281,11 +281,10 @@ def population(
     fits: Mapping[str, Fit] | Sequence[Fit], names: Sequence[str] | None = None, *,
     conditions: str | Mapping[str, Sequence[float]] | None = None, scale: float = 1.0, count: int = 4000, seed: int = 0,
 ) -> Population:  # fmt: skip
-    """The population that several experiments are members of, each fitted on its own.
+    """Estimate the population of several experiments, each fitted on its own.
 
-    Every experiment enters with its estimates and their whole covariance: a normal likelihood in the coordinates of
-    the fit, logarithms of parameters that must be positive. An experiment that does not determine a parameter says
-    nothing about it, and takes it from the others.
+    Every experiment enters with its estimates and their full covariance: a normal likelihood in the coordinates of the
+    fit, logarithms of positive parameters. A parameter that an experiment does not determine follows from the others.
 
     Parameters
     ----------
@@ -349,7 +348,7 @@ def population(
 
 
 def _references(fits: Mapping[str, Fit]) -> list[Problem]:
-    """Levels of friction are those at a reference rate, which must be the same in all."""
+    """Problems with reference velocities, which must be equal in all fits: levels of friction refer to them."""
     found = []
     rigs = {label: one.plan.rig for label, one in fits.items()}
     for name in next(iter(rigs.values())).of_kind("reference rate"):
@@ -400,7 +399,7 @@ def _conditions(fits: Mapping[str, Fit], conditions: Any) -> dict[str, Array]:
 
 
 def _estimate_of(one: Fit, names: tuple[str, ...], unknowns: tuple[Unknown, ...], design: Array) -> ExperimentEstimate:
-    """What a fit says of some parameters, those that it does not determine left out."""
+    """Estimates of the parameters that a fit determines, with their covariance."""
     places = {p: one.names.index(name) for p, name in enumerate(names) if name in one.names}
     seen = [p for p, k in places.items() if np.isfinite(one.covariance[k, k])]
     own = [places[p] for p in seen]

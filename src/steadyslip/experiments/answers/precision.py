@@ -1,4 +1,4 @@
-"""Design of experiments: how well would a protocol determine each parameter?"""
+"""Design of experiments: errors of the parameters that a fit to a planned experiment would have."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from steadyslip.protocol import (
     VelocityStep,
 )
 
-SAMPLES = 4000
+SAMPLES = 4000  # default number of samples; errors fall with its square root
 
 
 @dataclass(frozen=True, eq=False)
 class Precision(ReadOnly):
-    """Errors that a fit to such an experiment would have, to first order (Fisher information).
+    """Errors that a fit to a planned experiment would have, to first order (Fisher information).
 
     Attributes
     ----------
@@ -42,13 +42,17 @@ class Precision(ReadOnly):
     errors : dict of str to float
         Standard deviations, SI units; inf where the experiment does not determine a parameter.
     relative : dict of str to float
-        The same as shares of the parameters.
-    correlation : ndarray (p, p)
-    unidentified : tuple of Combination
-    noise : float
-    samples : int
-    area : float or None
-        Of the rig, m²: people are told totals then.
+            Standard deviations as shares of the parameters.
+        correlation : ndarray (p, p)
+            Correlation of the estimates; NaN where one is not determined.
+        unidentified : tuple of Combination
+            Combinations of parameters that the experiment does not determine.
+        noise : float
+            Standard deviation of friction in each sample.
+        samples : int
+            Number of samples.
+        area : float or None
+            Contact area of the rig, m²; if given, text shows totals for the whole contact.
     """
 
     protocol: Protocol
@@ -79,23 +83,23 @@ def precision(
     rig: Slider, protocol: Any, *, free: Sequence[str] | None = None, fixed: Sequence[str] = (), noise: float = 2e-4,
     until: float | None = None, samples: int = SAMPLES, trend: int = 0,
 ) -> Precision:  # fmt: skip
-    """What precision would an experiment give?
+    """Errors that a fit to a planned experiment would have.
 
     Parameters
     ----------
     rig : Slider
-        With the values that are expected.
+        Rig with the expected values.
     protocol : Protocol, Piece or sequence of Piece
     free, fixed : sequence of str, optional
         As for `fit`.
     noise : float
         Standard deviation of friction, sample by sample, independent.
     until : float, optional
-        End, s; the protocol's own unless given.
-    samples : int
-        Evenly spaced.
-    trend : int
-        Order of the trend that is fitted along.
+            End of the experiment, s; the protocol's own unless given.
+        samples : int
+            Number of evenly spaced samples.
+        trend : int
+            Order of the polynomial trend that is fitted too.
 
     Raises
     ------
@@ -116,7 +120,7 @@ def precision(
     if problems:
         raise ParameterError(problems)
     if end is None:
-        raise InternalError("end is not None")
+        raise InternalError("the end of the experiment is missing")
     time = np.linspace(0.0, float(end), samples)
     level = steady_state(rig).normal_stress
     record = record_from_arrays(time, friction=np.full(samples, 0.5), normal=level, source="planned")
@@ -147,12 +151,14 @@ def precision(
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Experiments by how well they determine one parameter, the best first.
+    """Planned experiments sorted by the error of one parameter, the smallest first.
 
     Attributes
     ----------
     parameter : str
+        Name of the parameter.
     found : dict of str to Precision
+        Errors of each experiment, by label.
     """
 
     parameter: str
@@ -174,7 +180,7 @@ class Ranking:
         return "\n".join(lines)
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the experiments by the error that they leave.
+        """Draw the error of the parameter for each experiment.
 
         Returns
         -------
@@ -187,15 +193,16 @@ class Ranking:
 def best_protocol(
     rig: Slider, candidates: Mapping[str, Any] | None = None, parameter: str | None = None, **options: Any
 ) -> Ranking:
-    """Which experiment determines a parameter best?
+    """Rank planned experiments by the error of one parameter.
 
     Parameters
     ----------
     rig : Slider
     candidates : mapping of str to Protocol, optional
-        By label; changes of the normal stress of several shapes, and the same with a step of the rate, unless given.
-    parameter : str, optional
-        What friction's answer to normal stress is told by unless given: the parameter that its law calls a share of it.
+            Experiments by label; unless given, changes of the normal stress of several shapes, with and without a
+            velocity step.
+        parameter : str, optional
+            Name of the parameter; unless given, the law's stress share, by which friction responds to normal stress.
     **options
         As for `precision`.
 
@@ -221,7 +228,7 @@ def best_protocol(
 
 
 def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Protocol]:
-    """Changes of the normal stress by a share of it, in several shapes and over times that suit the rig."""
+    """Protocols, by label, that change the normal stress by a share of it in several shapes, timed for the rig."""
     level = steady_state(rig).normal_stress
     size = share * level
     unit = _slip_time(rig)
@@ -241,7 +248,7 @@ def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Proto
 
 
 def _slip_time(rig: Slider) -> float:
-    """Time to slide one slip distance, s."""
+    """Time in which the rig slides its largest slip distance, s."""
     distances = [value for name in rig.of_kind("slip distance") if (value := rig.value(name)) is not None]
     if not distances:
         raise NotAvailable("this friction law has no slip distance to scale experiments with; give candidates")

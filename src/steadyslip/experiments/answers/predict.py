@@ -1,4 +1,4 @@
-"""From a fit to the question: will this machine, or this fault, slide steadily, given what the records say?"""
+"""Predict the stability of a rig with fitted friction, carrying the uncertainty of the fit."""
 
 from __future__ import annotations
 
@@ -26,38 +26,39 @@ from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
-COUNT = 4000
-KICKED = 200  # draws of which a threshold is found
-LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)
-CLEAR = 0.95  # probability from which on a verdict is called clear
+COUNT = 4000  # default number of draws: errors of a probability are below 1 %
+KICK_DRAWS = 200  # draws for which thresholds of kicks are computed, each by simulations
+LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, 68 % and 95 % intervals
+CLEAR_PROBABILITY = 0.95  # probability above which the text says stable or unstable
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction(ReadOnly):
-    """What the records say about a rig.
+    """Stability of a rig for m draws of the fitted parameters.
 
     Attributes
     ----------
     rig : Slider
-        With the fit's best friction.
+        Rig with the best fitted friction.
     draws : Draws
+        Draws of the fitted parameters.
     stable : ndarray of bool (m,)
-        Of every draw.
+        True for draws with stable steady sliding.
     exists : ndarray of bool (m,)
-        Whether there is steady sliding at all.
+        True for draws that have steady sliding.
     critical_stiffness : ndarray (m,)
-        Pa/m; NaN where there is no edge.
+        Critical stiffness, Pa/m; NaN where there is no edge of stability.
     safety : ndarray (m,)
         Stiffness over critical stiffness.
     growth_rate : ndarray (m,)
-        1/s.
+        Growth rate of the least stable mode, 1/s.
     thresholds : dict of str to ndarray
-        By kind of kick, sizes as in `Threshold`, of the first draws.
+        Smallest kicks not survived, by kind of kick, in the units of `Threshold`; of the first draws only.
     shares : dict of str to float
-        Share of the spread of the critical stiffness (of the growth rate, where there is none) that goes away once a
+        Share of the variance of the critical stiffness (of the growth rate, where there is none) that vanishes once a
         parameter, or b − a, is known exactly.
     left_out : tuple of str
-        Kinds of kick that were not done when Ctrl-C came.
+        Kinds of kick that were not computed before Ctrl-C.
     """
 
     rig: Slider
@@ -73,22 +74,28 @@ class Prediction(ReadOnly):
 
     @property
     def probability_stable(self) -> float:
-        """That steady sliding exists and is stable."""
+        """Probability that steady sliding exists and is stable."""
         return float(np.mean(self.stable))
 
     @property
     def dominant(self) -> str | None:
-        """Parameter whose uncertainty matters most."""
+        """Parameter whose uncertainty contributes most; None if no share is known."""
         return next(iter(self.shares), None)
 
     def quantiles(self, values: Array) -> tuple[float, ...]:
-        """At 2.5, 16, 50, 84 and 97.5 %, where there are values at all."""
+        """Quantiles of the finite values at 2.5, 16, 50, 84 and 97.5 %; NaN if there are none."""
         finite = values[np.isfinite(values)]
         return tuple(float(q) for q in np.quantile(finite, LEVELS)) if len(finite) else (float("nan"),) * len(LEVELS)
 
     def __str__(self) -> str:
         p = self.probability_stable
-        clear = "Stable" if p >= CLEAR else "Unstable" if p <= 1 - CLEAR else "Not decided by the records"
+        clear = (
+            "Stable"
+            if p >= CLEAR_PROBABILITY
+            else "Unstable"
+            if p <= 1 - CLEAR_PROBABILITY
+            else "Not decided by the records"
+        )
         lines = [f"{clear}: steady sliding is stable with probability {probability_text(p, len(self.stable))}"]
         absent = 1 - float(np.mean(self.exists))
         if absent:
@@ -115,13 +122,13 @@ class Prediction(ReadOnly):
 
     @property
     def undecided(self) -> dict[str, float]:
-        """By kind of kick, share of the draws that slide steadily but whose threshold is undecided."""
+        """Share of the draws with steady sliding whose threshold is undecided, by kind of kick."""
         return {
             kick: float(np.mean(np.isnan(sizes) & self.exists[: len(sizes)])) for kick, sizes in self.thresholds.items()
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units; what does not exist is None."""
+        """Convert to a dict of JSON-ready data, SI units; None for what does not exist."""
 
         def plain(values: Array) -> list[float | None]:
             return [x if np.isfinite(x) else None for x in self.quantiles(values)]
@@ -146,7 +153,7 @@ class Prediction(ReadOnly):
         }
 
     def _forces(self, critical: list[float | None]) -> dict[str, Any]:
-        """With an area, the critical stiffness of the whole contact."""
+        """Critical stiffness of the whole contact, N/m, as JSON data; empty without an area."""
         factor, unit = outside("Pa/m", self.rig.area)
         if self.rig.area is None:
             return {}
@@ -154,7 +161,7 @@ class Prediction(ReadOnly):
         return {"forces": {"area": self.rig.area, "critical_stiffness": values, "unit": unit}}
 
     def plot(self, kind: str = "prediction", ax: Any = None) -> Any:
-        """Draw the distribution of the critical stiffness, and the rig's own; or of the kicks that are survived.
+        """Draw the distribution of the critical stiffness with the rig's stiffness, or of the thresholds of kicks.
 
         Parameters
         ----------
@@ -174,7 +181,7 @@ def predict(
     rig: Slider, fit: Fit | Draws, *, kick: str | Sequence[str] = (), transfer: Sequence[str] = (), record: int = 0,
     count: int = COUNT, seed: int = 0,
 ) -> Prediction:  # fmt: skip
-    """Carry the uncertainty of a fit to a rig.
+    """Predict the stability of a rig with fitted friction, carrying the uncertainty of the fit.
 
     Parameters
     ----------
@@ -211,7 +218,7 @@ def predict(
 def transferred(
     rig: Slider, fit: Fit | Draws, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT, seed: int = 0
 ) -> tuple[Slider, Draws, dict[str, Array]]:
-    """The rig with a fit's best friction, the draws, and the rig's parameters in each of them; see `predict`."""
+    """Rig with the best fitted friction, the draws, and their values of the rig's parameters; see `predict`."""
     draws = normal_draws(fit, count, seed) if isinstance(fit, Fit) else fit
     source = draws.fit
     target = with_fitted_friction(rig, source, record)
@@ -240,7 +247,7 @@ def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tupl
             np.broadcast_to(np.asarray(number(target, vary), dtype=float), (len(draws),))
             for number in (critical_stiffness, safety_factor, growth_rate)
         )
-    few = {name: values[:KICKED] for name, values in vary.items()}
+    few = {name: values[:KICK_DRAWS] for name, values in vary.items()}
     thresholds: dict[str, Array] = {}
     for kick in kicks:
         found, _, _ = threshold_brackets(target, few, kick, precision=1e-3)
@@ -254,7 +261,7 @@ def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tupl
 
 
 def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
-    """The rig with the friction that a fit found."""
+    """Rig with its friction law replaced by the fitted one."""
     return replace(rig, friction=fit.rig(record).friction.completed_by(rig.friction))
 
 
@@ -263,7 +270,7 @@ def _name_of(fit: Fit, parameter: str, record: int) -> str:
 
 
 def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
-    """b − a, which decides where b and a do not by themselves."""
+    """Draws of b − a, by label, which decides stability more than b or a alone; empty if neither was fitted."""
     direct, evolved = rig.of_kind("direct effect"), rig.of_kind("evolution effect")
     if not direct or not evolved or not {*direct, *evolved} & set(vary):
         return {}
@@ -274,7 +281,7 @@ def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
 
 
 def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str, float]:
-    """Squared correlation of the result with every parameter: the largest first."""
+    """Squared correlation of the result with every parameter, by name, the largest first."""
     result = critical if np.mean(np.isfinite(critical)) > 0.5 else growth
     good = np.isfinite(result)
     if good.sum() < 10 or not np.std(result[good]) > 0:
@@ -289,7 +296,7 @@ def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str,
 
 
 def probability_text(share: float, count: int) -> str:
-    """A probability, no finer than the number of draws tells."""
+    """Format a probability, no finer than the number of draws allows (3 / count: 95 % bound of no event)."""
     if share >= 1:
         return f"more than {100 * (1 - 3 / count):.4g} %"
     if share <= 0:

@@ -1,4 +1,4 @@
-"""Profiles: how fast the misfit rises away from the best value of one parameter, all others fitted anew."""
+"""Likelihood profiles: least sum of squares with one parameter held at each of several values."""
 
 from __future__ import annotations
 
@@ -18,27 +18,28 @@ from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
-LEVEL = 0.95  # at which a profile and an error are compared
-ALIKE = 0.15  # of the reach of the error to one side: difference of ends that is still Gaussian
+LEVEL = 0.95  # probability of the intervals that are compared
+END_TOLERANCE = 0.15  # largest difference of interval ends, as a share of the error's reach, of a Gaussian profile
 
 
 @dataclass(frozen=True, eq=False)
 class Profile(ReadOnly):
-    """Least sum of squares with one parameter held at each of several values.
+    """Likelihood profile of one parameter: least sum of squares at each of its values.
 
     Attributes
     ----------
     name : str
     unit : str
     values : ndarray (m,)
+        Values of the parameter, SI units.
     ssq : ndarray (m,)
+        Least sums of squares.
     rise : ndarray (m,)
-        Rise above the minimum in units in which 1 is one standard deviation squared: minus twice the logarithm of the
-        profile likelihood.
+        Minus twice the logarithm of the profile likelihood, zero at the best value; 1 at one standard deviation.
     normal : ndarray (m,)
-        The rise that the fit's error stands for; NaN where the fit does not determine the parameter.
+        Rise of a normal distribution with the fit's error; NaN where the fit does not determine the parameter.
     area : float or None
-        Of the rig, m²: people are told totals then.
+        Contact area of the rig, m²; if given, text shows totals for the whole contact.
     """
 
     name: str
@@ -50,20 +51,20 @@ class Profile(ReadOnly):
     area: float | None = None
 
     def interval(self, level: float = LEVEL) -> tuple[float, float]:
-        """Where the rise is below that of a probability; infinite where the profile does not rise so far."""
+        """Confidence interval of probability `level`, SI units; an end is infinite if the profile ends before."""
         low, high = self._ends(self.rise, level)
         return low, high
 
     @property
     def gaussian(self) -> bool:
-        """Whether its 95 % interval is that of the fit's error, nearly."""
+        """True if the 95 % interval is nearly that of the fit's error."""
         if not np.all(np.isfinite(self.normal)):
             return False
         own, usual = np.array(self._ends(self.rise, LEVEL)), np.array(self._ends(self.normal, LEVEL))
         best = float(self.values[int(np.argmin(self.normal))])
         both = np.isfinite(own)
         return bool(np.all(both == np.isfinite(usual)) and
-                    np.all(np.abs(own[both] - usual[both]) <= ALIKE * np.abs(usual[both] - best)))  # fmt: skip
+                    np.all(np.abs(own[both] - usual[both]) <= END_TOLERANCE * np.abs(usual[both] - best)))  # fmt: skip
 
     def _ends(self, rise: Array, level: float) -> tuple[float, float]:
         limit = float(chi2.ppf(level, 1))
@@ -81,21 +82,21 @@ class Profile(ReadOnly):
         return ends[0], ends[1]
 
     def __str__(self) -> str:
-        text = f"{self.name}, 95 % by its profile: {self._shown(self.rise)}"
+        text = f"{self.name}, 95 % by its profile: {self._interval_text(self.rise)}"
         if self.gaussian:
             return text
-        return f"{text}; not Gaussian, its error alone would say {self._shown(self.normal)}" if np.all(
+        return f"{text}; not Gaussian, its error alone would say {self._interval_text(self.normal)}" if np.all(
             np.isfinite(self.normal)
         ) else f"{text}; not Gaussian, no error can stand for it"  # fmt: skip
 
-    def _shown(self, rise: Array) -> str:
+    def _interval_text(self, rise: Array) -> str:
         ends = self._ends(rise, LEVEL)
         return " to ".join(
             "beyond the profile" if not np.isfinite(x) else format_quantity(x, self.unit, area=self.area) for x in ends
         )
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw how fast the misfit rises, with the intervals that this gives, and what the fit's error stands for.
+        """Draw the profile with its intervals, and the parabola of the fit's error.
 
         Returns
         -------
@@ -106,24 +107,25 @@ class Profile(ReadOnly):
 
 @checked(reach=finite(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
-    """Profile of a parameter: all others fitted anew at each value, side by side.
+    """Compute the likelihood profile of a parameter: all others are fitted again at each of its values.
 
     Parameters
     ----------
     fit : Fit
     name : str
     reach : float
-        How far to go, in standard deviations; two e-folds or natural sizes where the parameter is not determined.
-    count : int
-        Values on the way.
-    threads : int, optional
+            Range on both sides, in standard deviations; if the parameter is not determined, 2 e-folds or natural sizes.
+        count : int
+            Number of values.
+        threads : int, optional
+            Number of threads; all cores unless given.
     """
     i = fit.index(name)
     variance = float(fit.covariance[i, i])
     width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
     z = np.tile(fit.coordinates, (count, 1))
     z[:, i] = fit.coordinates[i] + width * np.linspace(-1, 1, count)
-    if np.isfinite(variance):  # along the valley, as far as it is straight
+    if np.isfinite(variance):  # other coordinates start where the covariance expects them
         slope = fit.covariance[:, i] / variance
         slope[~np.isfinite(slope)] = 0.0
         z = fit.coordinates + (z[:, i : i + 1] - fit.coordinates[i]) * slope
@@ -145,7 +147,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
 
 
 def _unit_of_rise(fit: Fit, i: int) -> float:
-    """Rise of the sum of squares one standard deviation from the minimum; more where residuals are correlated."""
+    """Rise of the sum of squares at one standard deviation from the minimum, with correlation of the residuals."""
     _, jacobian = fit.comparison.residuals(fit.coordinates[None])
     information = jacobian[0] @ jacobian[0].T
     naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])

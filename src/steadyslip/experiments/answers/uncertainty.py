@@ -1,4 +1,4 @@
-"""How sure a fit is, beyond its covariance: bootstrap and posterior samples; on the compiled model."""
+"""Uncertainty of a fit beyond its covariance: bootstrap, posterior samples and normal draws."""
 
 from __future__ import annotations
 
@@ -24,10 +24,12 @@ from steadyslip.experiments.numerics.sampling import run_walkers
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
+REFITS_AT_ONCE = 32  # refits at a time: four SIMD vectors of eight lanes, which bounds the memory
 BOOTSTRAPS = ("auto", "block", "residual")
-WARM = 1e-6  # reduction still to be had, as a share of the sum, at which a refit is done: far below its scatter
-LONGEST_BLOCK = 0.1  # of a record
+REFIT_TOLERANCE = (
+    1e-6  # a refit stops when the predicted relative decrease of the sum of squares is below; its scatter is larger
+)
+MAX_BLOCK_SHARE = 0.1  # longest block, as a share of the record: longer ones would leave too few to resample
 DRAWS = FileKind("draws", 1, 2**30, "draw them again and save them anew")
 _ATTRIBUTES = {"kind": str, "about": str, "chains": int}
 _ABOUT = {"details": {str: float}, "interrupted": bool, "weighed": bool}
@@ -36,7 +38,7 @@ KINDS = ("bootstrap", "posterior", "normal")
 
 @dataclass(frozen=True, eq=False)
 class Draws(ReadOnly):
-    """Sets of parameters that a fit allows.
+    """Draws of the parameters that are compatible with a fit.
 
     Attributes
     ----------
@@ -44,15 +46,15 @@ class Draws(ReadOnly):
     kind : str
         ``bootstrap``, ``posterior`` or ``normal``.
     values : dict of str to ndarray (m,)
-        SI units, by name.
+        Draws by name of the parameter, SI units.
     details : dict of str to float
-        How they came about: block length and share of refits that converged, or acceptance and autocorrelation time.
+        Block length and share of refits that converged, or acceptance and autocorrelation time, or seed.
     interrupted : bool
-        Whether Ctrl-C came before all that were asked for.
+        True if Ctrl-C came before all draws were made.
     chains : int
-        Chains that the draws belong to, one after another and equally long; 1 where each draw is independent.
+        Number of chains, one after another and equally long; 1 if the draws are independent.
     log_probability : ndarray (m,) or None
-        Up to a constant, where it was computed.
+        Logarithm of the probability density up to a constant, where it was computed.
     """
 
     fit: Fit
@@ -74,7 +76,7 @@ class Draws(ReadOnly):
         return float(np.std(self[name], ddof=1))
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Quantiles that leave the same probability on both sides."""
+        """Central interval of probability `level`, SI units."""
         low, high = np.quantile(self[name], [0.5 - level / 2, 0.5 + level / 2])
         return float(low), float(high)
 
@@ -89,7 +91,7 @@ class Draws(ReadOnly):
         return "\n".join(lines)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything, the fit and its records included, to a netCDF file; `load_draws` reads it back.
+        """Write the draws, the fit and its records to a netCDF file; `load_draws` reads it back.
 
         Raises
         ------
@@ -111,12 +113,12 @@ class Draws(ReadOnly):
         return draw(self, ax=ax)
 
     def to_arviz(self) -> Any:
-        """The draws for ArviZ, chain by chain, values in SI units: what its diagnostics and figures take.
+        """Convert the draws, in SI units, to ArviZ, for its diagnostics and figures.
 
         Returns
         -------
         arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
-            With a group ``posterior`` and, where it was computed, ``lp`` in ``sample_stats``.
+            Group ``posterior`` and, where the log probability was computed, ``lp`` in ``sample_stats``.
 
         Raises
         ------
@@ -132,7 +134,7 @@ class Draws(ReadOnly):
 def load_draws(path: str | PathLike[str]) -> Draws:
     """Read draws that `Draws.save` wrote.
 
-    Nothing in the file is executed; damage is found, whatever it is.
+    Nothing in the file is executed; a damaged file is refused.
 
     Raises
     ------
@@ -157,7 +159,7 @@ def load_draws(path: str | PathLike[str]) -> Draws:
 
 @checked(count=whole(1, 10**8))
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
-    """Draws from the covariance of a fit, in its coordinates.
+    """Draw parameters from the normal distribution with the covariance of a fit, in its coordinates.
 
     Raises
     ------
@@ -221,12 +223,12 @@ def bootstrap(
             data[:, where] = fit.model[where] + _resampled(centred, lengths[i], many, generator)
         start = np.tile(fit.coordinates, (many, 1))
         return minimise(lambda z, lanes: comparison.residuals(z, data[lanes]), start, *fit.bounds, most=30,
-                        tolerance=WARM)  # fmt: skip
+                        tolerance=REFIT_TOLERANCE)  # fmt: skip
 
     with progress_bar(count, progress, "refits") as advanced:
         try:
             while done < count:
-                found = refitted(min(TOGETHER, count - done))
+                found = refitted(min(REFITS_AT_ONCE, count - done))
                 ends.append(found.coordinates[np.isfinite(found.ssq)])
                 converged.append(found.converged)
                 done += len(found.ssq)
@@ -240,17 +242,17 @@ def bootstrap(
 
 
 def block_length(fit: Fit, record: int, kind: str = "block", block: int | None = None) -> int:
-    """Samples of a record to be taken together so that what lies further apart is independent."""
+    """Number of samples in a block: residuals further apart are nearly independent."""
     noise = fit.noise[record]
     size = len(fit.part(fit.residuals, record))
     if kind == "residual" or (kind == "auto" and not noise.correlated):
         return 1
     usual = max(int(np.ceil(3 * noise.inflation)), int(np.ceil(size ** (1 / 3))))
-    return max(1, min(block or usual, int(LONGEST_BLOCK * size)))
+    return max(1, min(block or usual, int(MAX_BLOCK_SHARE * size)))
 
 
 def _resampled(residuals: Array, block: int, many: int, generator: np.random.Generator) -> Array:
-    """Blocks of residuals from random places, end joined to beginning."""
+    """Residuals resampled in blocks from random places, (many, n); blocks continue from the end at the start."""
     size = len(residuals)
     starts = generator.integers(0, size, size=(many, -(-size // block)))
     places = (starts[:, :, None] + np.arange(block)).reshape(many, -1)[:, :size] % size
@@ -311,7 +313,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
 
 
 def _stretch(fit: Fit) -> Array:
-    """The map of coordinates about the minimum that gives the sum of squares the curvature of the covariance."""
+    """Linear map (p, p) of coordinates about the minimum that adapts the sum of squares to the fit's covariance."""
     size = len(fit.space)
     if not fit.correlated:
         return np.eye(size)

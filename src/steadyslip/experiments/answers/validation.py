@@ -1,4 +1,4 @@
-"""How well does a fit predict samples that it has not seen?"""
+"""Cross-validation: prediction of samples that were left out of a fit."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class CrossValidation(ReadOnly):
     Attributes
     ----------
     residuals : ndarray (n,)
-        Data less prediction, each sample predicted by the fit that did not see it; weighted as the fit is.
-    fold : ndarray of int (n,)
-        Which samples were left out together.
-    block : int
-        Samples that follow each other in a fold.
-    seen : float
-        Root mean square of the residuals of the fit itself, which has seen all.
+            Data less prediction, each sample predicted by the fit that left it out; weighted as the fit is.
+        fold : ndarray of int (n,)
+            Index of the fold of each sample; samples of one fold are left out together.
+        block : int
+            Number of successive samples in a fold.
+        seen : float
+            Root mean square of the residuals of the fit to all samples.
     """
 
     residuals: Array = field(repr=False)
@@ -44,7 +44,7 @@ class CrossValidation(ReadOnly):
 
     @property
     def by_fold(self) -> Array:
-        """The same for each fold."""
+        """Root mean square of the prediction errors in each fold, (folds,)."""
         squares = np.bincount(self.fold, self.residuals**2) / np.bincount(self.fold)
         return np.asarray(np.sqrt(squares))
 
@@ -59,16 +59,16 @@ class CrossValidation(ReadOnly):
 def cross_validate(
     fit: Fit, folds: int = 8, *, block: int | None = None, threads: int | None = None
 ) -> CrossValidation:
-    """Fit anew without a part of the samples, predict these, and so with every part.
+    """Leave each part of the samples out of the fit in turn, and predict it.
 
-    A part is every so-many-th block of all records. Blocks are longer than the noise lasts, so that a neighbour that
-    was seen does not tell what was not; and short enough that every step of the loading is seen from several sides.
+    A part consists of every so-many-th block of all records. Blocks are longer than the correlation of the noise, so
+    that neighbours do not reveal samples left out; and short enough that every step of the loading remains in the fit.
 
     Parameters
     ----------
     fit : Fit
     folds : int
-        Parts.
+        Number of parts.
     block : int, optional
         Samples in a block; three times as many as are worth one independent sample unless given.
     threads : int, optional

@@ -8,7 +8,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
-from steadyslip.experiments.fitting.inputs import LEAST_RATE
+from steadyslip.experiments.fitting.inputs import MIN_RATE_STEP
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
@@ -47,7 +47,7 @@ def check_records(plan: Plan) -> None:
             problems.append(Problem("drive", f"{record.source} changes the pore pressure; allowed: 'commanded' or "
                                     "'smoothed', without a protocol"))  # fmt: skip
         rate = record.initial_rate or 0.0
-        if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
+        if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > MIN_RATE_STEP:
             message = (
                 f"got {format_quantity(given, 'm/s')}, but {record.source} begins at "
                 f"{format_quantity(rate, 'm/s')}; make them agree"

@@ -16,13 +16,14 @@ from steadyslip.experiments.fitting.commanded import STRAIGHT_TOLERANCE
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import inputs_at
 from steadyslip.protocol.segments import Segments, pack
 
-LEAST_RATE = 0.05  # least change of ln(velocity) that counts as a step; smaller ones are within measuring errors
-PER_PERIOD = 300  # rows per period of a sine wave; straight lines deviate from it by 6e-5 of its amplitude
-MOST_JUMPS = 20  # largest number of jumps whose times are fitted
+MIN_RATE_STEP = 0.05  # least change of ln(velocity) that counts as a step; smaller ones are within measuring errors
+ROWS_PER_PERIOD = 300  # rows per period of a sine wave; straight lines deviate from it by 6e-5 of its amplitude
+MAX_JUMPS = 20  # largest number of jumps whose times are fitted
 _SHIFT = 1e-3  # step of the central difference in free times, s; any would do, as the table is linear in them
 
 
@@ -59,12 +60,12 @@ def sharp_changes(record: Record) -> Sharp:
         jumps |= set(_jumps(record.time, record.normal, LEAST_STRESS))
     kinks: list[tuple[int, float]] = []
     if record.integrated and record.velocity is not None:
-        jumps |= set(_jumps(record.time, record.velocity, LEAST_RATE))
+        jumps |= set(_jumps(record.time, record.velocity, MIN_RATE_STEP))
     elif record.displacement is not None:
         kinks = _kinks(record.time, record.displacement)
     t = record.time
     return Sharp(
-        tuple((float(t[i]), float(t[i + 1])) for i in sorted(jumps)[:MOST_JUMPS]),
+        tuple((float(t[i]), float(t[i + 1])) for i in sorted(jumps)[:MAX_JUMPS]),
         tuple((float(t[i]), float(t[i + 1]), moment) for i, moment in kinks if i not in jumps),
     )
 
@@ -74,7 +75,7 @@ def _jumps(time: Array, values: Array, least: float) -> Array:
     size, spacing = np.abs(np.diff(values)), np.diff(time)
     if len(size) < 5:
         return np.empty(0, dtype=int)
-    usual = 1.4826 * float(np.median(size))
+    usual = MAD_TO_SIGMA * float(np.median(size))
     padded = np.pad(size / spacing, 2)
     rates = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)  # of two intervals on each side
     alone = size > 8 * rates * spacing
@@ -97,7 +98,7 @@ def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
     return [(int(i), float(time[i] + share[i] * (time[i + 1] - time[i]))) for i in np.flatnonzero(clear)]
 
 
-def _through(time: Array, values: Array, jumping: set[float]) -> Any:
+def _curve_through(time: Array, values: Array, jumping: set[float]) -> Any:
     """Piecewise cubic curve through samples, with zero slope next to jumps; `jumping` has their first times."""
     from scipy.interpolate import CubicHermiteSpline
 
@@ -108,7 +109,7 @@ def _through(time: Array, values: Array, jumping: set[float]) -> Any:
     return CubicHermiteSpline(time, values, slopes)
 
 
-def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Array]:
+def _curve_cuts(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Array]:
     """Intervals on which a straight line deviates from a smooth curve, and times, s, that divide them finely enough.
 
     Deviations count only above the noise, which is estimated by predicting samples from their neighbours.
@@ -117,9 +118,9 @@ def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Arr
         return np.empty(0, dtype=int), np.empty(0)
     spacing = np.diff(time)
     middle = 0.5 * (time[1:] + time[:-1])
-    misses = np.abs(_through(time, values, jumping)(middle) - 0.5 * (values[1:] + values[:-1]))
+    misses = np.abs(_curve_through(time, values, jumping)(middle) - 0.5 * (values[1:] + values[:-1]))
     even, odd = np.arange(0, len(time), 2), np.arange(1, len(time) - 1, 2)
-    noise = float(np.median(np.abs(_through(time[even], values[even], set())(time[odd]) - values[odd])))
+    noise = float(np.median(np.abs(_curve_through(time[even], values[even], set())(time[odd]) - values[odd])))
     least = max(STRAIGHT_TOLERANCE * float(np.ptp(values)), 3 * noise)
     for first in jumping:
         i = int(np.searchsorted(time, first))
@@ -151,7 +152,9 @@ class MeasuredInputs:
         self.origin = float(time[0])
         self.times = time - self.origin
         jumping, bending = {first for first, _ in sharp.jumps}, {first for first, _, _ in sharp.kinks}
-        curved, bent = _curved(time, pressed, jumping) if pressed is not None else (np.empty(0, dtype=int), np.empty(0))
+        curved, bent = (
+            _curve_cuts(time, pressed, jumping) if pressed is not None else (np.empty(0, dtype=int), np.empty(0))
+        )
         moments = [*(float(np.mean(j)) for j in sharp.jumps), *(k[2] for k in sharp.kinks), *bent]
         cuts = [*(int(np.searchsorted(time, j[0])) for j in sharp.jumps),
                 *(int(np.searchsorted(time, k[0])) for k in sharp.kinks), *curved]  # fmt: skip
@@ -162,16 +165,16 @@ class MeasuredInputs:
         old = np.maximum.accumulate(np.where(samples >= 0, samples, 0))[:-1]  # interval of each row
         rows = np.zeros((1, len(nodes) - 1, 9))
         rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
-        self._measured(rows[0], record, old, pressed, jumping, samples >= 0)
+        self._set_measured_inputs(rows[0], record, old, pressed, jumping, samples >= 0)
         halves = np.flatnonzero(samples[:-1] < 0)  # second parts of cut intervals
         self.moving = np.array([row for row in halves if float(time[old[row]]) in jumping], dtype=int)
         for row in halves:
             first = float(time[old[row]])
             if first in jumping or first in bending:
-                self._cut(rows[0], int(row), record, int(old[row]), first in jumping, pressed)
+                self._set_divided_rows(rows[0], int(row), record, int(old[row]), first in jumping, pressed)
         self.rows = rows
 
-    def _measured(
+    def _set_measured_inputs(
         self, rows: Array, record: Record, old: Array, pressed: Array | None, jumping: set[float], sampled: Array
     ) -> None:
         spacing = np.diff(record.time)
@@ -182,13 +185,15 @@ class MeasuredInputs:
             rows[:, 3] = record.velocity[old] + slope * (rows[:, 0] - (record.time[old] - self.origin))
             rows[:, 6] = slope
         if pressed is not None:
-            curve = _through(record.time, pressed, jumping)
+            curve = _curve_through(record.time, pressed, jumping)
             before, after = curve(rows[:, 0] + self.origin), curve(rows[:, 1] + self.origin)
             before = np.where(sampled[:-1], pressed[old], before)
             after = np.where(sampled[1:], pressed[old + 1], after)
             rows[:, 5], rows[:, 8] = before, (after - before) / (rows[:, 1] - rows[:, 0])
 
-    def _cut(self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None) -> None:
+    def _set_divided_rows(
+        self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None
+    ) -> None:
         """Set the two rows of a divided interval: constant values before and after a jump, two velocities at a kink."""
         if not jumps:
             early, late = rows[row - 1, 1] - rows[row - 1, 0], rows[row, 1] - rows[row, 0]
@@ -261,7 +266,7 @@ class ProtocolInputs:
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """Input table for values of the free times (jobs, free), s; see `MeasuredInputs.table`."""
         if not self.free:
-            return self._once
+            return self._fixed_table
         segments = self._packed(times)
         moved = []
         for k in range(len(self.free)) if directions else ():
@@ -270,7 +275,7 @@ class ProtocolInputs:
         return self._table(segments, moved, directions, len(times))
 
     @cached_property
-    def _once(self) -> InputTable:
+    def _fixed_table(self) -> InputTable:
         return self._table(pack(self.protocol, self.velocity, float(self.time[-1])), [], 0, 1)
 
     def _packed(self, times: Array) -> Segments:
@@ -292,9 +297,9 @@ class ProtocolInputs:
         rows = np.zeros((jobs, ends.shape[1] - 1, 9))
         rows[:, :, 0], rows[:, :, 1] = ends[:, :-1], ends[:, 1:]
         inside = begins & (np.take_along_axis(np.hstack([starts, nodes[:, starts.shape[1] :]]), order, 1) >= first)
-        rows[:, :, 2] = np.where(inside[:, :-1], _of(segments.jump, own, jobs), 0.0)
-        before = _at(segments, own, rows[:, :, 0], jobs)
-        after = _at(segments, own, rows[:, :, 1], jobs)
+        rows[:, :, 2] = np.where(inside[:, :-1], _rows_of(segments.jump, own, jobs), 0.0)
+        before = _inputs_at(segments, own, rows[:, :, 0], jobs)
+        after = _inputs_at(segments, own, rows[:, :, 1], jobs)
         if self.pressed is not None:
             before[:, :, 2] += np.interp(rows[:, :, 0], self.time, self.pressed)
             after[:, :, 2] += np.interp(rows[:, :, 1], self.time, self.pressed)
@@ -308,17 +313,17 @@ class ProtocolInputs:
         middle = 0.5 * (rows[:, :, 0] + rows[:, :, 1])
         for direction, plus, minus in moved:
             shift = (plus.start - minus.start) / (2 * _SHIFT)
-            node_rates[:, direction] = np.where(inside[:, :-1], _of(shift, own, jobs), 0.0)
-            change = _at(plus, own, middle, jobs) - _at(minus, own, middle, jobs)
+            node_rates[:, direction] = np.where(inside[:, :-1], _rows_of(shift, own, jobs), 0.0)
+            change = _inputs_at(plus, own, middle, jobs) - _inputs_at(minus, own, middle, jobs)
             input_rates[:, direction] = change / (2 * _SHIFT)
         return InputTable(rows, self.time, node_rates, input_rates)
 
 
-def _of(array: Array, own: Array, jobs: int) -> Array:
+def _rows_of(array: Array, own: Array, jobs: int) -> Array:
     return np.take_along_axis(np.broadcast_to(array, (jobs, *array.shape[1:])), own, axis=1)
 
 
-def _at(segments: Segments, own: Array, times: Array, jobs: int) -> Array:
+def _inputs_at(segments: Segments, own: Array, times: Array, jobs: int) -> Array:
     """Inputs of the segments `own` (jobs, rows) at given times, (jobs, rows, 3)."""
     return inputs_at(segments, np.arange(jobs)[:, None], own, times)
 
@@ -328,4 +333,4 @@ def _wave_nodes(segments: Segments, first: float, last: float) -> Array:
     fastest = float(segments.angular_frequency.max(initial=0.0, where=segments.amplitude != 0))
     if not fastest:
         return np.empty(0)
-    return np.arange(first, last, 2 * np.pi / fastest / PER_PERIOD)[1:]
+    return np.arange(first, last, 2 * np.pi / fastest / ROWS_PER_PERIOD)[1:]

@@ -20,8 +20,8 @@ from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import (
-    Ramped,
-    Remembered,
+    MemoryFit,
+    RampFit,
     driven_as_measured,
     with_memories,
     with_ramps,
@@ -194,12 +194,12 @@ class FitNumbers(ReadOnly):
         return driven_as_measured(self.plan, self.values, self._ends)
 
     @cached_property
-    def as_ramps(self) -> tuple[Ramped, ...]:
+    def as_ramps(self) -> tuple[RampFit, ...]:
         """Fits with ramps in place of velocity steps that the displacement does not distinguish from ramps."""
         return with_ramps(self.plan, self.values, self._ends)
 
     @cached_property
-    def with_memories(self) -> tuple[Remembered, ...]:
+    def with_memories(self) -> tuple[MemoryFit, ...]:
         """Fits with each memory of the normal stress, the best first, where it changes and the law has no memory.
 
         Empty if the residuals are white noise, as there is then nothing that a memory could explain.

@@ -37,7 +37,7 @@ from steadyslip.model.scales import natural_scales
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
-FRICTION = 0.01  # natural size of an initial difference of friction from steady sliding
+FRICTION_SIZE = 0.01  # natural size of an initial difference of friction from steady sliding
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class Plan:
         point = operating_point(self.rig, {})
         program = experiment_program(point.model, 0, "tsit5", settled=False)
         scales, _ = natural_scales(point, program.reduction)
-        return {name: float(np.max(scales.get(name, FRICTION))) for name in program.unsettled}
+        return {name: float(np.max(scales.get(name, FRICTION_SIZE))) for name in program.unsettled}
 
     def _unknown(self, name: str, record: int | None) -> Unknown:
         if name.startswith("protocol."):

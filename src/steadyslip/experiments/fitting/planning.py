@@ -16,12 +16,13 @@ from steadyslip.experiments.fitting.checks import check_changes, check_records
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.numerics.splitting import spread
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
 
-MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
+MAX_SAMPLES, AVERAGED_SAMPLES = 40_000, 8_000
 """Samples above which a record is averaged, and number of means then; chosen by trial, to save time."""
 NEVER_FREE = ("drive.velocity", "slider.area")
 
@@ -69,7 +70,7 @@ def make_plan(
     if problems:
         raise ParameterError(problems)
     if weights is None:
-        many, options["weights"] = _weighed(many)
+        many, options["weights"] = _averaged(many)
     if plan_protocol is not None:
         options["drive"] = "protocol"
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
@@ -113,9 +114,9 @@ def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> lis
     return found
 
 
-def _weighed(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
+def _averaged(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
     """Records, long ones averaged, and weights of the means; None if no sample is a mean."""
-    handy = tuple(r if len(r) <= MOST_SAMPLES else r.decimated(HANDY_SAMPLES) for r in records)
+    handy = tuple(r if len(r) <= MAX_SAMPLES else r.decimated(AVERAGED_SAMPLES) for r in records)
     if all(record.worth is None for record in handy):
         return handy, None
     worth = [np.ones(len(r)) if r.worth is None else r.worth for r in handy]
@@ -136,7 +137,7 @@ def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[P
 
 def with_width(plan: Plan, residuals: Array) -> Plan:
     """Plan with a width of its loss: 1.345 robust standard deviations (Huber: 95 % efficient for normal errors)."""
-    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
-    if not spread > 0:
+    deviation = spread(residuals)
+    if not deviation > 0:
         raise NotAvailable("residuals have no width; use loss='linear'")
-    return replace(plan, width=1.345 * spread)
+    return replace(plan, width=1.345 * deviation)

@@ -17,12 +17,15 @@ from steadyslip.experiments.fitting.search import find_minimum
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-BRIEF, FEW_STARTS = 0.1, 12  # effort and starts of a trial with another law: a tenth and a quarter of the defaults
-SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
+TRIAL_EFFORT, TRIAL_STARTS = (
+    0.1,
+    12,
+)  # effort and starts of a trial with another law: a tenth and a quarter of the defaults
+RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
 
 
 @dataclass(frozen=True)
-class Ramped:
+class RampFit:
     """Minimum with ramps in place of steps, all of one share of their longest possible durations.
 
     Attributes
@@ -77,7 +80,7 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
 
 
 @dataclass(frozen=True)
-class Remembered:
+class MemoryFit:
     """Minimum with a law that has a memory of the normal stress.
 
     Attributes
@@ -95,7 +98,7 @@ class Remembered:
     values: dict[str, float]
 
 
-def with_memories(plan: Plan) -> tuple[Remembered, ...]:
+def with_memories(plan: Plan) -> tuple[MemoryFit, ...]:
     """Minima with each memory of the normal stress, the best first; empty if it is constant or the law has one.
 
     Each search is short: a longer one may find a better minimum.
@@ -112,14 +115,14 @@ def with_memories(plan: Plan) -> tuple[Remembered, ...]:
             rig = replace(plan.rig, friction=own)
             free = (*plan.free, *(name for name in can_be_free(rig) if name not in plan.rig.parameters()))
             richer = replace(plan, rig=rig, free=free)
-            budget = Budget.of_fit(sum(map(len, plan.records)), len(richer.space()), BRIEF)
+            budget = Budget.of_fit(sum(map(len, plan.records)), len(richer.space()), TRIAL_EFFORT)
             try:
-                best = find_minimum(richer, FEW_STARTS, Effort(budget=budget), None)
+                best = find_minimum(richer, TRIAL_STARTS, Effort(budget=budget), None)
             except NotAvailable:
                 continue
             names = (one.name for one in richer.space().unknowns)
             values = dict(zip(names, map(float, richer.space().values(best.coordinates)), strict=True))
-            found.append(Remembered(f"{field} = {word!r}", best.ssq, values))
+            found.append(MemoryFit(f"{field} = {word!r}", best.ssq, values))
     return tuple(sorted(found, key=lambda one: one.ssq))
 
 
@@ -130,7 +133,7 @@ def may_be_ramp(channel: str, change: Change) -> bool:
 
 def with_ramps(
     plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[Ramped, ...]:
+) -> tuple[RampFit, ...]:
     """Minima with ramps in place of steps that may be ramps, the shortest first; empty if there are none.
 
     Parameters are those of `driven_as_measured`. Several durations are tried, as shares of the longest possible ones;
@@ -141,8 +144,8 @@ def with_ramps(
     plan = replace(plan, loading=tuple(_with_ramps(loading) for loading in plan.loading))
     space = plan.space()
     low, high = ([bounds.get(u.name, u.bounds)[side] for u in space.unknowns] for side in (0, 1))
-    lows, highs = (np.tile(ends, (len(SHARES), 1)) for ends in (low, high))
-    begin = np.array([[values.get(u.name, share * u.high) for u in space.unknowns] for share in SHARES])
+    lows, highs = (np.tile(ends, (len(RAMP_SHARES), 1)) for ends in (low, high))
+    begin = np.array([[values.get(u.name, share * u.high) for u in space.unknowns] for share in RAMP_SHARES])
     lengths = [k for k, u in enumerate(space.unknowns) if u.name not in values]
     for k in lengths:  # the unknown before a duration is when its ramp begins
         earlier = 0.5 * begin[:, k : k + 1]
@@ -156,8 +159,8 @@ def with_ramps(
     found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
     return tuple(
-        Ramped(share, float(ssq), dict(zip(names, map(float, row), strict=True)))
-        for share, ssq, row in zip(SHARES, found.ssq, own, strict=True)
+        RampFit(share, float(ssq), dict(zip(names, map(float, row), strict=True)))
+        for share, ssq, row in zip(RAMP_SHARES, found.ssq, own, strict=True)
         if np.isfinite(ssq)
     )
 

@@ -12,9 +12,9 @@ from steadyslip.experiments.fitting.comparison import scaled_by_loss
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.numerics.noise import Noise
 
-ADDED_UP = 1e-6  # relative difference of sums of squares; ten times the accuracy to which the search converges
-PIECES, SHORTEST = 16, 4  # pieces of a record whose means are compared, and least number of samples in each
-TWICE = 1.0  # relative excess of the scatter over the expected one; chance reaches it once in twenty million fits
+SSQ_TOLERANCE = 1e-6  # relative difference of sums of squares; ten times the accuracy to which the search converges
+PIECES, MIN_SAMPLES = 16, 4  # pieces of a record whose means are compared, and least number of samples in each
+MAX_EXCESS = 1.0  # relative excess of the scatter over the expected one; chance reaches it once in twenty million fits
 
 
 def residual_checks(fit: FitNumbers) -> tuple[Check, ...]:
@@ -24,19 +24,19 @@ def residual_checks(fit: FitNumbers) -> tuple[Check, ...]:
         r, _ = scaled_by_loss(fit.plan.loss, r, fit.comparison.width)
     missed = abs(float(r @ r) - fit.ssq) / fit.ssq if fit.ssq else float(np.any(r))
     ended = fit.search.converged and not fit.search.cut
-    scatters = [one for i, noise in enumerate(fit.noise) for one in _beyond(fit.part(r, i), noise)]
+    scatters = [one for i, noise in enumerate(fit.noise) for one in _excess_scatter(fit.part(r, i), noise)]
     found = [
-        check("sum of squares", "residuals of the model at the estimates, added up", missed, ADDED_UP),
+        check("sum of squares", "residuals of the model at the estimates, added up", missed, SSQ_TOLERANCE),
         check("minimum", "what further steps of the search would gain", float(not ended), 0.0),
     ]
     how = "scatter of the residuals' means over sixteenths of a record"
-    return tuple(found + ([check("errors", how, max(scatters), TWICE)] if scatters else []))
+    return tuple(found + ([check("errors", how, max(scatters), MAX_EXCESS)] if scatters else []))
 
 
-def _beyond(r: Array, noise: Noise) -> Iterator[float]:
+def _excess_scatter(r: Array, noise: Noise) -> Iterator[float]:
     """Relative excess of the scatter of piecewise means over that of the noise model; nothing for short records."""
     length = len(r) // PIECES
-    if length < SHORTEST:
+    if length < MIN_SAMPLES:
         return
     means = r[: length * PIECES].reshape(PIECES, length).mean(axis=1)
     own = noise.covariance[:length]

@@ -25,11 +25,14 @@ from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.loading.loading import resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA
 from steadyslip.model.sliding import steady_state
 
-NEARBY = 0.5  # share of the window of a free time over which its starting values are spread
-SPIKE = 2.0  # a sample is a spike if it is off its neighbours by more than this multiple of the range of friction
-STIFFEST = 100.0  # largest starting value of k d_c/(aσ): stiffer machines cannot be told apart from friction
+WINDOW_SHARE = 0.5  # share of the window of a free time over which its starting values are spread
+SPIKE_RATIO = 2.0  # a sample is a spike if it is off its neighbours by more than this multiple of the range of friction
+MAX_STIFFNESS_RATIO = (
+    100.0  # largest starting value of k d_c/(aσ): stiffer machines cannot be known apart from friction
+)
 _DIRECT = (0.004, 0.01, 0.025)  # starting values of a without a velocity step: the range usual for rocks
 
 
@@ -67,18 +70,18 @@ def features(record: Record, rate: float) -> Features:
     """Features of a record; `rate` is the load-point velocity at its start, m/s."""
     record = replace(record, friction=_without_spikes(record.friction))
     time, mu = record.time, record.friction
-    moved = _moved(record, 0.0 if resting_rate(record.loading) is not None else rate)
+    moved = _displacement(record, 0.0 if resting_rate(record.loading) is not None else rate)
     first = max(5, len(mu) // 50)
     level = float(np.median(mu[:first]))
     steps = [s for s in record.steps if s.kind == "velocity step"]
     steps.sort(key=lambda s: -abs(np.log(s.after / s.before)))
-    slope = max((_steepest(record, moved, s) for s in record.steps), default=_steepest_anywhere(moved, mu))
+    slope = max((_slope_after_step(record, moved, s) for s in record.steps), default=_steepest_slope(moved, mu))
     total = max(float(moved[-1]), 1e-12)
     spacing = float(np.median(np.diff(time))) * max(rate, *(s.after for s in steps), 0.0) if steps else total / len(mu)
     shortest = max(min(0.5 * spacing, total / 50), total * 1e-5)
     direct = drop = None
     if steps:
-        direct, drop = _response(record, moved, steps[0])
+        direct, drop = _step_response(record, moved, steps[0])
     return Features(level, direct, drop, slope, float(np.ptp(mu)) / total, shortest, total / 2)
 
 
@@ -86,10 +89,10 @@ def _without_spikes(friction: Array) -> Array:
     """Friction (n,) with isolated outliers replaced by the median of their neighbours."""
     around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(friction, 2, mode="edge"), 5), axis=1)
     low, high = np.quantile(friction, [0.01, 0.99])
-    return np.where(np.abs(friction - around) > SPIKE * (high - low), around, friction)
+    return np.where(np.abs(friction - around) > SPIKE_RATIO * (high - low), around, friction)
 
 
-def _moved(record: Record, rate: float) -> Array:
+def _displacement(record: Record, rate: float) -> Array:
     """Displacement of the load point (n,), m, integrated from its velocity steps and thus free of noise."""
     time = record.time
     changes = [(s.time, s.duration, s.after) for s in record.steps if s.unit != "Pa"]
@@ -103,7 +106,7 @@ def _moved(record: Record, rate: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * (along[1:] + along[:-1]) * np.diff(time))])
 
 
-def _response(record: Record, moved: Array, step: LoadStep) -> tuple[float, float]:
+def _step_response(record: Record, moved: Array, step: LoadStep) -> tuple[float, float]:
     """Peak and steady change of friction after a velocity step, per e-fold of velocity."""
     time, mu = record.time, record.friction
     fold = float(np.log(step.after / step.before))
@@ -128,7 +131,7 @@ def _smoothed(values: Array, width: int = 3) -> Array:
     return np.convolve(values, np.ones(width) / width, mode="valid")
 
 
-def _steepest(record: Record, moved: Array, step: LoadStep) -> float:
+def _slope_after_step(record: Record, moved: Array, step: LoadStep) -> float:
     """Steepest rise of friction with displacement, 1/m, in the samples after a step of velocity or normal stress."""
     begin = max(int(np.searchsorted(record.time, step.time)) - 1, 0)
     if step.unit == "Pa":
@@ -136,12 +139,12 @@ def _steepest(record: Record, moved: Array, step: LoadStep) -> float:
     part = slice(begin, begin + 200)
     if len(record.time[part]) < 3:
         return 0.0
-    return _steepest_anywhere(moved[part], record.friction[part])
+    return _steepest_slope(moved[part], record.friction[part])
 
 
-def _steepest_anywhere(moved: Array, mu: Array) -> float:
+def _steepest_slope(moved: Array, mu: Array) -> float:
     """Largest slope of friction with displacement, 1/m, that exceeds the noise."""
-    noise = 1.4826 * float(np.median(np.abs(np.diff(mu)))) / np.sqrt(2) if len(mu) > 3 else 0.0
+    noise = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(mu)))) / np.sqrt(2) if len(mu) > 3 else 0.0
     best = 0.0
     for width in (2, 3, 5, 9, 17, 33, 65):
         if len(mu) <= width:
@@ -174,7 +177,7 @@ def starting_points(
         a = np.array(_DIRECT)[(grid[:, 1] * len(_DIRECT)).astype(int)]
         b = a * (0.7 + 0.8 * grid[:, 2])
     steepness = max(f.slope for f in found) * 10.0 ** (1.2 * grid[:, 3] - 0.1)
-    steepness = np.minimum(steepness, STIFFEST * a / d_c)
+    steepness = np.minimum(steepness, MAX_STIFFNESS_RATIO * a / d_c)
     alpha = 0.1 + 0.5 * grid[:, 4]
     alike = np.argsort(steepness / a)  # similar stiffness side by side: SIMD lanes wait for the slowest of them
     d_c, a, b, steepness, alpha, grid = (x[alike] for x in (d_c, a, b, steepness, alpha, grid))
@@ -194,14 +197,14 @@ def _design(count: int) -> Array:
     return np.asarray(read_only(qmc.Halton(6, rng=12345).random(count)))
 
 
-def search_bounds(parts: Sequence[RecordPart], told: Sequence[Features], space: Space) -> tuple[Array, Array]:
+def search_bounds(parts: Sequence[RecordPart], known: Sequence[Features], space: Space) -> tuple[Array, Array]:
     """Bounds of the coordinates, (p,) each, from the parameters' domains and the resolution of the records.
 
     A slip distance far below the slip between samples, or far above the whole record, has no effect on the model.
     """
     low, high = space.low.copy(), space.high.copy()
     for i, unknown in enumerate(space.unknowns):
-        own = told if unknown.record is None else [told[unknown.record]]
+        own = known if unknown.record is None else [known[unknown.record]]
         if unknown.kind == "slip distance":
             ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
         elif unknown.kind == "drainage":  # slower than the record, or faster than its samples: nothing to see
@@ -255,21 +258,21 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
     if name == "start.hold":
         return float(np.ptp(part.record.time)) * 10.0 ** (3 * spare - 1.5)
     if name.startswith("step."):
-        return _near(unknown, part, spare)
+        return _change_time(unknown, part, spare)
     if name.startswith("jump."):
         return unknown.low + (unknown.high - unknown.low) * spare
     present = float(rig.parameters()[name].value or 0.0) if name in rig.parameters() else None
     if present is None:
-        return np.full_like(a, _time_of(name, part))
+        return np.full_like(a, _protocol_time(name, part))
     return present * 10.0 ** (2 * spare - 1) if present else 0.02 * (spare - 0.5)
 
 
-def _near(unknown: Unknown, part: RecordPart, spare: Array) -> Array:
+def _change_time(unknown: Unknown, part: RecordPart, spare: Array) -> Array:
     """Starting values (count,) of the time of a change, s, spread over part of its window."""
     if not isinstance(part.inputs, CommandedInputs):
         raise InternalError("times of changes are free in commanded loading only")
     begin = {(low, high): value for value, low, high in time_windows(part.inputs.changes)}[(unknown.low, unknown.high)]
-    return np.asarray(begin + NEARBY * (spare - 0.5) * (unknown.high - unknown.low))
+    return np.asarray(begin + WINDOW_SHARE * (spare - 0.5) * (unknown.high - unknown.low))
 
 
 def _stress(part: RecordPart) -> float:
@@ -277,7 +280,7 @@ def _stress(part: RecordPart) -> float:
     return float(part.record.normal[0]) if part.record.normal is not None else steady_state(part.rig).normal_stress
 
 
-def _time_of(name: str, part: RecordPart) -> float:
+def _protocol_time(name: str, part: RecordPart) -> float:
     """Starting value of a free time of the protocol, s: its value in the protocol."""
     if not isinstance(part.inputs, ProtocolInputs):
         raise InternalError(f"{name} is free, but the record is not driven by a protocol")

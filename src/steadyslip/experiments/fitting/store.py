@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
-from steadyslip.experiments.fitting.refit import Ramped, Remembered
+from steadyslip.experiments.fitting.refit import MemoryFit, RampFit
 from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.loading.pressing import JoinedCurves
@@ -94,7 +94,7 @@ def to_dataset(fit: FitNumbers) -> Any:
         "unidentified": json.dumps([vars(one) for one in fit.unidentified]),
         "noise": json.dumps([[n.lag1, n.correlated, n.innovation] for n in fit.noise]),
         "records": json.dumps([[r.source, list(r.notes), r.integrated] for r in fit.plan.records]),
-        "loading": json.dumps([_written(r.commanded) for r in fit.plan.records]),
+        "loading": json.dumps([_loading_to_json(r.commanded) for r in fit.plan.records]),
         "refits": json.dumps(
             {
                 "measured": [] if fit.as_measured is None else [fit.as_measured],
@@ -140,7 +140,7 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
         raise table.fault(f"it has {len(described)} records, {len(present)} sets of columns and {len(noises)} noises")
     found = table.columns(_columns(present, weighted))
     records = tuple(
-        _record(table, found, i, (source, notes, integrated), _read(table, own))
+        _record(table, found, i, (source, notes, integrated), _loading_from_json(table, own))
         for i, ((source, notes, integrated), own) in enumerate(zip(described, loading, strict=True), start=1)
     )
     weights = [found[f"weight_{i}"] for i in range(1, len(records) + 1)] if weighted else None
@@ -167,13 +167,13 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     )
     _check(table, fit)
     refits = stored["refits"]
-    found_before = {  # results that the file holds, so that nothing is computed again
+    stored_results = {  # results that the file holds, so that nothing is computed again
         "as_measured": next(iter(refits["measured"]), None),
-        "as_ramps": tuple(Ramped(*one) for one in refits["ramps"]),
-        "with_memories": tuple(Remembered(*one) for one in refits["memories"]),
+        "as_ramps": tuple(RampFit(*one) for one in refits["ramps"]),
+        "with_memories": tuple(MemoryFit(*one) for one in refits["memories"]),
         "model": read_only(np.concatenate([found[f"model_{i}"] for i in range(1, len(records) + 1)])),
     }
-    fit.__dict__.update(found_before)
+    fit.__dict__.update(stored_results)
     return fit
 
 
@@ -195,39 +195,39 @@ def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
     return found
 
 
-def _written(loading: Loading | None) -> Any:
+def _loading_to_json(loading: Loading | None) -> Any:
     """Loading as JSON data, a list for each channel; empty if it can be found again in the record's columns."""
     return (
         []
         if loading is None
-        else [[] if c is None else [_course(c)] for c in (loading.load, loading.stress, loading.pore)]
+        else [[] if c is None else [_course_to_json(c)] for c in (loading.load, loading.stress, loading.pore)]
     )
 
 
-def _course(course: Course) -> list[Any]:
+def _course_to_json(course: Course) -> list[Any]:
     changes = [list(astuple(change)) for change in course.changes]
-    return [course.first, changes, list(course.errors), _curves(course.curve), course.strays, course.slips,
+    return [course.first, changes, list(course.errors), _curves_to_json(course.curve), course.strays, course.slips,
             course.glitches, course.early, course.late]  # fmt: skip
 
 
-def _curves(curve: Any) -> list[Any]:
+def _curves_to_json(curve: Any) -> list[Any]:
     if isinstance(curve, JoinedCurves):
         return [[[first, last], *own.parts()] for first, last, own in curve.spans]
     return [] if curve is None else [[[], *curve.parts()]]
 
 
-def _read(table: ExpectedTable, written: list[Any]) -> Loading | None:
-    """Loading from the data that `_written` returns; None if they are empty."""
+def _loading_from_json(table: ExpectedTable, written: list[Any]) -> Loading | None:
+    """Loading from the data that `_loading_to_json` returns; None if they are empty."""
     if len(written) != 3:
         return None
     try:
-        load, stress, pore = (_channel(one[0]) if one else None for one in written)
+        load, stress, pore = (_course_from_json(one[0]) if one else None for one in written)
     except ValueError as error:
         raise table.fault(f"a curve of its loading {error}") from error
     return Loading(load, stress, pore)
 
 
-def _channel(one: list[Any]) -> Course:
+def _course_from_json(one: list[Any]) -> Course:
     first, changes, errors, curves, *rest = one
     own = [(ends, Smooth.from_parts(*parts)) for ends, *parts in curves]
     curve: Any = None

@@ -12,7 +12,7 @@ from steadyslip.core.checks import as_data, in_words
 from steadyslip.core.format import format_quantity
 from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.numbers import FitNumbers
-from steadyslip.experiments.fitting.refit import Ramped, may_be_ramp
+from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
@@ -20,12 +20,14 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 WIDTH = 100  # characters of a line of text
-AWAY = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
-BRIEFLY = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
-FAR = 20.0  # least size of an outlier, in rms of the other residuals
-RARE = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
-SURE = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
-VAGUE = 0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
+MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
+END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
+OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
+MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
+SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
+MAX_JUMP_ERROR = (
+    0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
+)
 
 
 def words(fit: FitNumbers) -> str:
@@ -102,8 +104,8 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _outliers(fit) + _unsettled(fit) + _off_the_loading(fit) + _vague_jumps(fit)
-    found += _untold_ramps(fit) + _forgotten_stress(fit) + _drained_at_once(fit)
+    found += list(fit.at_bounds) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit) + _vague_jumps(fit)
+    found += _possible_ramps(fit) + _missing_memory(fit) + _drained_at_once(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     if other := of_another(fit.version):
@@ -129,7 +131,7 @@ def _outliers(fit: FitNumbers) -> list[str]:
         gone = np.cumsum(squares[order])
         half = int(np.searchsorted(gone, 0.5 * gone[-1])) + 1
         rest = (gone[-1] - gone[half - 1]) / len(squares)
-        if half <= max(RARE * len(squares), 1) and squares[order[half - 1]] > FAR**2 * rest:
+        if half <= max(MAX_OUTLIERS * len(squares), 1) and squares[order[half - 1]] > OUTLIER_SIZE**2 * rest:
             far = np.sort(order[:half])
             where = f"{record.time[far[0]]:.7g} s" + (f" to {record.time[far[-1]]:.7g} s" if len(far) > 1 else "")
             what = "1 sample of friction is" if len(far) == 1 else f"{len(far)} samples of friction are"
@@ -140,19 +142,19 @@ def _outliers(fit: FitNumbers) -> list[str]:
     return found
 
 
-def _unsettled(fit: FitNumbers) -> list[str]:
+def _ends_off_model(fit: FitNumbers) -> list[str]:
     """Warnings on records whose first or last samples are off the model, which begins with steady sliding."""
     found = []
     for i, record in enumerate(fit.plan.records):
         own = fit.part(fit.residuals, i)
-        few = {BRIEFLY, max(BRIEFLY, len(own) // 200)}
+        few = {END_SAMPLES, max(END_SAMPLES, len(own) // 200)}
         begins, ends = (max((float(np.mean(side[:n])) for n in few), key=abs) for side in (own, own[::-1]))
-        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > AWAY * fit.rms:
+        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > MAX_END_OFFSET * fit.rms:
             found.append(
                 f"{record.source}: friction begins {begins:+.2g} beside the model, which begins with steady sliding; "
                 "where the record does not, let its beginning be free (initial = 'free'), or cut it off (between)"
             )
-        if abs(ends) > AWAY * fit.rms:
+        if abs(ends) > MAX_END_OFFSET * fit.rms:
             found.append(
                 f"{record.source}: friction ends {ends:+.2g} beside the model; where the loading changed at the very "
                 "end, cut that off (between)"
@@ -160,7 +162,7 @@ def _unsettled(fit: FitNumbers) -> list[str]:
     return found
 
 
-def _off_the_loading(fit: FitNumbers) -> list[str]:
+def _loading_outliers(fit: FitNumbers) -> list[str]:
     """Warnings on records whose first or last samples are off the commanded loading."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
@@ -177,8 +179,8 @@ def _off_the_loading(fit: FitNumbers) -> list[str]:
             if sides:
                 cure = ", and let its beginning be free (initial = 'free')" if course.early else ""
                 found.append(
-                    f"{record.source}: of the {channel}, {_listed(sides)} samples are off what is found in the others, "
-                    "too few to tell a change from a fault of the sensor; the model does not follow them; where the "
+                    f"{record.source}: of the {channel}, {_enumerated(sides)} samples are off what is found in the "
+                    "others, too few to tell a change from a fault of the sensor; the model does not follow them; where the "
                     f"loading did change there, cut that off (between){cure}"
                 )
     return found
@@ -188,7 +190,7 @@ def _vague_jumps(fit: FitNumbers) -> list[str]:
     """Warnings on jumps whose time is hardly determined, so that errors are not Gaussian."""
     found = []
     for i, one in enumerate(fit.space.unknowns):
-        if _between_samples(fit, one) and float(fit.covariance[i, i]) > VAGUE**2:
+        if _between_samples(fit, one) and float(fit.covariance[i, i]) > MAX_JUMP_ERROR**2:
             found.append(
                 f"when exactly the drive or the normal stress jumped between {one.low:.7g} and {one.high:.7g} s is "
                 f"hardly determined ({one.name}); errors of what the jump tells, such as alpha from one of normal "
@@ -208,41 +210,42 @@ def _between_samples(fit: FitNumbers, one: Any) -> bool:
     return channel != "load" and change.duration == 0
 
 
-def _untold_ramps(fit: FitNumbers) -> list[str]:
+def _possible_ramps(fit: FitNumbers) -> list[str]:
     """Warnings on velocity changes that may be steps or ramps, with the effect of ramps on the fit."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
-        untold = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
-        if untold:
-            times = _listed([f"{change.time:.7g}" for change in untold])
-            longest = format_quantity(max(change.longest for change in untold), "s")
-            what, taken, ramps = ("changes", "are taken as steps", "ramps") if len(untold) > 1 else (
+        possible = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
+        if possible:
+            times = _enumerated([f"{change.time:.7g}" for change in possible])
+            longest = format_quantity(max(change.longest for change in possible), "s")
+            what, taken, ramps = ("changes", "are taken as steps", "ramps") if len(possible) > 1 else (
                 "change", "is taken as a step", "a ramp")  # fmt: skip
             found.append(
                 f"{record.source}: the {what} of rate at {times} s {taken}; {ramps} of up to {longest} would fit the "
                 "displacement as well"
             )
     if found and fit.as_ramps:
-        found[-1] += f"; {_of_ramps(fit, fit.as_ramps)}"
+        found[-1] += f"; {_ramp_effect(fit, fit.as_ramps)}"
     return found
 
 
-def _of_ramps(fit: FitNumbers, tried: tuple[Ramped, ...]) -> str:
+def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
     """Text on whether friction distinguishes ramps from steps, and on how ramps change the parameters."""
     worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
     best = min(tried, key=lambda one: one.ssq)
-    alike = [one for one in tried if one.ssq < best.ssq * (1 + SURE / worth)]
+    alike = [one for one in tried if one.ssq < best.ssq * (1 + SIGNIFICANT_GAIN / worth)]
     lengths = {one.share: _lengths(fit, one) for one in tried}
     if alike == [tried[0]]:
-        return f"friction tells: ramps of {lengths[tried[1].share]} make the sum of squares {_more(fit, tried[1])}"
+        first = lengths[tried[1].share]
+        return f"friction tells: ramps of {first} make the sum of squares {_relative_change(fit, tried[1])}"
     longest = alike[-1] if tried[0] in alike else best
-    changes = ", ".join(f"{_letter(n)} {longest.values[n] / fit.values[n] - 1:+.1%}" for n in _steep_names(fit.rig(0))
+    changes = ", ".join(f"{_symbol(n)} {longest.values[n] / fit.values[n] - 1:+.1%}" for n in _steep_names(fit.rig(0))
                         if n in longest.values and fit.values.get(n))  # fmt: skip
     verdict = "friction does not tell either" if tried[0] in alike else "friction is better fitted so"
-    return f"{verdict}: with {lengths[longest.share]} the sum of squares is {_more(fit, longest)}; {changes}"
+    return f"{verdict}: with {lengths[longest.share]} the sum of squares is {_relative_change(fit, longest)}; {changes}"
 
 
-def _forgotten_stress(fit: FitNumbers) -> list[str]:
+def _missing_memory(fit: FitNumbers) -> list[str]:
     """Warning that the normal stress changes while the law has no memory of it, with the effect of a memory."""
     plan = fit.plan
     if not (plan.pressed and plan.rig.friction.forgets_stress()):
@@ -250,15 +253,15 @@ def _forgotten_stress(fit: FitNumbers) -> list[str]:
     changing = [record.source for record in plan.records if record.stress_changes]
     if not changing:
         return []
-    said = f"the normal stress changes in {_listed(changing)}, and this law has no memory of it"
+    said = f"the normal stress changes in {_enumerated(changing)}, and this law has no memory of it"
     if not fit.has_structure:
         return [f"{said}; residuals are white, which speaks for none"]
     worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
     best = next(iter(fit.with_memories), None)
-    if best is None or worth * np.log(fit.ssq / best.ssq) < SURE * (len(best.values) - len(fit.values)):
+    if best is None or worth * np.log(fit.ssq / best.ssq) < SIGNIFICANT_GAIN * (len(best.values) - len(fit.values)):
         return [f"{said}; none that was tried makes the fit better"]
     added = [f"{n.rpartition('.')[2]} {x:.3g}" for n, x in best.values.items() if n not in fit.values]
-    moved = [f"{_letter(n)} {best.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
+    moved = [f"{_symbol(n)} {best.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
              if n in best.values and fit.values.get(n)]  # fmt: skip
     return [
         f"{said}: with {best.choice} ({', '.join(added)}) the sum of squares is {best.ssq / fit.ssq:.2g} of this, and "
@@ -272,28 +275,28 @@ def _drained_at_once(fit: FitNumbers) -> list[str]:
     if not changing or fit.plan.rig.contact.has_pores():
         return []
     return [
-        f"the pore pressure changes in {_listed(changing)}, and acts at once in this contact, which has no pores; "
+        f"the pore pressure changes in {_enumerated(changing)}, and acts at once in this contact, which has no pores; "
         "where drainage takes time, fit its rate (lab_rig(pores=True), or no table [contact] in the file)"
     ]
 
 
-def _lengths(fit: FitNumbers, ramped: Ramped) -> str:
+def _lengths(fit: FitNumbers, ramped: RampFit) -> str:
     own = [
         format_quantity(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values
     ]
-    return _listed(own)
+    return _enumerated(own)
 
 
-def _more(fit: FitNumbers, ramped: Ramped) -> str:
+def _relative_change(fit: FitNumbers, ramped: RampFit) -> str:
     share = ramped.ssq / fit.ssq - 1
     return f"{abs(share):.2%} {'larger' if share > 0 else 'less'}"
 
 
-def _letter(name: str) -> str:
+def _symbol(name: str) -> str:
     return "k" if name == "slider.stiffness" else name.rpartition(".")[2]
 
 
-def _listed(words: list[str]) -> str:
+def _enumerated(words: list[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
@@ -330,7 +333,7 @@ def drive_line(fit: FitNumbers) -> str:
     if other is None:
         return text
     shares = [
-        f"{_letter(name)} {other[name] / fit.values[name] - 1:+.0%}"
+        f"{_symbol(name)} {other[name] / fit.values[name] - 1:+.0%}"
         for name in _steep_names(fit.rig(0))
         if name in other and fit.values.get(name)
     ]

@@ -320,7 +320,7 @@ def test_interrupted_thresholds_keep_those_found(monkeypatch, tmp_path):
 def test_an_interrupted_answer_is_printed_with_its_status(capsys):
     import typer
 
-    from steadyslip.cli.answers import give
+    from steadyslip.cli.answers import output_result
 
     class Answer:
         interrupted = True
@@ -329,6 +329,6 @@ def test_an_interrupted_answer_is_printed_with_its_status(capsys):
             return "what there is"
 
     with pytest.raises(typer.Exit) as left:
-        give(Answer(), [], False, print)
+        output_result(Answer(), [], False, print)
     assert left.value.exit_code == 130
     assert capsys.readouterr().out == "what there is\n"

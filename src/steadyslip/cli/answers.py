@@ -1,4 +1,4 @@
-"""Answers on the standard output, and in files."""
+"""Print results of commands, and write them to files."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ import typer
 from steadyslip.core.version import stamped
 
 
-def say(text: str) -> None:
-    """Print an answer; that it cannot be written is an error like any other."""
+def print_text(text: str) -> None:
+    """Print text; raise an error if the standard output cannot be written to."""
     from steadyslip.files.output import answering
 
     with answering():
         typer.echo(text)
 
 
-def say_json(data: Any) -> None:
-    """Print an answer for other programs, an object with the version that gave it."""
-    say(json.dumps(stamped(data), indent=2, allow_nan=False))
+def print_json(data: Any) -> None:
+    """Print data as a JSON object, with the version of steadyslip."""
+    print_text(json.dumps(stamped(data), indent=2, allow_nan=False))
 
 
-def formula_of(result: Any, along: str | None) -> dict[str, str | None]:
-    """The formula of an edge for JSON; null where there is none."""
+def formula_data(result: Any, along: str | None) -> dict[str, str | None]:
+    """Formula of an edge of stability for JSON; None if there is none."""
     from steadyslip.core.errors import NotAvailable
 
     try:
@@ -35,32 +35,34 @@ def formula_of(result: Any, along: str | None) -> dict[str, str | None]:
         return {"formula": None}
 
 
-def say_formula(result: Any, along: str | None) -> None:
-    """Print the formula of an edge, or why there is none."""
+def print_formula(result: Any, along: str | None) -> None:
+    """Print the formula of an edge of stability, or the reason that there is none."""
     from steadyslip.core.errors import NotAvailable
     from steadyslip.core.progress import progress_text
 
     try:
         with progress_text("simplifying the formula"):
             equation = result.formula(along)
-        say(f"\n{f'Edge in {along}' if along else 'Critical stiffness'}\n  {equation.lhs} = {equation.rhs}")
+        print_text(f"\n{f'Edge in {along}' if along else 'Critical stiffness'}\n  {equation.lhs} = {equation.rhs}")
     except NotAvailable as reason:
-        say(f"\nNo formula: {reason}")
+        print_text(f"\nNo formula: {reason}")
 
 
-def give(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]) -> None:
-    """Print JSON or words, then write the files asked for: an answer is not lost with a file.
+def output_result(
+    result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]
+) -> None:
+    """Print a result as text or JSON, then write it to files; printing first keeps it if a file cannot be written.
 
-    After Ctrl-C there is something to give as well. `write` says whether it was cut short itself.
+    Exits with status 130 if the result, or `write` (which then returns True), was interrupted by Ctrl-C.
     """
     if as_json:
-        say_json(result.to_dict())
+        print_json(result.to_dict())
     else:
-        say(str(result))
+        print_text(str(result))
     interrupted = bool(getattr(result, "interrupted", False))
     for path in output:
         interrupted = bool(write(result, path)) or interrupted
         if not as_json:
-            say(f"wrote {path}")
+            print_text(f"wrote {path}")
     if interrupted:
         raise typer.Exit(130)

@@ -1,4 +1,4 @@
-"""The commands."""
+"""Commands of the program; each calls one public function."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from steadyslip.cli.answers import formula_of, give, say, say_formula, say_json
-from steadyslip.cli.ending import end, failed
+from steadyslip.cli.answers import formula_data, output_result, print_formula, print_json, print_text
+from steadyslip.cli.ending import end, print_message
 from steadyslip.cli.options import AsJson, Branch, Changes, Fitted, Pieces, RigFile, Until, outputs, refuse_branch
 
 
 class _Commands(TyperGroup):
-    """Commands, of which Ctrl-C leaves what they say in parting: Typer would end without a word."""
+    """Group of commands that prints a message after Ctrl-C; Typer would exit without one."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as stopped:
-            raise typer.Exit(failed(str(stopped) or "before there was an answer", 130, "stopped")) from None
+            raise typer.Exit(print_message(str(stopped) or "before there was an answer", 130, "stopped")) from None
 
 
 app = typer.Typer(
@@ -41,7 +41,7 @@ def _start(version: Annotated[bool, typer.Option("--version", help="print the ve
     if version:
         from steadyslip import __version__
 
-        say(f"steadyslip {__version__}")
+        print_text(f"steadyslip {__version__}")
         raise typer.Exit
 
 
@@ -81,15 +81,15 @@ def analyze(
     if as_json:
         data = result.to_dict()
         if formula:
-            data |= formula_of(result, along)
-        say_json(data)
+            data |= formula_data(result, along)
+        print_json(data)
     else:
         head, _, rest = str(result).partition("\n")
         colour = {True: typer.colors.GREEN, False: typer.colors.RED, None: typer.colors.YELLOW}[result.stable]
-        say(typer.style(head, bold=True, fg=colour))
-        say(rest)
+        print_text(typer.style(head, bold=True, fg=colour))
+        print_text(rest)
         if formula:
-            say_formula(result, along)
+            print_formula(result, along)
     if any(one.interrupted for one in getattr(result, "kicks", ())):
         raise typer.Exit(130)
     if require_stable and (not result.stable or result.on_edge):
@@ -107,7 +107,7 @@ def _predicted(
     along: str | None,
     branch: int,
 ) -> None:
-    """The verdict with the friction of a fit: that of the best values, and its probability."""
+    """Analyze a rig with the friction of a fit: verdict of the best values, and probability of stability."""
     from steadyslip.experiments import load_fit, predict
     from steadyslip.files.specifications import read_slider
     from steadyslip.verdict import analyze as run
@@ -118,12 +118,12 @@ def _predicted(
     found = predict(slider, load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
-        data = best.to_dict() | {"prediction": found.to_dict()} | (formula_of(best, along) if formula else {})
-        say_json(data)
+        data = best.to_dict() | {"prediction": found.to_dict()} | (formula_data(best, along) if formula else {})
+        print_json(data)
     else:
-        say(f"{found}\n\nWith the best values\n{best}")
+        print_text(f"{found}\n\nWith the best values\n{best}")
         if formula:
-            say_formula(best, along)
+            print_formula(best, along)
     if found.left_out:
         raise typer.Exit(130)
     if require_stable and not found.probability_stable >= 0.95:
@@ -162,17 +162,17 @@ def fit(
             message = "cannot be combined with [population], whose draws carry the uncertainty"
             raise ParameterError([Problem("--bootstrap", message)])
         members = population_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
-        give(members, output or (), as_json, write_population)
+        output_result(members, output or (), as_json, write_population)
         return
     found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
     for path in output or ():
         write_fit(found, comparison, path)
     if not as_json:
         for record in found.plan.records:
-            say(f"{record}\n")
+            print_text(f"{record}\n")
         if comparison is not None:
-            say(f"{comparison}\n")
-        say(str(found))
+            print_text(f"{comparison}\n")
+        print_text(str(found))
     draws, stopped = None, comparison is not None and comparison.interrupted
     if bootstrap and not stopped:
         try:
@@ -187,11 +187,11 @@ def fit(
         data = plain(found, comparison)
         if draws is not None:
             data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
-        say_json(data)
+        print_json(data)
     elif draws is not None:
-        say(f"\n{draws}")
+        print_text(f"\n{draws}")
     for path in () if as_json else output or ():
-        say(f"wrote {path}")
+        print_text(f"wrote {path}")
     if stopped:
         raise typer.Exit(130)
 
@@ -214,10 +214,10 @@ def explore(
         check_output([output], [".html"])
     found = run(read_rig(rig, changes or ()), title=rig.stem, branch=branch, source=rig)
     if output is None:
-        say(f"opened {found.open()}")
+        print_text(f"opened {found.open()}")
         return
     found.save(output)
-    say(f"wrote {output}")
+    print_text(f"wrote {output}")
 
 
 @app.command()
@@ -251,10 +251,10 @@ def report(
         options["fit"] = load_fit(fitted)
     found = run(read_rig(rig, changes or ()), title=rig.stem, source=rig, **options)
     if output is None:
-        say(f"opened {found.open()}")
+        print_text(f"opened {found.open()}")
         return
     found.save(output)
-    say(f"wrote {output}")
+    print_text(f"wrote {output}")
 
 
 @app.command()
@@ -284,7 +284,7 @@ def simulate(
 
     check_output(output or (), ENDINGS)
     history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol, contact)
-    give(
+    output_result(
         history,
         output or (),
         as_json,
@@ -316,7 +316,7 @@ def cycles(
 
     check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings)
-    give(branch, output or (), as_json, partial(write_branch, source=rig))
+    output_result(branch, output or (), as_json, partial(write_branch, source=rig))
 
 
 @app.command()
@@ -350,7 +350,7 @@ def threshold(
     wanted = [path for path in output or () if not found.interrupted or path.suffix == ".html"]
     if len(wanted) < len(output or ()):
         typer.secho("stopped: the basin is not drawn", err=True)
-    give(found, wanted, as_json, partial(write_thresholds, source=rig))
+    output_result(found, wanted, as_json, partial(write_thresholds, source=rig))
 
 
 @app.command()
@@ -385,7 +385,7 @@ def response(
 
     check_output(files or (), ANSWERED)
     found = response_of_file(rig, changes or (), periods, points, amplitudes or (), swings, answers, on, limits)
-    give(found, files or (), as_json, partial(write_answers, title="Response", source=rig))
+    output_result(found, files or (), as_json, partial(write_answers, title="Response", source=rig))
 
 
 @app.command()
@@ -404,7 +404,7 @@ def verdicts(
 
     check_output(output or (), ANSWERED)
     found = verdicts_of_file(rig, changes or (), pieces or (), until, rtol)
-    give(found, output or (), as_json, partial(write_answers, title="Verdicts", source=rig))
+    output_result(found, output or (), as_json, partial(write_answers, title="Verdicts", source=rig))
 
 
 @app.command("map")
@@ -444,13 +444,13 @@ def map_(
     for path in others:
         write_map(found, path, figure, edge, source)
     if as_json:
-        say_json(found.to_dict())
+        print_json(found.to_dict())
         return
-    say(str(found))
+    print_text(str(found))
     if edge is not None:
-        say(f"\n{edge}")
+        print_text(f"\n{edge}")
     for path in others:
-        say(f"wrote {path}")
+        print_text(f"wrote {path}")
 
 
 @app.command()
@@ -471,7 +471,7 @@ def sensitivity(
 
     check_output(output or (), SHARES)
     found = sensitivity_file(rig, changes or (), of or (), points)
-    give(found, output or (), as_json, partial(write_sensitivity, source=rig))
+    output_result(found, output or (), as_json, partial(write_sensitivity, source=rig))
 
 
 @app.command()
@@ -482,9 +482,9 @@ def reproduce(
     from steadyslip.reproduce import paper_table, reproduce as run
 
     written = run(folder)
-    say(str(paper_table()))
+    print_text(str(paper_table()))
     for path in written:
-        say(f"wrote {path}")
+        print_text(f"wrote {path}")
 
 
 @app.command()
@@ -492,9 +492,9 @@ def schema() -> None:
     """Print the JSON schema of the files that are read: rigs, protocols, maps and fits."""
     from steadyslip.schemas import json_schema
 
-    say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    print_text(json.dumps(json_schema(), indent=2, ensure_ascii=False))
 
 
 def main() -> None:
-    """Entry point."""
+    """Run the command line and exit; entry point of the package."""
     end(app)

@@ -1,7 +1,7 @@
-"""How the program ends: whatever comes, one clear message at most, and a status that says what it was.
+"""Exit statuses and error messages of the program: at most one message, whatever happens.
 
-0 answered, 1 answered but not stable (``--require-stable``), 2 no answer (the message says why), 70 a fault of
-this program, 130 interrupted (what there is has been given), 141 nobody reads the answer any more.
+0 success, 1 success but not stable (``--require-stable``), 2 error (explained in the message), 70 internal error of
+steadyslip, 130 interrupted (after printing what is complete), 141 standard output closed by its reader.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ import typer
 
 
 def end(command: Callable[[], object]) -> None:
-    """Run, and end this process with the status."""
+    """Run a command, and exit with its status."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
             stream.reconfigure(errors="replace")
     if sys.stdout is None:  # closed by who started this
-        sys.exit(failed("there is no standard output to write the answer to", 2))
+        sys.exit(print_message("there is no standard output to write the answer to", 2))
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
         sys.exit(status_of(command))
 
 
 def status_of(command: Callable[[], object]) -> int:
-    """Run, and turn everything that can happen into a status."""
+    """Run a command and return its exit status; exceptions become messages."""
     from steadyslip.core.errors import SteadyslipError
     from steadyslip.files.output import OutputClosed
 
@@ -45,11 +45,11 @@ def status_of(command: Callable[[], object]) -> int:
     except OutputClosed:
         status = 141
     except SteadyslipError as error:
-        status = failed(str(error), 2)
+        status = print_message(str(error), 2)
     except MemoryError:
-        status = failed("there is not enough memory for this; ask for fewer points, samples or runs", 2)
+        status = print_message("there is not enough memory for this; ask for fewer points, samples or runs", 2)
     except OSError as error:
-        status = failed(_system_fault(error), 2)
+        status = print_message(_system_error_text(error), 2)
         if error.filename is None:  # the output itself: what is still buffered would fail once more
             from steadyslip.files.output import discard_output
 
@@ -58,23 +58,23 @@ def status_of(command: Callable[[], object]) -> int:
         if "STEADYSLIP_DEBUG" in os.environ:
             raise
         what = f"{type(error).__name__}: {error}"[:300]
-        status = failed(
+        status = print_message(
             f"a fault of steadyslip itself, please report it with the command and its files: {what} "
             "(STEADYSLIP_DEBUG=1 shows where)",
             70,
         )
-    return _flushed(status)
+    return _flush_output(status)
 
 
 def _show_warning(otherwise: Callable[..., None], message: Warning | str, kind: type[Warning], *where: Any) -> None:
-    """Warnings of ours in one line, without where in the program they arose."""
+    """Print warnings of steadyslip in one line, without the source location."""
     if kind.__module__.startswith("steadyslip."):
-        failed(str(message), 0, "warning")
+        print_message(str(message), 0, "warning")
     else:
         otherwise(message, kind, *where)
 
 
-def _system_fault(error: OSError) -> str:
+def _system_error_text(error: OSError) -> str:
     try:
         os.getcwd()
     except OSError:
@@ -83,15 +83,15 @@ def _system_fault(error: OSError) -> str:
     return f"{where}: {error.strerror or error}"
 
 
-def failed(message: str, status: int, kind: str = "error") -> int:
-    """Say why there is no answer; the status."""
+def print_message(message: str, status: int, kind: str = "error") -> int:
+    """Print a message to the standard error stream, and return `status`."""
     with suppress(OSError):
         typer.secho(f"{kind}: {message}", err=True, fg=typer.colors.RED if sys.stderr and sys.stderr.isatty() else None)
     return status
 
 
-def _flushed(status: int) -> int:
-    """What is left in the buffers must go out now: later nobody could say that it did not."""
+def _flush_output(status: int) -> int:
+    """Flush the standard output, and return `status` or that of the failure, which could not be reported later."""
     from steadyslip.files.output import discard_output
 
     try:
@@ -100,7 +100,7 @@ def _flushed(status: int) -> int:
     except BrokenPipeError:
         status = 141
     except (OSError, ValueError) as error:
-        status = failed(f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}", 2)
+        status = print_message(f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}", 2)
     else:
         return status
     discard_output()

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options shared by several commands."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Annotated, Any
 import typer
 
 
-def _speak(context: typer.Context, rig: Path) -> Path:
-    """Answer in the units of the file."""
+def _set_units(context: typer.Context, rig: Path) -> Path:
+    """Set the output units to those used in the rig file."""
     from steadyslip.core.errors import ParameterError
     from steadyslip.core.format import display_units
     from steadyslip.files.specifications.read import text_of
     from steadyslip.files.specifications.template import units_of
 
-    with suppress(ParameterError):  # whoever reads the rig says what is wrong with the file
+    with suppress(ParameterError):  # problems of the file are reported when the rig is read
         context.with_resource(display_units(units_of(text_of(rig))))
     return rig
 
 
 RigFile = Annotated[
-    Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'", callback=_speak)
+    Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'", callback=_set_units)
 ]
 Changes = Annotated[
     list[str] | None,
@@ -44,12 +44,12 @@ Fitted = Annotated[
 
 
 def outputs(what: str) -> Any:
-    """The option that names files to write."""
+    """Option that names output files."""
     return typer.Option("-o", "--output", help=f"{what}; repeatable")
 
 
 def refuse_branch(fitted: Path | None, branch: int) -> None:
-    """Refuse to judge another steady sliding with the friction of a fit.
+    """Raise ParameterError for --fit with --branch: a fit applies to the steady sliding of lowest normal stress.
 
     Raises
     ------

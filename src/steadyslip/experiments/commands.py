@@ -1,4 +1,4 @@
-"""What the command line does with fits."""
+"""Files and JSON of the command ``steadyslip fit``."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ENDINGS = (".nc", ".html", ".json", *FIGURES)
 
 
 def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
-    """Records, and the file of the fit: the one that ends in .toml.
+    """Separate the paths of records from that of the fit file, which ends in .toml (None if there is none).
 
     Raises
     ------
@@ -37,7 +37,7 @@ def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
 
 
 def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Draws | None = None) -> None:
-    """Write a fit by the ending of the name; a document has the draws in it, too.
+    """Write a fit in the format that the file's ending names; an HTML document includes the draws.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Dra
 
 
 def write_population(found: Population, path: Path) -> None:
-    """Write a population by the ending of the name.
+    """Write a population in the format that the file's ending names.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def write_population(found: Population, path: Path) -> None:
 
 
 def as_json(fit: Fit, comparison: LawComparison | None) -> dict[str, Any]:
-    """Plain data of a fit, and of the laws it was compared with."""
+    """Data of a fit for JSON, with those of the laws that it was compared with."""
     data = fit.to_dict()
     if comparison is not None:
         data["comparison"] = {

@@ -1,4 +1,4 @@
-"""From files of records, and the file that says how, to a fit or a population, as the command line does it."""
+"""Fit records in files, as the command line does: from paths to a fit or a population."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Paths = Sequence[str | PathLike[str]]
 
 
 def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Spec:
-    """What the file of a fit says; one-state slip law at the measured normal stress unless there is one."""
+    """Read a fit file; without one, the one-state slip law at the measured normal stress."""
     text = "[friction]\n" if spec is None else text_of(spec)
     return spec_from_text(text, "default" if spec is None else str(spec), changes)
 
@@ -49,8 +49,8 @@ def fit_files(
     fit : Fit
         The best, where laws are compared.
     comparison : LawComparison or None
-        Of the laws that the file lists; where the normal stress changes and no file says how friction remembers that,
-        of the memories of it.
+        Comparison of the laws that the file lists; if it lists none and the normal stress changes, of laws with each
+        memory of it, unless the file chooses one. None for a single law.
 
     Raises
     ------
@@ -60,11 +60,11 @@ def fit_files(
     plan = spec_of(spec, changes)
     records = _read(plan, paths, skip_bad_lines)
     with progress_text("searching") as said:
-        told = _teller(said)
+        report = _progress_reporter(said)
         if plan.compared(records):
-            found = plan.compare(records, progress=told)
+            found = plan.compare(records, progress=report)
             return found.fits[found.best], found
-        return plan.fit(records, progress=told), None
+        return plan.fit(records, progress=report), None
 
 
 @checked()
@@ -111,14 +111,14 @@ def population_files(
         for path, record in zip(paths, records, strict=True):
             stem = Path(path).stem
             label = stem if stem not in fits else f"{stem} ({len(fits) + 1})"
-            fits[label] = plan.fit([record], progress=_teller(said, f"{label}, "))
+            fits[label] = plan.fit([record], progress=_progress_reporter(said, f"{label}, "))
     return population(
         fits, members.parameters, conditions=members.depends_on(), scale=members.scale, count=members.draws
     )
 
 
 def _read(plan: Spec, paths: Paths, skip_bad_lines: bool) -> list[Record]:
-    """All records; every fault of every file at once."""
+    """Read all records; one error lists the problems of all files."""
     records, faults = [], []
     for path in paths:
         try:
@@ -132,9 +132,9 @@ def _read(plan: Spec, paths: Paths, skip_bad_lines: bool) -> list[Record]:
     return records
 
 
-def _teller(said: Callable[[str], None], of: str = "") -> Progress:
-    def told(what: str, starts: int, rms: float) -> None:
+def _progress_reporter(said: Callable[[str], None], of: str = "") -> Progress:
+    def report(what: str, starts: int, rms: float) -> None:
         reached = f", residuals {rms:.3g} of friction" if math.isfinite(rms) else ""
         said(f"{of}{what}: {starts} starts tried{reached}; Ctrl-C ends it")
 
-    return told
+    return report

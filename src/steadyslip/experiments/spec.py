@@ -1,4 +1,4 @@
-"""The file that says how to fit: a rig file in which what is to be fitted may be missing, and three more tables."""
+"""Fit files: rig files in which fitted values may be missing, with tables on records, fit and population."""
 
 from __future__ import annotations
 
@@ -38,35 +38,35 @@ from steadyslip.protocol import Protocol
 TABLES = (
     Section("record", RecordSettings), Section("fit", FitSettings), Section("population", PopulationSettings)
 )  # fmt: skip
-"""The tables of such a file besides those of a rig."""
+"""Tables of a fit file besides those of a rig file."""
 
 
 @dataclass(frozen=True)
 class Spec(Displayed):
-    """How to read records and what to fit to them.
+    """Contents of a fit file: how to read records, and what to fit to them.
 
     Attributes
     ----------
     rig : Slider
     protocol : Protocol or None
     record : RecordSettings
-        How to read records.
-    options : dict
-        Arguments of `fit`.
-    laws : tuple of str
-        Laws to compare; none unless asked for.
-    undecided : tuple of str
-        Labels of laws among which records choose where their normal stress changes, as the file does not say.
-    windows : bool
-        Whether every step of a record is a record of its own.
-    v_ref_given : bool
-        Whether the file says at which rate mu_ref holds; the rate at the start of the first record unless given.
-    contact_given : bool
-        Whether it says what presses the surfaces together.
-    drive_given : bool
-        Whether it says how fast the load point moves before a protocol changes that; as in the records unless given.
-    population : PopulationSettings or None
-        Whether, and how, records are experiments of their own that are members of a population.
+            Format of the records.
+        options : dict
+            Arguments of `fit`.
+        laws : tuple of str
+            Labels of laws to compare; empty unless the file lists some.
+        undecided : tuple of str
+            Labels of laws to compare if the normal stress changes in a record and the file names no memory of it.
+        windows : bool
+            True if every step of a record is a record of its own.
+        v_ref_given : bool
+            True if the file gives the velocity at which mu_ref holds; otherwise that at the start of the first record.
+        contact_given : bool
+            True if the file has a table ``[contact]`` with a value.
+        drive_given : bool
+            True if the file gives the initial velocity of the drive; otherwise it is that of the records.
+        population : PopulationSettings or None
+            Settings of a population, if every record is an experiment of its own.
     """
 
     rig: Slider
@@ -82,7 +82,7 @@ class Spec(Displayed):
     population: PopulationSettings | None = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
-        """Read a record as the file says."""
+        """Read a record with the settings of the file."""
         options = self.record.arguments()
         decimate = options.pop("decimate", None)
         options["skip_bad_lines"] = skip_bad_lines or options.get("skip_bad_lines", False)
@@ -90,30 +90,30 @@ class Spec(Displayed):
         return record if decimate is None else record.decimated(decimate)
 
     def fit(self, records: Sequence[Record], **changes: Any) -> Fit:
-        """Fit the records as the file says."""
-        rig, parts = self._for(records)
+        """Fit the records with the settings of the file."""
+        rig, parts = self._rig_and_records(records)
         return fit(rig, parts, **self._options(rig), protocol=self.protocol, **changes)
 
     def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
-        """The laws that the file lists; if none, those among which changes of the normal stress decide."""
+        """Labels of the laws to compare: those of the file, else `undecided` if the normal stress changes."""
         imposed = self.rig.contact.is_imposed() or self.rig.contact.has_pores()
         decides = imposed and any(record.stress_changes for record in records)
         return self.laws or (self.undecided if decides else ())
 
     def compare(self, records: Sequence[Record], **changes: Any) -> LawComparison:
         """Fit all laws of `compared`."""
-        rig, parts = self._for(records)
+        rig, parts = self._rig_and_records(records)
         options = self._options(rig)
         return compare_laws(rig, parts, self.compared(records), **options, protocol=self.protocol, **changes)
 
     def _options(self, rig: Slider) -> dict[str, Any]:
-        """Arguments of `fit`; of a contact that was given pores as the records have some, the drainage is free too."""
+        """Arguments of `fit`; the drainage is free too if the rig was given pores because of the records."""
         further = [name for name in rig.of_kind("drainage") if name not in self.rig.parameters()]
         if "free" not in self.options or not further:
             return self.options
         return self.options | {"free": [*self.options["free"], *further]}
 
-    def _for(self, records: Sequence[Record]) -> tuple[Slider, tuple[Record, ...]]:
+    def _rig_and_records(self, records: Sequence[Record]) -> tuple[Slider, tuple[Record, ...]]:
         parts = tuple(w for r in records for w in (r.windows() if self.windows else (r,)))
         pressed = [record.normal is not None for record in parts]
         if not (self.contact_given or all(pressed)):
@@ -137,7 +137,7 @@ class Spec(Displayed):
         return rig, parts
 
     def referred_to(self, record: Record) -> Spec:
-        """The same with mu_ref at the rate at which a record begins, unless the file says at which."""
+        """Copy with the initial velocity of a record as the reference velocity of mu_ref, unless the file gives one."""
         references = [name for name in self.rig.of_kind("reference rate") if name.startswith("friction.")]
         if self.v_ref_given or not references:
             return self
@@ -148,10 +148,10 @@ class Spec(Displayed):
 
 @checked()
 def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
-    """Read the file of a fit.
+    """Read a fit file.
 
-    It is a rig file. What is to be fitted may be missing: a, b, d_c, α, mu_ref, the stiffness; so may what records
-    determine: contact, drive, v_ref. The table ``[record]`` says how to read records, ``[fit]`` what to fit.
+    A fit file is a rig file in which fitted values may be missing (a, b, d_c, α, mu_ref, stiffness), and also values
+    that the records give (contact, drive, v_ref). The table ``[record]`` describes the records, ``[fit]`` the fit.
 
     Parameters
     ----------
@@ -168,16 +168,16 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
 
 
 def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec:
-    """Read the text of such a file; see `read_spec`."""
-    filled = _Filled()
+    """Read the text of a fit file; see `read_spec`."""
+    filled = _Placeholders()
     return _spec(read_contents(text, source, changes, TABLES, filled.complete), filled)
 
 
-def _spec(found: RigFileContents, filled: _Filled) -> Spec:
+def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
     record, settings = found.further.get("record"), found.further.get("fit")
     settings = settings if isinstance(settings, FitSettings) else FitSettings()
     missing = filled.missing - found.changed
-    left = [] if found.problems or found.rig is None else _left_open(missing, settings, found.rig)
+    left = [] if found.problems or found.rig is None else _values_missing(missing, settings, found.rig)
     members = found.further.get("population")
     members = members if isinstance(members, PopulationSettings) else None
     if members is not None:
@@ -191,7 +191,7 @@ def _spec(found: RigFileContents, filled: _Filled) -> Spec:
         options["free"] = sorted(name for name in missing if name in rig.parameters())
         if known := [name for name in rig.of_kind("friction level") if name not in missing]:
             options["fixed"] = [*settings.fixed, *known]
-    v_ref, contact, drive = (filled.given(kind, found.changed) for kind in _Filled.FROM_RECORDS)
+    v_ref, contact, drive = (filled.given(kind, found.changed) for kind in _Placeholders.FROM_RECORDS)
     choices = [words for name, words in rig.friction.decided_by_stress.items() if name not in filled.friction]
     undecided = tuple(map(", ".join, product(*choices))) if choices else ()
     return Spec(
@@ -210,7 +210,7 @@ def lab_rig(
     stiffness: Any = None,
     v_ref: Any = "1 um/s",
 ) -> Slider:
-    """A rig for fits: rate-and-state friction in a press, whose numbers stand for what is to be fitted.
+    """Make a rig for fits, with rate-and-state friction and constant normal stress; its values are placeholders.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def lab_rig(
     """
     rate = _checked("v_ref", "m/s", v_ref)
     friction = {"evolution": evolution, "v_ref": rate, "normal_memory": {"law": normal_memory}}
-    filled = _Filled()
+    filled = _Placeholders()
     count = int(states) if isinstance(states, np.integer) else states
     tables = {"friction": friction, "fit": {"states": count}}
     rig = _spec(read_tables(tables, {}, "lab_rig", further=TABLES, complete=filled.complete), filled).rig
@@ -238,7 +238,7 @@ def lab_rig(
 
 
 def with_pores(rig: Slider) -> Slider:
-    """The rig with a contact whose pores drain, without dilatancy, at a rate that stands for what is fitted."""
+    """Rig with pores in its contact that drain, without dilatancy; the drainage rate is a placeholder."""
     return replace(rig, contact=contact_laws.porous(steady_state(rig).normal_stress))
 
 
@@ -249,10 +249,10 @@ def _checked(name: str, unit: str, value: Any) -> float:
         raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
 
-class _Filled:
-    """Puts values where a file has none, and knows which of them are to be fitted or are those of the records.
+class _Placeholders:
+    """Fills in missing values of a fit file, and keeps which of them are to be fitted or to be read off records.
 
-    What may be missing, and what stands for it, the laws declare (`Parameter.standing`).
+    The laws declare which values may be missing, with their placeholders (`Parameter.standing`).
     """
 
     FROM_RECORDS = ("reference rate", "normal stress", "drive velocity")
@@ -264,7 +264,7 @@ class _Filled:
         self.friction: set[str] = set()
 
     def given(self, kind: str, changed: set[str]) -> bool:
-        """Whether the file, or a change, says what records would say otherwise."""
+        """True if the file, or a change to it, gives a value that would otherwise come from the records."""
         return kind not in self.standing or self.standing[kind] in changed
 
     def complete(self, tables: Table) -> None:
@@ -279,7 +279,7 @@ class _Filled:
         self.friction = set(friction)
         law = FrictionLaw.registry.get(str(friction.setdefault("law", friction_laws.USUAL)))
         if law is not None:
-            self._law(friction, law, "friction.", states)
+            self._fill_law(friction, law, "friction.", states)
         stiff = [item for item in fields(Slider) if _kind(item) == "stiffness"]
         gains = {item.name for one in Drive.registry.values() for item in fields(one) if _kind(item) == "stiffness"}  # type: ignore[arg-type]
         if not {item.name for item in stiff} & set(slider) and not any(drive.get(name) for name in gains):
@@ -296,7 +296,7 @@ class _Filled:
                     self._fill(contact, item, "contact.")
 
     def _fill(self, table: Table, item: Field[Any], prefix: str, factor: float = 1.0) -> None:
-        """A value for a parameter that has none, if it declares one that may stand for it."""
+        """Fill in the placeholder of a missing parameter, times `factor`, if it declares one."""
         role = role_of(item)
         if item.name in table or not isinstance(role, Parameter) or role.standing is None:
             return
@@ -306,8 +306,8 @@ class _Filled:
         else:
             self.missing.add(f"{prefix}{item.name}")
 
-    def _law(self, table: Table, law: type[FrozenRecord], prefix: str, states: Any = None) -> None:
-        """All parameters of a law and of its parts; of a list of states either the law's own, or the list's."""
+    def _fill_law(self, table: Table, law: type[FrozenRecord], prefix: str, states: Any = None) -> None:
+        """Fill in the parameters of a law and of its parts; those of a list of states in the list, not in the law."""
         items = {item.name: item for item in fields(law)}  # type: ignore[arg-type]  # every law is a dataclass
         roles = {name: role for name, item in items.items() if isinstance(role := role_of(item), Part)}
         lists = [name for name, role in roles.items() if role.many]
@@ -315,16 +315,16 @@ class _Filled:
             self.problems.append(Problem("fit.states", f"got {states!r}; the law {law.name!r} has no number of states"))
         elsewhere: set[str] = set()
         for name in lists:
-            elsewhere |= self._members(table, name, roles[name].family, prefix, states)
+            elsewhere |= self._fill_members(table, name, roles[name].family, prefix, states)
         for name, item in items.items():
             if name not in elsewhere:
                 self._fill(table, item, prefix)
         for name, role in roles.items():
             if not role.many:
-                self._part(table, name, role, prefix, elsewhere)
+                self._fill_part(table, name, role, prefix, elsewhere)
 
-    def _members(self, table: Table, name: str, family: type[FrozenRecord], prefix: str, states: Any) -> set[str]:
-        """Fill the members of a list; what they have, given or filled, the law itself need not."""
+    def _fill_members(self, table: Table, name: str, family: type[FrozenRecord], prefix: str, states: Any) -> set[str]:
+        """Fill in the members of a list, and return the names that the law itself then does not need."""
         items = [item for item in fields(family) if getattr(role_of(item), "standing", None) is not None]  # type: ignore[arg-type]
         single = {item.name for item in items} & set(table)
         if name not in table and isinstance(states, int) and 1 < states <= MOST_STATES:
@@ -342,8 +342,8 @@ class _Filled:
                 self._fill(member, item, f"{prefix}{name}.{i}.", apart)
         return {item.name for item in items} | {key for member in members for key in member}
 
-    def _part(self, table: Table, name: str, role: Part, prefix: str, elsewhere: set[str]) -> None:
-        """The parameters of a part, beside the law's own or in a table of their own."""
+    def _fill_part(self, table: Table, name: str, role: Part, prefix: str, elsewhere: set[str]) -> None:
+        """Fill in the parameters of a part of a law, in the law's table or in a table of the part."""
         chosen = table.get(name)
         own = chosen.get("law") if isinstance(chosen, dict) else chosen
         law = role.family.registry.get(own) if isinstance(own, str) else None
@@ -359,13 +359,13 @@ class _Filled:
 
 
 def _kind(item: Field[Any]) -> str:
-    """What a field's parameter is; see `steadyslip.core.roles.PARAMETER_KINDS`."""
+    """Kind of a field's parameter, see `steadyslip.core.roles.PARAMETER_KINDS`; empty for other fields."""
     role = role_of(item)
     return role.kind if isinstance(role, Parameter) else ""
 
 
-def _left_open(missing: set[str], settings: FitSettings, rig: Slider) -> list[Problem]:
-    """Parameters that have no value and are not fitted either; what stands in for them must not be taken for one."""
+def _values_missing(missing: set[str], settings: FitSettings, rig: Slider) -> list[Problem]:
+    """Problems with parameters that have no value and are not fitted, whose placeholders must not be used."""
 
     problems: list[Problem] = []
 

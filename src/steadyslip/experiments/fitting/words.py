@@ -180,8 +180,8 @@ def _loading_outliers(fit: FitNumbers) -> list[str]:
                 cure = ", and let its beginning be free (initial = 'free')" if course.early else ""
                 found.append(
                     f"{record.source}: of the {channel}, {_enumerated(sides)} samples are off what is found in the "
-                    "others, too few to tell a change from a fault of the sensor; the model does not follow them; where the "
-                    f"loading did change there, cut that off (between){cure}"
+                    "others, too few to tell a change from a fault of the sensor; the model does not follow them; "
+                    f"where the loading did change there, cut that off (between){cure}"
                 )
     return found
 

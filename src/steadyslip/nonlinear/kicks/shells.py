@@ -31,7 +31,7 @@ FINE = 24  # shells between the last that falls and the first that rises,
 REFINED = 2  # rounds of that refinement
 NOISE = 25.0  # drift of a turn, in tolerances per step, above which it exceeds the errors of integration
 SHARE = 0.02  # smallest significant drift, as a share of the linear decay per turn
-POINTS = 16  # starting points per shell for the outcome beyond a band
+POINTS = 16  # starting points on the outer rim of a band for the outcome beyond it
 ROUNDS = 12  # Newton iterations for the time of a turn
 FLAT = 2.0  # decay per radian of the other modes above which motion takes place on a surface
 SLOW = 0.02  # decay per radian of the leading mode above which simulating is as quick
@@ -60,7 +60,7 @@ class Shells:
         self.known = np.zeros(count, dtype=bool)
         self.inner = np.zeros(count)  # radius of the ball,
         self.band = np.tile([np.inf, -np.inf], (count, 1))  # and of both rims of the band
-        self.known = np.zeros(count, dtype=bool)  # True where `beyond` has been computed
+        self.fate_known = np.zeros(count, dtype=bool)  # True where `beyond` has been computed
         self.beyond = np.full(count, OPEN)  # what comes of that
 
     def outcomes(self, which: Array, states: Array) -> Array:
@@ -75,9 +75,9 @@ class Shells:
             away[flat & useful] = self._on_ray(which[flat & useful], states[flat & useful])
         found = np.where(away < self.inner[group], RETURNS, OPEN)
         inside = (away > self.band[group, 0]) & (away < self.band[group, 1])
-        for one in np.unique(group[inside & ~self.known[group]]):  # costly: only where a motion is
+        for one in np.unique(group[inside & ~self.fate_known[group]]):  # costly: only where a motion is
             fate = self._fate(one, self.band[one, 1])
-            self.known[one], self.beyond[one] = True, fate if fate in CERTAIN else OPEN
+            self.fate_known[one], self.beyond[one] = True, fate if fate in CERTAIN else OPEN
         return np.where(inside, self.beyond[group], found)
 
     def _ask(self, group: Array) -> None:

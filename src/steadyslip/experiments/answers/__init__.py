@@ -1,1 +1,1 @@
-"""What follows from a fit: how sure it is, which law, another machine, the next experiment."""
+"""Results derived from fits: uncertainty, comparison of laws, prediction for another rig, planned experiments."""

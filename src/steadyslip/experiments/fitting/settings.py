@@ -95,13 +95,13 @@ class PopulationSettings(Settings):
     draws: int = setting(Whole("draws from the posterior", *DRAWS), default=4000)
 
     def depends_on(self) -> str | dict[str, tuple[float, ...]] | None:
-        """As `steadyslip.population` takes them."""
+        """Conditions in the form of the argument of `steadyslip.population`."""
         if self.condition is None or self.values is None:
             return self.condition
         return {self.condition: self.values}
 
     def faults(self) -> tuple[Problem, ...]:
-        """What does not go together."""
+        """Problems with combinations of settings."""
         if self.condition is None and self.values is not None:
             return (Problem("population.condition", "missing; say what the values are, such as 'temperature'"),)
         if self.condition == STRESS and self.values is not None:
@@ -113,7 +113,7 @@ class PopulationSettings(Settings):
 
 
 def faults(options: Mapping[str, Any]) -> tuple[Problem, ...]:
-    """What is wrong with options of a fit."""
+    """Problems with the options of a fit."""
     try:
         FitSettings(**options)
     except ParameterError as error:

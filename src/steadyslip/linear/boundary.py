@@ -1,4 +1,4 @@
-"""Where stability changes as any one parameter varies, and how far each parameter is from that."""
+"""`boundary` and `margins`: edges of stability in one parameter, and the distance of each parameter to its nearest."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from steadyslip.model.range import require_range
 
 @dataclass(frozen=True)
 class Margin(Displayed):
-    """How far one parameter is from the nearest edge of stability.
+    """Distance of one parameter from its nearest edge of stability, and all its edges.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ def boundary(
 
 
 def _kept(rig: Rig, name: str) -> tuple[str, ...]:
-    """The terms that are kept while one of them is varied."""
+    """Names of zero parameters whose terms stay in the equations while the parameter `name` is varied."""
     return (name,) if isinstance(rig, Machine) and not rig.value(name) else present_zeros(rig)
 
 
@@ -120,7 +120,7 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
 
 
 def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Margin, ...]:
-    """Margins without some of their edges, the most critical first."""
+    """Margins without the edges in `lost`, the most critical first."""
     if not lost:
         return tuple(found)
     kept = [(one, tuple(edge for edge in one.edges if edge not in lost)) for one in found]
@@ -129,7 +129,7 @@ def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Ma
 
 
 def _margin(name: str, unit: str, value: float, edges: tuple[Boundary, ...], searched: tuple[float, float]) -> Margin:
-    """The margin of a parameter with these edges."""
+    """Margin of a parameter, from its value and its edges."""
     edge = min(edges, key=lambda one: abs(one.value - value), default=None)
     gap = edge.value - value if edge else float("nan")
     return Margin(name, unit, value, edge, edges, gap, gap / abs(value) if value else float("nan"), searched)
@@ -148,9 +148,9 @@ def _urgency(margin: Margin) -> float:
 
 
 def present_zeros(rig: Rig) -> tuple[str, ...]:
-    """Terms that are zero and worth keeping in the equations, because they may be varied from there.
+    """Names of a slider's parameters that are zero but stay in the equations, so that they can be varied from zero.
 
-    Of a machine none is: what bodies without mass or damping add to the degree of its polynomial would hide others.
+    Empty for a machine: masses and dampings kept so would raise the degree of its polynomial and hide other edges.
     """
     if isinstance(rig, Machine):
         return ()

@@ -1,4 +1,4 @@
-"""Polynomials beside the imaginary axis: the Routh array, and where p + k q has a root iβ (theory 3).
+"""Routh array of polynomials, and the k at which p + k q has a root iβ on the imaginary axis (theory 3).
 
 Plain arithmetic: a polynomial is a list of coefficients, lowest power first, that are numbers, arrays or nodes of a
 program. Arrays of rigs (`polynomials`) and pages (`steadyslip.explorer`) are judged by these lines.
@@ -33,7 +33,7 @@ def routh(c: Polynomial) -> list[Any]:
 
 
 def is_ill_posed(c: Polynomial) -> Any:
-    """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0."""
+    """True where a polynomial is ill-posed: highest coefficient < 0, or 0 with the second highest <= 0."""
     highest, second = c[-1], c[-2]
     return (highest < 0) | ((highest <= 0) & (second <= 0))
 
@@ -73,13 +73,13 @@ def axis_polynomial(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> 
 
 
 def stiffness_on_axis(p: Polynomial, q: Polynomial, square: Any) -> Any:
-    """That k, given β²."""
+    """Real k that puts a root of p + k q at iβ, given β² = `square`."""
     e1, o1, e2, o2 = (_at(part, square) for part in (*even_odd(p), *even_odd(q)))
     return -(e1 * e2 + square * o1 * o2) / (e2 * e2 + square * o2 * o2)
 
 
 def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple[Any, Any]:
-    """The k at which a root is zero, and that at which the highest coefficient vanishes, where one is infinite."""
+    """k at which a root of p + k q is zero, and k at which the highest coefficient vanishes (a root is infinite)."""
     none = (abs(p[-1]) <= 0) & (abs(q[-1]) <= 0)
     return -p[0] / q[0], choose(none, -p[-2] / q[-2], -p[-1] / q[-1])
 
@@ -87,7 +87,7 @@ def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple
 def linear_split(
     low: Polynomial, own: Polynomial, high: Polynomial, choose: Choose = np.where
 ) -> tuple[list[Any], list[Any], Any]:
-    """p and q of a polynomial p + f q, from it at f = 1/`APART`, 1 and `APART`; and whether it is one."""
+    """p and q of p + f q, from its values at f = 1/`APART`, 1 and `APART`; and True where these are linear in f."""
     p: list[Any] = []
     q: list[Any] = []
     straight: Any = True
@@ -107,7 +107,7 @@ def linear_split(
 
 
 def is_hurwitz(c: Polynomial, choose: Choose) -> Any:
-    """Whether the highest coefficient is positive and all roots are on the left; of full degree, or of one less.
+    """True if all roots lie left of the axis and the highest coefficient (or, if 0, the second) is positive.
 
     For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
     """
@@ -142,7 +142,7 @@ def _all_positive(values: Polynomial) -> Any:
 
 
 def share_left(terms: Sequence[Any], choose: Choose = np.where) -> Any:
-    """What is left of a sum, as a share of its terms; zero where there are none."""
+    """Size of the sum of terms over the sum of their sizes; zero without terms."""
     total, sizes = 0.0, 0.0
     for term in terms:
         total, sizes = total + term, sizes + abs(term)

@@ -1,4 +1,4 @@
-"""How the linearised rig answers an input that swings: the transfer function over periods, and where it is largest."""
+"""Transfer functions of the linearised rig at given periods, and its resonances."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
-PLACES = 200  # periods, evenly spaced in their logarithm, at which a largest gain is looked for besides the modes' own
-PROMINENCE = 0.01  # of the gain's logarithm above the dips beside it: less is no resonance to speak of
-BESIDE = np.linspace(-8, 8, 33)  # widths of a mode's peak from its own period, tried besides those
-SHARPNESS = 1e-5  # of what is tried beside a resonance, to which its period is found
+# Chosen by trial: computing time against missed resonances.
+PLACES = 200  # periods, evenly spaced in their logarithm, at which the gain is computed
+PROMINENCE = 0.01  # least rise of ln(gain) above the dips on both sides of a resonance
+BESIDE = np.linspace(-8, 8, 33)  # further periods: distances from that of each mode, in widths of its peak
+SHARPNESS = 1e-5  # tolerance of a resonance's period, relative to the spacing of the periods beside it
 
 
 def transfer(rig: Slider | Machine, input: str, output: str, periods: Array) -> Array:
@@ -29,9 +30,9 @@ def _answer(blocks: tuple[Array, Array, Array, Array], periods: Array) -> Array:
 
 
 def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, longest: float) -> Array:
-    """Largest answers within a range of periods (s): period, gain, phase (degrees), largest gain first; (r, 3).
+    """Resonances in a range of periods (s): period, gain, phase (degrees), largest gain first; (r, 3).
 
-    Looked for near the period of every mode, however little damped, and on a fine grid.
+    They are searched on a fine grid and near the period of every mode, however little damped.
     """
     from scipy.optimize import minimize_scalar  # slow to import
     from scipy.signal import find_peaks

@@ -1,4 +1,4 @@
-"""The scan of one parameter for edges of stability.
+"""Scan of one parameter for edges of stability.
 
 The parameter is sampled over its range; where the status (stable, unstable, no steady sliding) of two samples
 differs, the change is bracketed and narrowed to rounding. Dips of the damping between samples are followed,
@@ -44,17 +44,18 @@ from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import explain_absence
 
-_ROUNDING = 64  # units of the last place within which two conditions are one, at first;
-_WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
-_FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a level stretch, which hides no zero
-_DIPS = 16  # lowest of a scan that are looked into: contacts that are alike have roots that jitter at every sample
-_ROUNDS = 8  # of narrowing, each of which finds one edge more in a cell that has several
-_CHANGES = 64  # of samples next to each other, of more only those of the status: conditions that rounding decides
-_MORE = 8  # changes beside others that one round of narrowing may bring to light
-_BESIDE = 4  # the status is what is left when kinds are divided by this
+_ROUNDING = 64  # units in the last place within which two edges are one, in the first attempt
+_WIDER = 6  # attempts, each 8 times wider: up to about 1e-10 of the value, still the same edge for a verdict
+_BESIDE = 4  # a kind is the status plus multiples of this; kind % _BESIDE is the status
+# Limits of the scan, chosen by trial: computing time against edges missed where several lie close together.
+_FLAT = 1e-6  # relative depth of a dip of a measure below which it is rounding on a level stretch
+_DIPS = 16  # deepest dips that are examined: similar contacts have eigenvalues that jitter at every sample
+_ROUNDS = 8  # rounds of narrowing; each finds one more edge between two samples that have several between them
+_CHANGES = 64  # changes of kind above which only changes of the status are narrowed: rounding makes the others
+_MORE = 8  # changes that a round may find beyond those of the round before
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
-_FEW = 8  # growing roots of rigs with delay, of which a dip between two samples may be a window; of more none is
-_SCARCE = 6  # times fewer samples where roots have to be counted one rig after the other: with several delays
+_FEW = 8  # largest number of growing roots (with delay) at which a dip between two samples is examined
+_SCARCE = 6  # factor by which samples are fewer with several delays: their roots are counted rig by rig
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,9 @@ class Boundary(Displayed):
         On which side steady sliding is stable: ``above``, ``below`` or ``neither``.
     unit : str
     area : float or None
-        Of the rig, m²: people are told totals then.
+        Contact area of the rig, m²; where there is one, values are printed as totals.
     contact : str
-        Of a machine: the contact that locks up or lifts off beyond.
+        Contact of a machine that locks up or lifts off beyond the edge; empty otherwise.
     """
 
     parameter: str
@@ -108,7 +109,7 @@ Sample = tuple[float, int]
 
 
 class Search:
-    """Scanning one parameter of one rig."""
+    """Scan of one parameter of one rig for edges of stability; `boundaries` is the result."""
 
     def __init__(self, rig: Rig, name: str, present: Iterable[str], branch: int) -> None:
         self.rig, self.name, self.present, self.branch = rig, name, tuple(present), branch
@@ -124,7 +125,7 @@ class Search:
 
     @cached_property
     def searched(self) -> tuple[float, float]:
-        """The range that is searched unless another is asked for: from the first to the last that can be built."""
+        """Default range: from the first to the last sample at which a rig can be built."""
         grid, point = self._usual
         built = grid[np.broadcast_to(point.valid, grid.shape)]
         return float(built[0]), float(built[-1])
@@ -135,7 +136,7 @@ class Search:
         return grid, self.values(grid)
 
     def _grid(self, between: tuple[float, float] | None) -> Array:
-        """Samples, rising; the rig's own value is one of them."""
+        """Sample values, rising, the rig's own value among them."""
         domain = self.role.domain
         if np.isfinite(domain.high):
             found = samples.bounded(domain, self.share)
@@ -146,18 +147,18 @@ class Search:
 
     @cached_property
     def _sizes(self) -> tuple[float, float]:
-        """The rig's own and the natural one."""
+        """Size of the rig's own value (of the natural one where that is 0), and natural size."""
         natural = self.natural_size()
         return abs(self.value) or natural, natural
 
     def _reach(self, between: tuple[float, float] | None) -> tuple[float, float]:
-        """Least and largest size to look at: around the rig's own and the natural one, and what is asked for."""
+        """Least and largest size of samples: decades around own and natural size, and the requested range."""
         far, sizes = 10.0**samples.DECADES, self._sizes
         asked = [abs(end) for end in between or () if end]
         return min([min(sizes) / far, *asked]), max([max(sizes) * far, *asked])
 
     def natural_size(self) -> float:
-        """A size of the parameter that does not follow from its value: from σss, v0 and the slip distance v0/r."""
+        """Typical size of the parameter by dimensional analysis, from σss, v0 and the slip distance v0/r."""
         point = self.own
         sigma, v0 = np.exp(np.mean(np.log([float(one) for one in point.sigmas]))), point.drive
         length = v0 / (_decay_rate(point) or 1.0)
@@ -169,24 +170,23 @@ class Search:
         size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
         return float(size) if np.isfinite(size) and size > 0 else abs(self.value) or 1.0
 
-    # -- what sliding is along the parameter
+    # -- status of sliding along the parameter
 
     def status(self, x: Array) -> NDArray[np.int64]:
-        """The status at values (n,)."""
+        """Status (stable, unstable, ...) at values (n,)."""
         return status(self.values(x))
 
     def kinds(self, x: Array) -> NDArray[np.int64]:
-        """The status at values (n,), and what else may end a strip of it: 4 where the static stiffness is positive, 8
-        where the equations are ill-posed are added."""
+        """Status at values (n,), plus 4 where the static stiffness is positive, plus 8 where it is ill-posed."""
         point = self.values(x)
         return _kinds(point, status(point))
 
     def measures(self, x: Array) -> Array:
-        """Two functions that pass through zero at an edge: damping of pairs, and of single eigenvalues."""
+        """Two measures (2, n) that change sign at an edge: damping of pairs, and of single eigenvalues."""
         return nearness(self.values(np.asarray(x, dtype=float)))
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
-        """Edges in a range, or in the usual one: those of the whole search that are in it."""
+        """Edges in a range, by default in `searched`, rising."""
         with np.errstate(all="ignore"):
             low, high = self.searched if between is None else between
             exact = self._exact(between)
@@ -195,7 +195,7 @@ class Search:
             return tuple(one for one in self._found(between) if low <= one.value <= high)
 
     def _found(self, between: tuple[float, float] | None) -> list[Boundary]:
-        """All edges, rising.
+        """All edges that the scan finds, rising.
 
         Where two samples next to each other differ, the lowest change between them is narrowed. Others may hide beside
         it, so that samples are added ever closer to it from both sides, until whatever differs has been narrowed.
@@ -233,7 +233,7 @@ class Search:
         return grid, self.values(grid)
 
     def _judged(self, grid: Array, point: OperatingPoint) -> tuple[Array, NDArray[np.int64]]:
-        """Samples, those of hidden windows among them, and their kinds; without those that rounding decides."""
+        """Samples with those at hidden windows added, and their kinds; without samples whose status is rounding."""
         valid = np.broadcast_to(point.valid, grid.shape)
         outside = grid[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
         here, point = (grid, point) if np.all(valid) else (grid[valid], self.values(grid[valid]))
@@ -245,7 +245,7 @@ class Search:
         return _merged(found, outside, self._certain(self._hidden_windows(here, own, point)))
 
     def _certain(self, x: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Samples and their kinds; without those that rounding decides, or whose roots cannot be counted."""
+        """Samples and their kinds; without samples whose status is rounding or whose roots cannot be counted."""
         x = np.unique(x)
         if not x.size:
             return x, np.empty(0, dtype=np.int64)
@@ -285,7 +285,7 @@ class Search:
         return np.concatenate(extra)
 
     def _descended(self, which: int, sign: Array, low: Array, high: Array) -> list[Array]:
-        """Lowest points of a measure (times its sign) inside brackets, ever more closely."""
+        """Lowest points of a measure (times its sign) inside brackets, one array per step of refinement."""
         found = []
         row = np.arange(len(low))
         for _ in range(4):
@@ -299,7 +299,7 @@ class Search:
     def _narrowed(
         self, low: Array, high: Array, low_kind: NDArray[np.int64], high_kind: NDArray[np.int64]
     ) -> tuple[Array, Array]:
-        """Brackets down to rounding, all at once; keeps the lowest change in each, of the status if that differs."""
+        """Brackets narrowed to rounding around the lowest change of status, or of kind where the status is equal."""
         low, high = low.copy(), high.copy()
         judged = (low_kind - high_kind) % _BESIDE != 0
         for rows, asked in ((np.flatnonzero(judged), self.status), (np.flatnonzero(~judged), self.kinds)):
@@ -316,7 +316,7 @@ class Search:
         return low, high
 
     def _described(self, low: float, high: float, below: Sample, above: Sample) -> Boundary:
-        """The edge in a bracket, between two samples of which rounding does not decide."""
+        """Edge in a bracket between two samples whose status is certain."""
         low, high = self._past_rounding(low, high)
         absent = next((value for value, kind in (below, above) if kind == ABSENT), None)
         lost = None if absent is None else self._why_none(absent)
@@ -330,9 +330,9 @@ class Search:
         )  # fmt: skip
 
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
-        """A wider bracket where steady sliding ends within rounding of the edge.
+        """Bracket of an edge, widened where steady sliding ends within rounding of it.
 
-        The static stiffness vanishes there too, so that rounding alone decides which of the two is met first.
+        The static stiffness vanishes there too, so that rounding alone decides which of the two comes first.
         """
         unit = max(np.spacing(abs(low)), np.spacing(abs(high)))
         reach = _ROUNDING * unit * 8.0 ** np.arange(_WIDER)  # friction hardly changes with the velocity, say
@@ -357,7 +357,7 @@ class Search:
         return ("oscillatory" if frequency else "divergence"), frequency
 
     def _exact(self, between: tuple[float, float] | None) -> StableSet | None:
-        """The stable set of the stiffness of a slider, and of whatever enters linearly in a machine."""
+        """Exact stable set of a slider's stiffness or of a linear parameter of a machine; None for others."""
         point = self.own
         late = bool(point.model.delays)
         if self.name == STIFFNESS:
@@ -369,7 +369,7 @@ class Search:
         return linear_set(point, self.name, None if self.value else self._sizes[0], self._reach(between))
 
     def _of_set(self, edges: StableSet, low: float, high: float) -> tuple[Boundary, ...]:
-        """The exact edges of the stable set."""
+        """Edges of an exact stable set from `low` to `high`."""
         keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
         return tuple(
             self._exact_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
@@ -384,26 +384,26 @@ class Search:
 
 
 def _kinds(point: OperatingPoint, status: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The status of samples, and beside it which conditions hold; none beside what is no sliding."""
+    """Status of samples plus multiples of `_BESIDE` for positive static stiffness and for ill-posed equations."""
     more = _BESIDE * ((static_sum(point) > 0) & ~is_neutral(point)) + 2 * _BESIDE * is_ill_posed(point)
     return np.asarray(status + np.where((status == STABLE) | (status == UNSTABLE), more, 0))
 
 
 def _merged(*parts: tuple[Array, NDArray[np.int64]]) -> tuple[Array, NDArray[np.int64]]:
-    """Samples and their kinds, rising."""
+    """Samples and their kinds, joined and sorted; one of each value."""
     x, at = np.unique(np.concatenate([x for x, _ in parts]), return_index=True)
     return x, np.concatenate([kind for _, kind in parts])[at]
 
 
 def _within(places: Array, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Whether any of some places is in each of some brackets."""
+    """True for each bracket (low, high) that contains at least one of `places`."""
     rising = np.sort(places)
     return np.asarray(np.searchsorted(rising, low) < np.searchsorted(rising, high))
 
 
 @question
 def _decay_function(model: Model) -> ArrayFunction:
-    """Decay rates of the memory (1/s) that are numbers in steady sliding, with their signs."""
+    """Function that gives the signed decay rates (1/s) of memory that depend on the rig's numbers alone."""
     linear = linearise(model)
     own = [linear.rows[item.symbol][item.symbol] for item in model.memory]
     known = {*model.arguments}

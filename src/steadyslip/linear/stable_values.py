@@ -1,4 +1,4 @@
-"""The exact stable set of any parameter that enters the characteristic polynomial linearly: p(s) + θ q(s) (theory 11).
+"""Exact stable sets of parameters θ that enter the characteristic polynomial linearly, p(s) + θ q(s) (theory 11).
 
 Stiffnesses, dampings, masses and gains do, and much of friction as well. Whether a parameter does is read off the
 polynomial itself, at three values that are decades apart.
@@ -107,7 +107,7 @@ def safety_factor(rig: Slider | Machine, vary: Vary | None = None, *, along: str
 
 
 def name_along(rig: Slider | Machine, along: str | None) -> str:
-    """The full name of a parameter whose edge is asked for; the stiffness of a slider unless one is given.
+    """Dotted name of the parameter `along`; by default the stiffness of a slider.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def name_along(rig: Slider | Machine, along: str | None) -> str:
 
 
 def is_own_stiffness(rig: Slider | Machine, name: str) -> TypeGuard[Slider]:
-    """Whether a parameter is the stiffness of a slider, for which there are closed forms."""
+    """True if the parameter is a slider's stiffness, for which there are closed forms."""
     return isinstance(rig, Slider) and name == STIFFNESS
 
 
@@ -133,7 +133,7 @@ def _require_positive(rig: Slider | Machine, name: str) -> None:
 
 
 def edge_along(rig: Slider | Machine, name: str, vary: Vary | None) -> tuple[Array, Array]:
-    """The end of a stable interval of a parameter nearest to its own value, and that value; SI units, (...).
+    """Nearest edge of a parameter's stable intervals, and the parameter's own value; SI units, (...) each.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def intervals_along(rig: Slider | Machine, name: str, vary: Vary | None) -> Arra
 
 
 def stable_intervals(point: OperatingPoint, name: str) -> Array:
-    """Stable intervals of one parameter for arrays of rigs, whatever value of it these have, (..., m, 2), NaN padded.
+    """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), NaN padded.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def stable_intervals(point: OperatingPoint, name: str) -> Array:
 
 
 def nearest_value(intervals: Array, own: ArrayLike) -> Array:
-    """The end of a stable interval nearest to a rig's own value, (...); NaN where there is none above zero."""
+    """Positive finite end of a stable interval nearest to a rig's own value, (...); NaN without one."""
     ends = intervals.reshape(*intervals.shape[:-2], -1)
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)
     distance = np.where(np.isnan(ends), np.inf, np.abs(ends - np.asarray(own, dtype=float)[..., None]))

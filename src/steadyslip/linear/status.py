@@ -1,4 +1,4 @@
-"""The verdict on arrays of rigs as one small number each, for scans and charts."""
+"""Status of arrays of rigs (no steady sliding, stable, unstable, unknown) as integers, for scans and charts."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from steadyslip.model.linearisation import characteristic_terms, is_written_out
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range
 
-ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms, that rounding alone can make
-LAST_DIGITS = 24  # trials of other last digits
+ON_THE_EDGE = 1e-9  # damping ratio, and static stiffness relative to its terms, below which a rig is on the edge
+LAST_DIGITS = 24  # copies of a rig with perturbed last digits; by trial: computing time against a missed change
 ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
 WORDS = ("no steady sliding", "stable", "unstable", "out of range")
-"""What they are called; out of the range of floating point."""
+"""Names of the status values; "out of range" means the range of floating point."""
 EVERY, NONE = "stable at every stiffness", "stable at no stiffness"
 
 
 @checked()
 def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
-    """Whether steady sliding is stable, in words, for one rig or many.
+    """Stability of steady sliding as text, for one rig or many.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
 
 def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
-    """Why rigs have no critical stiffness, in words; the empty text where they have one."""
+    """Text (...) that explains why a rig has no critical stiffness; empty where it has one."""
     found = status(point)
     with np.errstate(all="ignore"):
         low, high = interval_ends(point)
@@ -68,7 +68,7 @@ def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
 
 
 def status(point: OperatingPoint) -> NDArray[np.int64]:
-    """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed too) or UNKNOWN (out of floating point, or no rig)."""
+    """Status of rigs (...): ABSENT (no steady sliding), STABLE, UNSTABLE (also ill-posed), UNKNOWN (out of range)."""
     with np.errstate(all="ignore"):
         verdict = np.where(is_stable(point), STABLE, UNSTABLE)
         found = np.where(point.exists, verdict, ABSENT)
@@ -76,10 +76,10 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
 
 
 def decided_by_rounding(point: OperatingPoint) -> bool:
-    """Whether the verdict on a single rig changes as its numbers do in their last digits.
+    """True if changes in the last digits of a single rig's numbers change its status.
 
-    So it does at an edge, and where terms of the equations cancel that are many orders of magnitude larger than what
-    is left of them; not where a disturbance grows beside one that an edge leaves as it is.
+    They do at an edge, and where terms cancel that are many orders of magnitude larger than their sum; not where
+    another disturbance grows anyway.
     """
     chance = np.random.default_rng(0)
     arguments = [
@@ -93,7 +93,7 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
 
 @question
 def _static_terms(model: Model) -> ArrayFunction:
-    """What adds up to the static stiffness of a machine, a0; nothing where that is not written out."""
+    """Function that gives the terms of a machine's static stiffness a0; none where a0 is not written out in symbols."""
     if not is_written_out(model):
         return model.function([])
     parts = (sp.Add.make_args(term.coefficients[0]) for term in characteristic_terms(model))
@@ -102,7 +102,7 @@ def _static_terms(model: Model) -> ArrayFunction:
 
 @question
 def is_neutral(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Where the static stiffness is zero to within rounding, to 9 digits."""
+    """True where the static stiffness is zero to 9 digits, relative to its terms."""
     if has_closed_form(point.model):
         part = response_numbers(point)
         terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]
@@ -116,10 +116,10 @@ def is_neutral(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits.
+    """True where a rig is on an edge to 9 digits: an oscillation is undamped, or the static stiffness is zero.
 
-    Without any stiffness nothing restores the place of the block: that is static stiffness zero, too. Where another
-    disturbance grows, sliding is unstable, and no edge decides.
+    A block without any stiffness has static stiffness zero, too. Where another disturbance grows, sliding is unstable
+    and the rig is not on an edge.
     """
     with np.errstate(all="ignore"):
         undamped = is_near_edge(point, ON_THE_EDGE)

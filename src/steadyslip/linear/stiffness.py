@@ -38,8 +38,8 @@ from steadyslip.model.steady import steady_equation
 
 STIFFNESS = "slider.stiffness"
 ONE_STIFFNESS = slider("of a machine's stiffnesses safety_factor and stable_values tell, each by its name")
-_CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
-_LEAST = 1e-290  # size beneath which a product of numbers is looked at by the general route
+_CHUNK = 32768  # rigs at a time, 256 KiB per array of doubles, so that intermediate arrays stay in the cache
+_LEAST = 1e-290  # products smaller than this (or larger than its inverse) go through the general route; doubles: 1e-308
 
 
 @checked(rig=ONE_STIFFNESS)
@@ -75,7 +75,7 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
 
 
 def own_safety_factor(point: OperatingPoint) -> Array:
-    """Stiffness of sliders over the critical one, a controller's gain kp counted with both, (...)."""
+    """Safety factor (k + kp)/(k_cr + kp) of sliders, with the gain kp of a controller, (...)."""
 
     def kernel(part: OperatingPoint) -> Array:
         with np.errstate(all="ignore"):
@@ -143,7 +143,7 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
 
 def _warn_of_delays(count: int, size: int) -> None:
-    """Say to the caller how many rigs have no rightmost eigenvalue."""
+    """Issue an `IllPosedWarning` that `count` of `size` rigs have no rightmost eigenvalue."""
     if count:
         which = f"{count} of {size} rigs have" if size > 1 else "this rig has"
         message = (
@@ -182,7 +182,7 @@ def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def general_set(point: OperatingPoint) -> StableSet:
-    """The stable set by the Model's characteristic equation, for any number of states; with a delay only intervals."""
+    """Stable set in stiffness from the characteristic equation of any Model; with a delay intervals only, no edges."""
     if point.model.delays:
         nothing = np.empty(0)
         return StableSet(sets_of(point, STIFFNESS, _size(point)), nothing, nothing, nothing.astype(bool))
@@ -190,7 +190,7 @@ def general_set(point: OperatingPoint) -> StableSet:
 
 
 def _size(point: OperatingPoint) -> Array:
-    """A stiffness around which to look for others: that of the spring, else what a controller adds, else one."""
+    """Stiffness (Pa/m) around which to search, (...): that of the spring, else a controller's gain, else 1."""
     own = np.broadcast_to(np.asarray(point.named()[STIFFNESS], dtype=float), point.shape)
     gain = np.broadcast_to(np.asarray(point.gain, dtype=float), point.shape)
     return np.where(own > 0, own, np.where(gain > 0, gain, 1.0))
@@ -206,7 +206,7 @@ def _split_function(model: Model) -> ArrayFunction:
 
 
 def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
-    """Ends of the one stable interval of a rig with one memory variable (cubic in closed form)."""
+    """Lower and upper end (Pa/m) of the one stable interval of stiffness, in closed form, for one memory variable."""
     exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
     low, high = cubic.without_gain(low, high, gain)
@@ -218,16 +218,16 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def _lost(product: Array) -> NDArray[np.bool_]:
-    """Whether a product of numbers may have left the range of floating point, or lost digits at its lower end."""
+    """True where a product is so large or small that it may have overflowed or lost digits."""
     size = np.abs(product)
     return np.asarray(~((size > _LEAST) & (size < 1 / _LEAST)))
 
 
 @question
 def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
-    """N, D, μB2, μB3, a2, a3 and the gain of a controller: what `cubic.stable_interval` takes, and what is behind it.
+    """Expressions N, D, μB2, μB3, a2, a3 (arguments of `cubic.stable_interval`) and the gain of a controller.
 
-    In the model's parameters and σss; the interval is one of the total stiffness, the gain included.
+    They are in the model's parameters and σss. The interval is one of the total stiffness, gain included.
     """
     part = response(model)
     known = part.as_dict()
@@ -243,7 +243,7 @@ def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
 
 @question
 def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
-    """Everything that `closed_form_interval` needs, compiled into one function."""
+    """Function of a point that gives where steady sliding exists, then the numbers of `interval_ingredients`."""
     wanted = interval_ingredients(model)
     equation = steady_equation(model)
     arguments = list(model.parameters.values())
@@ -267,7 +267,7 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
 
 
 def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
-    """N and D of D k > N, divided by a2 where that divides both: stability needs a2 > 0 anyway."""
+    """N and D of the condition D k > N, both divided by a2 > 0 where that leaves polynomials."""
     names = {key: sp.Integer(0) if value == 0 else inner_symbol(key) for key, value in known.items()}
     numerator, denominator = cubic.hopf_line(**names)
     a2 = cubic.coefficients(**names, k=sp.Integer(0))[2]
@@ -279,7 +279,7 @@ def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
 
 
 def set_of_one(point: OperatingPoint) -> StableSet:
-    """The stable set of a single rig with its edges: closed form where there is one, else the general route.
+    """Stable set in stiffness of a single rig, with edges: in closed form where there is one.
 
     The closed form keeps its digits where a large mass swamps the direct effect in the polynomial.
     """
@@ -318,12 +318,12 @@ def interval_ends(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def _nearest_edge(point: OperatingPoint) -> Array:
-    """The finite positive end of a stable interval nearest to the rig's own stiffness."""
+    """Finite positive end of a stable interval (Pa/m) nearest to the rig's own stiffness, (...); NaN without one."""
     own = point.named()["slider.stiffness"]
     low, high = interval_ends(point)
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
-        if not np.any(high < np.inf):  # the common case, worth its own line for arrays of rigs
+        if not np.any(high < np.inf):  # shortcut for the common case, for speed
             return np.asarray(cubic.unless(cubic.positive(low), low))
         is_low = (low > 0) & ~((high < np.inf) & (np.abs(high - own) < np.abs(low - own)))
         return np.where(is_low, low, np.where(high < np.inf, high, np.nan))
@@ -336,7 +336,7 @@ def _nearest_edge(point: OperatingPoint) -> Array:
 
 @quietly
 def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], NDArray[Any]]) -> NDArray[Any]:
-    """Apply a kernel to the varied rigs some thousand at a time; NaN for those that leave the range of floating point.
+    """Results of `kernel` for all rigs, computed `_CHUNK` at a time; NaN where numbers overflow or underflow.
 
     Raises
     ------
@@ -359,7 +359,7 @@ def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], NDArray[
         whole[done : done + part.size] = np.broadcast_to(result, (*part.shape, *extra)).reshape(-1, *extra)
         done += part.size
     if whole is None:
-        raise InternalError("at least one piece")
+        raise InternalError("this array of rigs is empty, which operating points exclude; please report it")
     if beyond:
         warn_of_range(beyond, point.size)
     return whole.reshape(point.shape + whole.shape[1:])

@@ -27,7 +27,15 @@ from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
 from steadyslip.nonlinear.kicks.places import steady_speeds
 from steadyslip.nonlinear.kicks.rest import Rest
 from steadyslip.nonlinear.kicks.settled import rest_of
-from steadyslip.nonlinear.kicks.spans import BLOW_UP, CONTACT_LOST, INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
+from steadyslip.nonlinear.kicks.spans import (
+    BLOW_UP,
+    CONTACT_LOST,
+    INTERRUPTED,
+    OUTCOMES,
+    MotionBatch,
+    StepBudget,
+    doubt_of,
+)
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.follow import cycles
 
@@ -178,7 +186,7 @@ def basin(
     near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
     near.computed()
     one = (rest.part(every), near.part(every))
-    runs = Judged(replace(jobs, size=count), *one, np.zeros(count), every, budget=budget)
+    runs = MotionBatch(replace(jobs, size=count), *one, np.zeros(count), every, budget=budget)
     with progress_bar(count, progress, "starting points") as advanced:
         found = outcomes_of(runs, threads, advanced)
     contact = contacts_of(runs, np.flatnonzero(np.isin(found, (CONTACT_LOST, BLOW_UP))), threads)

@@ -17,7 +17,7 @@ import numpy as np
 
 from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.field import rates_at
-from steadyslip.nonlinear.kicks.spans import Judged, advanced_runs, constant_inputs
+from steadyslip.nonlinear.kicks.spans import MotionBatch, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
@@ -34,7 +34,7 @@ AWAY = 1e-3  # distance from steady sliding below which a closed orbit cannot be
 DONE = STATUSES.index("done")
 
 
-def on_long_cycle(runs: Judged, one: int, state: Array, unknowns: Array) -> bool:
+def on_long_cycle(runs: MotionBatch, one: int, state: Array, unknowns: Array) -> bool:
     """True if one run, now at `state` (n,), is on an attracting cycle of several slip events or turns.
 
     `unknowns` (u,) are those of the balances there, NaN where they are not known.
@@ -58,7 +58,7 @@ class _Turn:
 
 
 def attracted(
-    runs: Judged, which: Array, states: Array, unknowns: Array, period: Array, threads: int | None = None
+    runs: MotionBatch, which: Array, states: Array, unknowns: Array, period: Array, threads: int | None = None
 ) -> tuple[Array, Array]:
     """True (k,) for runs `which`, now at `states` (k, n), on an attracting closed orbit of about `period` (k,) s.
 
@@ -117,7 +117,7 @@ def attracted(
 
 
 def _turned(
-    runs: Judged, which: Array, states: Array, unknowns: Array, scale: Array, period: Array, threads: int | None
+    runs: MotionBatch, which: Array, states: Array, unknowns: Array, scale: Array, period: Array, threads: int | None
 ) -> _Turn:
     """Integrate one period from k states; its derivative by central differences."""
     count, n = states.shape

@@ -26,7 +26,7 @@ from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
 from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, steady_speeds
 from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
-from steadyslip.nonlinear.kicks.spans import STIFF, Judged, StepBudget, continuous_at
+from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
 
 Array = np.ndarray
 PATIENCE = 5.0  # factor of time, against that in a scan, for which single motions are followed
@@ -238,7 +238,7 @@ class Kicked:
         rest = self.rest_after(which, sizes)
         return np.asarray(rest.exists & (rest.stable | rest.neutral))
 
-    def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> Judged:
+    def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> MotionBatch:
         """Motions of rigs `which` (n,) after kicks of `sizes` (n,)."""
         jobs, amount = self._jobs(which), self.amount(sizes, which)
         if self.moves_rest:
@@ -257,13 +257,13 @@ class Kicked:
             jobs = self._started(jobs, {f"{self.at}.x": amount})
         jumps = self.kick.name == "displacement" and self.of_drive
         jump = amount if jumps else np.zeros(len(which))
-        return Judged(jobs, rest, near, jump, group, effort, self.budget)
+        return MotionBatch(jobs, rest, near, jump, group, effort, self.budget)
 
     def outcomes(
         self, which: Array, sizes: Array, threads: int | None = None,
         advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
     ) -> Array:  # fmt: skip
-        """Outcomes of kicks as indices into `OUTCOMES`, (n,); see `Judged` for `effort`."""
+        """Outcomes of kicks as indices into `OUTCOMES`, (n,); see `MotionBatch` for `effort`."""
         return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
 
     def contacts(self, which: Array, sizes: Array, threads: int | None = None) -> Array:

@@ -35,8 +35,8 @@ from steadyslip.nonlinear.kicks.spans import (
     STIFF,
     STUCK,
     UNSEEN,
-    Judged,
-    Spans,
+    MotionBatch,
+    SpanResults,
     advanced_runs,
 )
 
@@ -54,8 +54,9 @@ CODE = {word: number for number, word in enumerate(STATUSES)}
 
 
 def outcomes_of(
-    runs: Judged, threads: int | None = None, advanced: Callable[[int], None] | None = None, start: Array | None = None
-) -> Array:
+    runs: MotionBatch, threads: int | None = None, advanced: Callable[[int], None] | None = None,
+    start: Array | None = None,
+) -> Array:  # fmt: skip
     """Simulate motions and return outcomes, indices into `OUTCOMES` (m,); from states `start` (m, n) if given.
 
     `advanced` is called now and then with the number of further motions decided.
@@ -63,7 +64,7 @@ def outcomes_of(
     return _Course(runs, threads, start).run(advanced)
 
 
-def contacts_of(runs: Judged, which: Array, threads: int | None = None) -> Array:
+def contacts_of(runs: MotionBatch, which: Array, threads: int | None = None) -> Array:
     """Name of the contact at which each motion loses contact or blows up, (m,); empty for other outcomes.
 
     They are run once more, to where they end.
@@ -103,7 +104,7 @@ class _Course:
         Highest velocity so far, m/s.
     """
 
-    def __init__(self, runs: Judged, threads: int | None, start: Array | None) -> None:
+    def __init__(self, runs: MotionBatch, threads: int | None, start: Array | None) -> None:
         self.runs, self.threads = runs, threads
         count = len(runs.rest.velocity)
         self.span, self.allowed = runs.times()
@@ -139,10 +140,10 @@ class _Course:
             self.span[open_] = np.minimum(2 * self.span[open_], rest)
         return self.found
 
-    def _advanced(self, open_: Array) -> Spans:
+    def _advanced(self, open_: Array) -> SpanResults:
         """Simulate one span of some motions, grouped by method and by first span or later."""
         fresh = ~self.begun[open_]
-        found = Spans.empty(len(open_), self.state.shape[1], self.runs.rest.unknowns.shape[1])
+        found = SpanResults.empty(len(open_), self.state.shape[1], self.runs.rest.unknowns.shape[1])
         for stiff, anew in ((False, True), (False, False), (True, True), (True, False)):
             here = np.flatnonzero((self.stiff[open_] == stiff) & (fresh == anew))
             if not len(here) or not found.whole:
@@ -155,7 +156,7 @@ class _Course:
             ))  # fmt: skip
         return found
 
-    def _retried(self, open_: Array, ended: Spans) -> Array:
+    def _retried(self, open_: Array, ended: SpanResults) -> Array:
         """Mark motions for which the explicit method needed too many steps for a repeat; return the others.
 
         A span that too many steps were not enough for has ended where they were used up.
@@ -174,7 +175,7 @@ class _Course:
         self.most[which] = np.maximum(self.most[which], away)
         return over
 
-    def _judge(self, which: Array, ended: Spans, watched: Array) -> None:
+    def _judge(self, which: Array, ended: SpanResults, watched: Array) -> None:
         """Record the outcomes that are certain at the end of a span."""
         runs, found, state = self.runs, self.found, self.state
         found[which] = _seen(runs, which, ended)
@@ -227,7 +228,7 @@ class _Course:
             self.found[open_[self.found[open_] == OPEN]] = SPENT
 
 
-def _fates(runs: Judged, threads: int | None, start: Array) -> Array:
+def _fates(runs: MotionBatch, threads: int | None, start: Array) -> Array:
     """Outcomes of motions from given states."""
     return outcomes_of(runs, threads, start=start)
 
@@ -238,7 +239,7 @@ def _alike(now: Array, before: Array) -> Array:
         return np.asarray((now > 0) & (np.abs(now - before) < ALIKE * now))
 
 
-def _seen(runs: Judged, which: Array, ended: Spans) -> Array:
+def _seen(runs: MotionBatch, which: Array, ended: SpanResults) -> Array:
     """Outcomes that follow from the status of a run; OPEN where it can go on."""
     status = ended.status
     found = np.full(len(status), NO_SOLUTION)

@@ -22,7 +22,7 @@ import numpy as np
 from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.neighbourhood import LARGEST
-from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, Judged, advanced_runs
+from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, MotionBatch, advanced_runs
 
 Array = np.ndarray
 DONE = STATUSES.index("done")
@@ -49,7 +49,7 @@ class Shells:
     """
 
     def __init__(
-        self, runs: Judged, threads: int | None, fates: Callable[[Judged, int | None, Array], Array]
+        self, runs: MotionBatch, threads: int | None, fates: Callable[[MotionBatch, int | None, Array], Array]
     ) -> None:  # fmt: skip
         self.runs, self.threads, self.fates = runs, threads, fates
         count = len(runs.rest.velocity)

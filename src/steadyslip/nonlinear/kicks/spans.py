@@ -65,7 +65,7 @@ class StepBudget:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class MotionBatch:
     """Motions under constant inputs, ready to be simulated.
 
     Attributes
@@ -94,13 +94,13 @@ class Judged:
     effort: float = 1.0
     budget: StepBudget = field(default_factory=StepBudget)
 
-    def repeated(self, one: int, count: int) -> Judged:
+    def repeated(self, one: int, count: int) -> MotionBatch:
         """Copies of one rig, to be started from any states."""
         which = np.full(count, one)
         rest, near = self.rest.part(which), self.near.part(which)
         nothing = np.zeros(count)
         jobs = replace(self.jobs, point=self.jobs.point.part(which), size=count)
-        return Judged(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
+        return MotionBatch(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
 
     def times(self) -> tuple[Array, Array]:
         """Length of the first span, and the time after which a motion is undecided, s."""
@@ -139,7 +139,7 @@ ARRAYS = ("status", "time", "state", "unknowns", "steps", "tally")
 
 
 @dataclass
-class Spans:
+class SpanResults:
     """State of some runs at the end of a span: status, time reached (s), state (k, n), steps and tally.
 
     `unknowns` (k, u) are those of the balances.
@@ -154,17 +154,17 @@ class Spans:
     whole: bool = True
 
     @classmethod
-    def empty(cls, count: int, n: int, unknowns: int) -> Spans:
+    def empty(cls, count: int, n: int, unknowns: int) -> SpanResults:
         """Placeholder for runs not simulated yet."""
         return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan),
                    np.full((count, unknowns), np.nan), np.zeros(count),
                    np.full((count, len(TALLY)), np.nan))  # fmt: skip
 
-    def part(self, which: Array) -> Spans:
+    def part(self, which: Array) -> SpanResults:
         """Entries of some of the runs."""
         return replace(self, **{name: getattr(self, name)[which] for name in ARRAYS})
 
-    def put(self, which: Array, found: Spans) -> None:
+    def put(self, which: Array, found: SpanResults) -> None:
         """Store entries for some of the runs."""
         for name in ARRAYS:
             getattr(self, name)[which] = getattr(found, name)
@@ -172,9 +172,9 @@ class Spans:
 
 
 def advanced_runs(
-    runs: Judged, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
+    runs: MotionBatch, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
     options: Options | None = None, unknowns: Array | None = None,
-) -> Spans:  # fmt: skip
+) -> SpanResults:  # fmt: skip
     """Simulate runs `which` (k,) for `span` (k,) s from states `start` (k, n), or from their beginning.
 
     `unknowns` (k, u) are those of the balances at `start`, NaN where they are not known.
@@ -194,7 +194,7 @@ def advanced_runs(
     machine: Runner = jobs.runner(LANES, dense=True)
     _ = machine.code.advance  # compile before the threads start
     count, own = len(which), rest.contact * len(TALLY)
-    found = Spans.empty(count, rest.state.shape[1], rest.unknowns.shape[1])
+    found = SpanResults.empty(count, rest.state.shape[1], rest.unknowns.shape[1])
 
     def work(begin: int, end: int, stopped: threading.Event) -> None:
         outcome = run_chunk(part, machine, begin, end, np.empty(0), watch, stopped)

@@ -34,7 +34,7 @@ STEP = 1e-6
 Numbers = list[Any]
 
 
-class _Failed(ArithmeticError):
+class _NoConvergence(ArithmeticError):
     """Newton's method does not converge: the edge is not a simple one."""
 
 
@@ -80,9 +80,9 @@ def coefficient(
 
 
 @question
-def _steady_misfits(model: Model) -> list[sp.Expr]:
+def _steady_residuals(model: Model) -> list[sp.Expr]:
     """Residuals of steady sliding: of normal stresses and of forces carried by links (cached)."""
-    misfits = [contact.steady_stress - contact.sigma_ss for contact in model.contacts]
+    residuals = [contact.steady_stress - contact.sigma_ss for contact in model.contacts]
     carried = model.carried
     if carried is not None:
         for i, rest in enumerate(carried.rest):
@@ -93,8 +93,8 @@ def _steady_misfits(model: Model) -> list[sp.Expr]:
                 (carried.normal, [contact.sigma_ss for contact in model.contacts], -1),
             ):
                 row += sp.Add(*(sign * e * values[j] for (k, j), e in entries.items() if k == i))
-            misfits.append(row)
-    return misfits
+            residuals.append(row)
+    return residuals
 
 
 @question
@@ -102,7 +102,7 @@ def _linear(model: Model) -> tuple[sp.Expr, ...]:
     """First derivatives of the model, residuals of steady sliding, and slip rates (cached)."""
     found = system(model)
     speeds = [model.steady[contact.velocity] for contact in model.contacts]
-    return (*found.expressions[: len(found.entries[0])], *_steady_misfits(model), *speeds)
+    return (*found.expressions[: len(found.entries[0])], *_steady_residuals(model), *speeds)
 
 
 @question
@@ -127,13 +127,13 @@ class _Rig:
         self.fixed = self.system.place(point.model.contacts[contact].velocity)
         start = [*numbers[self.count :], numbers[self.along], omega, *vector.real, *vector.imag]
         self.start = [mpmath.mpf(float(one)) for one in start]
-        self.newton = _Inverse(self._slopes(np.array(start)))
+        self.newton = _Inverse(self._jacobian(np.array(start)))
         self.inverses: tuple[_Inverse, ...] = ()
 
     def coefficient(self, arguments: Numbers) -> Any:
         """c1 at these parameters, of which the one along the edge is solved for."""
-        unknowns = self.newton.refined(lambda y: self._misfits(arguments, y), self.start)
-        values, omega, q = self._parted(arguments, unknowns)
+        unknowns = self.newton.refined(lambda y: self._residuals(arguments, y), self.start)
+        values, omega, q = self._split(arguments, unknowns)
         gradient = self._entries(self.linear(*values))
         second, third = self._higher(self.higher(*values))
         conjugate = [mpmath.conj(one) for one in q]
@@ -161,7 +161,7 @@ class _Rig:
         total = mpmath.fsum(mpmath.re(p * (a + 2 * b + c)) for p, (a, b, c) in zip(left[:n], parts, strict=True))
         return total / 2
 
-    def _parted(self, arguments: Numbers, y: Numbers) -> tuple[Numbers, Any, Numbers]:
+    def _split(self, arguments: Numbers, y: Numbers) -> tuple[Numbers, Any, Numbers]:
         """Split the unknowns `y` into arguments of the functions, the frequency (rad/s) and the eigenvector."""
         many = len(y) - 2 - 2 * self.n
         values = [*arguments, *y[:many]]
@@ -169,9 +169,9 @@ class _Rig:
         parts = y[many + 2 :]
         return values, y[many + 1], [mpmath.mpc(a, b) for a, b in zip(parts[: self.n], parts[self.n :], strict=True)]
 
-    def _misfits(self, arguments: Numbers, y: Numbers) -> Numbers:
+    def _residuals(self, arguments: Numbers, y: Numbers) -> Numbers:
         """Residuals of steady sliding, of (G − iωM) q = 0 and of the amplitude, as many as unknowns."""
-        values, omega, q = self._parted(arguments, y)
+        values, omega, q = self._split(arguments, y)
         found = self.linear(*values)
         rows = _times(self._entries(found), q, self.n)
         for i in range(self.system.dynamic):
@@ -181,8 +181,8 @@ class _Rig:
         rows.append(amplitude)
         return [*found[first : len(found) - contacts], *map(mpmath.re, rows), *map(mpmath.im, rows)]
 
-    def _slopes(self, y: Array) -> Array:
-        """Jacobian of `_misfits` in double precision; differences for unknowns that are numbers of the rig."""
+    def _jacobian(self, y: Array) -> Array:
+        """Jacobian of `_residuals` in double precision; differences for unknowns that are numbers of the rig."""
         n, many = self.n, len(y) - 2 - 2 * self.n
         dynamic, first = self.system.dynamic, len(self.system.entries[0])
         base = np.array([*map(float, self.arguments), *y[:many]])
@@ -258,21 +258,21 @@ class _Inverse:
         self.rows, self.columns = rows[0], columns[0]
         self.inverse = np.linalg.inv(self.rows[:, None] * matrix * self.columns)
 
-    def refined(self, misfits: Callable[[Numbers], Numbers], start: Numbers) -> Numbers:
+    def refined(self, residuals: Callable[[Numbers], Numbers], start: Numbers) -> Numbers:
         """Find a zero of the residuals near `start`, by steps with this inverse.
 
         Raises
         ------
-        _Failed
+        _NoConvergence
             If steps do not become small.
         """
         found = list(start)
         rows, columns = ([mpmath.mpf(float(one)) for one in own] for own in (self.rows, self.columns))
         for _ in range(STEPS):
-            missed = [row * own for row, own in zip(rows, misfits(found), strict=True)]
+            missed = [row * own for row, own in zip(rows, residuals(found), strict=True)]
             largest = max(map(abs, missed))
             if not mpmath.isfinite(largest):
-                raise _Failed
+                raise _NoConvergence
             if largest == 0:
                 return found
             step = self.inverse @ np.array([complex(one / largest) for one in missed])
@@ -283,7 +283,7 @@ class _Inverse:
             size = max(abs(complex(own / column)) for own, column in zip(found, columns, strict=True))
             if largest * float(np.max(np.abs(step))) <= SETTLED * size:
                 return found
-        raise _Failed
+        raise _NoConvergence
 
     def solved(self, matrix: Sequence[tuple[int, int, Any]], right: Numbers) -> Numbers:
         """Solve linear equations whose matrix, by entries, agrees with this inverse's up to rounding."""

@@ -225,7 +225,7 @@ def parameter_along(rig: Slider | Machine, along: str) -> str:
 def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
     """Kind of onset at a given oscillatory edge."""
     name = edge.parameter
-    point = _flat(rig, name, [edge.value], branch)
+    point = _points_at(rig, name, [edge.value], branch)
     found, kind = onsets(point, np.array([edge.angular_frequency]), name)
     names = [contact.name for contact in point.model.contacts]
     most = int(found.contact[0])
@@ -247,7 +247,7 @@ def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
     )
 
 
-def _flat(rig: Slider | Machine, name: str, at: Any, branch: int) -> OperatingPoint:
+def _points_at(rig: Slider | Machine, name: str, at: Any, branch: int) -> OperatingPoint:
     """Operating points with the parameter `name` at the values `at` (m,), SI units."""
     present = (name,) if rig.parameters()[name].role.structural else ()
     return operating_point(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
@@ -257,9 +257,9 @@ def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int)
     """Re(dλ/dp) from the characteristic polynomial: central differences of its coefficients, Richardson's rule."""
     size = abs(edge.value) or 1e-3
     steps = np.array([1e-3, -1e-3, 5e-4, -5e-4]) * size
-    c = characteristic(_flat(rig, name, edge.value + steps, branch))
+    c = characteristic(_points_at(rig, name, edge.value + steps, branch))
     slope = (4 * (c[2] - c[3]) / (2 * steps[2]) - (c[0] - c[1]) / (2 * steps[0])) / 3
-    middle = characteristic(_flat(rig, name, [edge.value], branch))[0]
+    middle = characteristic(_points_at(rig, name, [edge.value], branch))[0]
     s = 1j * edge.angular_frequency
     powers = s ** np.arange(len(middle))
     down = np.arange(1, len(middle)) * middle[1:] @ powers[:-1]

@@ -10,7 +10,7 @@ from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
 from steadyslip.nonlinear.orbits.end_reasons import ENDS
 from steadyslip.nonlinear.orbits.search import cut_back, met
-from steadyslip.nonlinear.orbits.special import MET, looks
+from steadyslip.nonlinear.orbits.special import MET, log_features
 from steadyslip.nonlinear.orbits.tracer import BranchPiece, Tracer
 
 SIZES = (1e-3, 1e-2, 1e-4, 1e-1)  # distances of the first cycle from the doubling, in unknowns, tried in this order
@@ -62,9 +62,9 @@ def _entered(tracer: Tracer, pieces: list[BranchPiece], flip: Cycle) -> BranchPi
 def _nearest(flips: Sequence[Cycle], piece: BranchPiece) -> int | None:
     """Index of the doubling at which a piece ends, where its period is halved; None if none is near."""
     pair = [piece.points[-1], *([] if piece.beyond is None else [piece.beyond])]
-    seen = np.array([looks(known.cycle) - [np.log(2), 0, 0] for known in pair])
+    seen = np.array([log_features(known.cycle) - [np.log(2), 0, 0] for known in pair])
     reach = MET + float(np.ptp(seen, axis=0).max()) + 2 * max(float(np.abs(known.half).max()) for known in pair)
-    away = [float(np.abs(seen - looks(flip)).max(axis=1).min()) for flip in flips]
+    away = [float(np.abs(seen - log_features(flip)).max(axis=1).min()) for flip in flips]
     best = int(np.argmin(away))
     return best if away[best] < reach else None
 

@@ -150,7 +150,7 @@ def torus(multipliers: Array) -> float:
     return float(np.max(np.abs(pairs) - 1, initial=-1.0))
 
 
-def looks(cycle: Cycle) -> Array:
+def log_features(cycle: Cycle) -> Array:
     """Logarithms of period and velocities (3,), by which cycles are compared."""
     lowest = np.arcsinh(cycle.lowest_velocity / cycle.speed)
     return np.array([np.log(cycle.period), np.log(cycle.peak_velocity), lowest])
@@ -161,5 +161,5 @@ def lies_between(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
     if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
         return False
     share = (cycle.value - a.value) / (b.value - a.value) if b.value != a.value else 0.5
-    spread = MET + 0.3 * np.abs(looks(b) - looks(a)).max() ** 2
-    return bool(np.abs(looks(a) * (1 - share) + looks(b) * share - looks(cycle)).max() < spread)
+    spread = MET + 0.3 * np.abs(log_features(b) - log_features(a)).max() ** 2
+    return bool(np.abs(log_features(a) * (1 - share) + log_features(b) * share - log_features(cycle)).max() < spread)

@@ -1,7 +1,7 @@
-"""Eigenvalues with many digits, of the characteristic matrix with its entries evaluated by mpmath.
+"""Eigenvalues with many digits, from the characteristic matrix evaluated by mpmath.
 
-What cancels in double precision, of stiffnesses and velocities twenty decades apart, does not here: digits are doubled
-until as many eigenvalues as there are agree, with each other or with another route.
+Stiffnesses and velocities twenty decades apart lose all digits of some eigenvalues in double precision. Here digits are
+doubled until all eigenvalues agree with those of the step before, or with those of another route.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def precise_root(point: OperatingPoint, near: complex) -> complex | None:
 
 
 def _summed(table: list[Any], terms: list[Any], size: int) -> Any:
-    """The matrix whose entries, row by row, are sums of `terms` with the numbers of a table before them."""
+    """Square matrix (size, size) of sums of `terms`, with coefficients from `table`, entry by entry in rows."""
     import mpmath
 
     many = len(terms)
@@ -110,7 +110,7 @@ def _alike(some: ComplexArray, others: ComplexArray, share: float) -> bool:
 
 
 def _with_digits(point: OperatingPoint, digits: int, rate: float) -> ComplexArray | None:
-    """The eigenvalues that so many digits find finite; None where no digits would help."""
+    """Finite eigenvalues (1/s) computed with `digits` digits; None where the matrix is singular or undefined."""
     import mpmath  # slow to import
 
     with mpmath.workdps(digits):
@@ -132,7 +132,7 @@ def _with_digits(point: OperatingPoint, digits: int, rate: float) -> ComplexArra
 
 
 def _parts(point: OperatingPoint, rate: Any) -> list[Any] | None:
-    """The coefficients of s^0, s^1 and s² in the characteristic matrix, in units of time of 1/rate."""
+    """Matrices before s^0, s^1 and s² in the characteristic matrix, time in units of 1/rate; None if undefined."""
     import mpmath
 
     powers, entries, _ = _precise_matrix(point.model)

@@ -69,7 +69,7 @@ def formula(rig: Slider | Machine, along: str | None = None) -> sp.Eq:
 
 
 def _name(rig: Slider | Machine, along: str | None) -> str:
-    """The parameter that is meant; of a machine its only stiffness unless one is given."""
+    """Dotted name of the parameter `along`; by default a slider's stiffness, or a machine's only one."""
     if along is None and isinstance(rig, Machine):
         springs = [name for name, one in rig.parameters().items() if one.value and one.role.kind == "stiffness"]
         if len(springs) == 1:
@@ -81,7 +81,7 @@ def _name(rig: Slider | Machine, along: str | None) -> str:
 
 @question
 def _condition(model: Model, name: str) -> sp.Eq:
-    """Where the last Hurwitz determinant but one vanishes: roots on the imaginary axis."""
+    """Equation for a parameter at which the last but one Hurwitz determinant vanishes: roots on the imaginary axis."""
     symbol, c = model.parameters.get(name), tuple(map(model.written, characteristic_coefficients(model)))
     degree, numbers = len(c) - 1, f"; stable_values(rig, {name!r}) gives its edges as numbers"
     if symbol is None:
@@ -124,12 +124,12 @@ def _formula(model: Model) -> sp.Eq:
 
 
 def _answers(model: Model) -> dict[str, sp.Expr]:
-    """What friction and contact answer to small changes, in letters."""
+    """Expressions of the small-signal response by name (f, S, r, ...), without the stiffness k."""
     return {name: model.written(value) for name, value in response(model).as_dict().items() if name != "k"}
 
 
 def formula_in_parts(rig: Slider) -> list[sp.Eq]:
-    """The same in one line where it is short, else in the ingredients of `small_signal`, each with a line of its own.
+    """Formula of `formula` as one equation if short, else in the quantities of `small_signal`, then one equation each.
 
     Raises
     ------
@@ -163,7 +163,7 @@ class _TooLong(Exception):
 
 
 def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
-    """What `work` gives, or `otherwise` where it takes longer than `LONGEST`: nobody knows how long SymPy will take."""
+    """Result of `work`, or `otherwise` after `LONGEST` seconds: times of SymPy's simplifications are unpredictable."""
     found: list[sp.Expr] = []
     faults: list[Exception] = []
 

@@ -1,4 +1,4 @@
-"""How a machine moves in its modes: amplitude of every body, slip of every contact, and where the energy is."""
+"""Modes of a machine: complex amplitude of every coordinate, and shares of the energy."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WORDS = {
     "both": " (along and normal)", "share": "{name} by {share} of that",
     "energy": "; {share} of the energy is in the {name}",
 }  # fmt: skip
-"""What modes are told in, for one thing and for several; pages tell theirs in the same words."""
+"""Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""
 MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body judders, below the second it hardly moves
 
 
@@ -93,7 +93,7 @@ class Mode(Displayed):
 
 
 def _does(what: str, names: list[str]) -> str:
-    """What one thing does, or several do."""
+    """Verb of a phrase, in the singular for one name and in the plural for several."""
     return WORDS[what].split("|")[len(names) > 1]
 
 
@@ -102,7 +102,7 @@ def _called(name: str) -> str:
 
 
 def _merged(names: list[str]) -> list[str]:
-    """A body that moves along the slide and away from it, once."""
+    """Names in which a body that moves both along and normal to the surface occurs once."""
     both = {name for name in names if name + NORMAL in names}
     return [
         n + WORDS["both"] if n in both else n
@@ -133,7 +133,7 @@ def modes(rig: Machine) -> tuple[Mode, ...]:
 
 
 def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
-    """The mode of an eigenvalue."""
+    """Mode of a machine that belongs to the eigenvalue `s` (1/s)."""
     model = point.model
     size = len(characteristic_rows(model))
     powers, function = matrix_function(model)
@@ -158,7 +158,7 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
 
 
 def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The vector that a singular matrix takes to zero; rows and columns of very different size are balanced first.
+    """Null vector of a singular matrix; rows and columns of very different size are balanced first.
 
     `sizes` are those of the terms of each entry: a row that the eigenvalue makes zero must not count by its rounding.
     """
@@ -183,7 +183,7 @@ class EnergyStore:
 
 
 def stores(mechanism: Mechanism) -> list[EnergyStore]:
-    """What holds energy in a mechanism, of numbers or of symbols; one name may have several."""
+    """Kinetic and elastic energy stores of a mechanism, in numbers or symbols; one name may have several."""
     names = {one.name for one in mechanism.coordinates}
     found = [
         EnergyStore(f"bodies.{one.name.removesuffix(NORMAL)}", True, one.inertia, {one.name: 1})
@@ -204,7 +204,7 @@ def stores(mechanism: Mechanism) -> list[EnergyStore]:
 
 
 def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[str, float]:
-    """Shares of kinetic and elastic energy, averaged over a cycle."""
+    """Shares of the energy, kinetic and elastic, averaged over a cycle, by name of body, link or contact."""
     found: dict[str, float] = {}
     for one in stores(rig.mechanism()):
         stretch = sum(float(c) * places[name] for name, c in one.row.items())

@@ -1,4 +1,4 @@
-"""Eigenvalues with their errors, asked of the machine's own matrix, of which no characteristic polynomial was made.
+"""Eigenvalues with error bounds from the characteristic matrix itself, without a characteristic polynomial.
 
 M(s) x = 0, with M a polynomial in s whose entries are slopes of the Model's equations (`characteristic_rows`), is the
 machine's matrix pencil; delays add factors exp(−s h). An eigenvalue that was found by another route is checked by the
@@ -123,9 +123,9 @@ def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexAr
 
 
 def best_spectrum(point: OperatingPoint) -> ComplexArray:
-    """As `spectrum`; of a single rig whose polynomial is too long to be written out, checked and if need be refined.
+    """Eigenvalues (1/s), (..., n), as from `spectrum`; refined for a single rig without a written-out polynomial.
 
-    Its state matrix has stiffnesses of several links in one sum, so that the stiffest may hide the others.
+    The state matrix of such a rig adds stiffnesses of several links, so that rounding of the stiffest may hide others.
     """
     found = spectrum(point)
     if point.shape or point.model.delays or is_written_out(point.model):
@@ -150,7 +150,7 @@ def _checked(
 
 
 def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
-    """Where an eigenvalue is known to `GOOD`, or lies so close to others that rounding decides where."""
+    """True where the relative error is at most `GOOD`, or an eigenvalue nearly coincides with others."""
     apart = np.abs(values[:, None] - values[None, :]) + np.where(np.eye(len(values)) > 0, np.inf, 0.0)
     near = np.min(apart, axis=1, initial=np.inf) <= 2 * errors
     size = np.abs(values)
@@ -158,7 +158,7 @@ def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
 
 
 def _count(point: OperatingPoint) -> int:
-    """Growing roots by the argument principle, −1 where that takes too long."""
+    """Number of growing roots by the argument principle; −1 where counting takes too long."""
     c, h = quasipolynomial(point)
     with np.errstate(all="ignore"):
         scaled, own, _ = nondimensional(c[None], h[None])
@@ -168,7 +168,7 @@ def _count(point: OperatingPoint) -> int:
 
 
 def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
-    """What the last digits of the coefficients of the characteristic polynomial do to its roots; zero without one."""
+    """Change of eigenvalues `s` (1/s) by the last digits of the polynomial's coefficients; zero without polynomial."""
     if not is_written_out(point.model):
         return np.zeros(len(s))
     c, moved = characteristic(point), characteristic(_retold(point))
@@ -182,7 +182,7 @@ def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
 
 
 def _retold(point: OperatingPoint) -> OperatingPoint:
-    """The same rig some times with other last digits."""
+    """Copies of a single rig, (`_TRIALS`,), with perturbed last digits."""
     chance = np.random.default_rng(0)
     last = 1 + _LAST * chance.choice([-0.5, 0.5], (len(point.arguments), _TRIALS))
     return point.with_arguments([a * own for a, own in zip(point.arguments, last, strict=True)], (_TRIALS,))
@@ -235,7 +235,7 @@ class _Matrix:
         return whole, np.einsum("ijk,pk->pij", self.wrong, np.abs(factor)) * units, slope
 
     def errors(self, s: ComplexArray) -> Array:
-        """How far each of these is from an eigenvalue of the matrix; inf where that cannot be said."""
+        """Distance (1/s) of each `s` from an eigenvalue of the matrix; inf where it cannot be computed."""
         with np.errstate(all="ignore"):
             whole, wrong, slope = self.even(s * _BESIDE)
             good = np.all(np.isfinite(whole) & np.isfinite(wrong) & np.isfinite(slope), axis=(1, 2))
@@ -245,7 +245,7 @@ class _Matrix:
         return _spread(s, found)
 
     def has_all(self, s: ComplexArray) -> bool:
-        """Whether the determinant turns along the imaginary axis as the product of s − s_i does, at enough places."""
+        """True if the argument of the determinant follows that of Π(iω − s_i) along the imaginary axis."""
         size = np.abs(s[s != 0])
         if not size.size:
             return True
@@ -267,7 +267,7 @@ class _Matrix:
 
 
 def _distance(whole: ComplexArray, wrong: Array, slope: ComplexArray) -> float:
-    """By how much s must change for a matrix to be singular, rounding included."""
+    """Change of s (1/s) that makes the matrix `whole` singular, given its slope dM/ds and errors `wrong`."""
     left, singular, right = np.linalg.svd(whole)
     u, v = np.abs(left[:, -1]), np.abs(right[-1])
     least = float(singular[-1] + u @ wrong @ v)
@@ -277,7 +277,7 @@ def _distance(whole: ComplexArray, wrong: Array, slope: ComplexArray) -> float:
 
 
 def _spread(s: ComplexArray, errors: Array) -> Array:
-    """Errors of eigenvalues close to others: m that meet move as the m-th root of what moves one alone.
+    """Errors (1/s) of eigenvalues with near neighbours: m that coincide move with the m-th root of a perturbation.
 
     `errors` are those of each alone, which are the larger the closer the others are.
     """

@@ -1,4 +1,4 @@
-"""Arrays of real polynomials: Hurwitz test, and the k for which p(s) + k q(s) is stable.
+"""Hurwitz test of arrays of real polynomials, and the k for which p(s) + k q(s) is stable.
 
 Coefficients run along the last axis, lowest power first; the other axes are rigs. Highest coefficients
 may be zero (a rig without mass), rig by rig.
@@ -47,7 +47,7 @@ def damping_measures(s: ComplexArray) -> Array:
 
 @quietly
 def is_hurwitz(c: Array) -> NDArray[np.bool_]:
-    """Whether the highest coefficient is positive and all roots have negative real parts (Routh)."""
+    """True where the highest coefficient is positive and all roots have negative real parts (Routh), (...)."""
     n = c.shape[-1] - 1
     flat = c.reshape(-1, n + 1)
     result = np.zeros(len(flat), dtype=bool)
@@ -100,7 +100,7 @@ def most_intervals(degree: int) -> int:
 
 @dataclass(frozen=True)
 class StableSet:
-    """Where p + k q is stable, for arrays of rigs.
+    """Stable intervals of k in p + k q and their edges, for arrays of rigs.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Roots of arrays of real polynomials, also of one that holds roots many orders of magnitude apart.
+"""Roots of arrays of real polynomials, also where roots are many orders of magnitude apart.
 
 Coefficients run along the last axis, lowest power first; the other axes are rigs.
 """
@@ -26,7 +26,7 @@ _ROUNDING = 16 * np.finfo(float).eps  # share of (half sum)² below which a pair
 
 
 def quietly(function: Callable[P, R]) -> Callable[P, R]:
-    """Overflow ends as inf or NaN, which every function here expects.
+    """Decorate a function so that overflow gives inf or NaN without a NumPy warning.
 
     A fresh `numpy.errstate` for every call: one instance that decorates functions which call each other, or run in
     several threads, leaves NumPy's error state changed (before NumPy 2).
@@ -125,7 +125,7 @@ def _polished(c: Array, found: ComplexArray) -> ComplexArray:
 
 
 def _are_missed(c: Array, s: ComplexArray) -> NDArray[np.bool_]:
-    """Where roots found of polynomials of full degree, (rows, n), are no roots, or some are missing.
+    """True for polynomials (rows,) of full degree some of whose computed roots (rows, n) are wrong or missing.
 
     Each must make the polynomial vanish beside its terms, and all together have the product c0/cn.
     """
@@ -183,7 +183,7 @@ def _groups_of_size(mantissa: Array, exponent: NDArray[np.int64]) -> Iterator[tu
 
 
 def _scaled(s: ComplexArray, exponent: NDArray[np.int64]) -> ComplexArray:
-    """s times a power of two."""
+    """Complex numbers s times 2**exponent, exactly."""
     return np.asarray(np.ldexp(s.real, exponent) + 1j * np.ldexp(s.imag, exponent))
 
 

@@ -20,7 +20,7 @@ from delays import some, spectral, winding
 from machine_onsets import compared
 from machines import at_random, same_block, three_bodies
 from moving_machines import slopes_of_motion
-from steadyslip.linear import quasi
+from steadyslip.linear import quasipolynomial as quasi
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.model.point import operating_point
 

@@ -24,9 +24,9 @@ from steadyslip.protocol import (
     VelocityHarmonic,
     VelocityRamp,
     VelocityStep,
-    evaluate,
-    pack,
 )
+from steadyslip.protocol.inputs import evaluate
+from steadyslip.protocol.segments import pack
 from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 
 UNTIL = 64.0

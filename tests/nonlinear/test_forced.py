@@ -262,6 +262,37 @@ def test_limits_as_scipy_has_them():
     assert len(found.plot()) == 3
 
 
+@pytest.mark.campaign
+def test_sliding_is_lost_first_at_half_the_period_of_the_resonance():
+    """Motion takes two periods there, from an amplitude on that LSODA finds too; a little mass changes nothing."""
+    a, b, d_c, mu, v, sigma, k = 0.010, 0.015, 1e-5, 0.6, 1e-5, 25e6, 1.3 * 12.5e9
+    rig = press(b=b, normal_memory=ss.laws.NoMemory()).with_values({"stiffness": k})
+    natural = 2 * np.pi * d_c / v * np.sqrt(a * sigma / (k * d_c))
+    half, whole = ss.response(rig, [natural / 2, natural], limits=True).lost_at
+    assert half < whole / 3
+    with_mass = ss.response(rig.with_values({"mass": 1e3}), [natural / 2], limits=True)
+    assert with_mass.lost_at[0] == pytest.approx(half, rel=0.08)  # each is right to 4 %
+
+    def follows(size, period):
+        """Whether ln v is the same after each of the last of 600 periods."""
+        omega = 2 * np.pi / period
+
+        def rates(t, y):
+            w, state = y
+            normal = sigma + size * np.sin(omega * t)
+            slid = -v / d_c * np.exp(w) * (w + state)
+            pressed = size * omega * np.cos(omega * t) * (mu + a * w + b * state)
+            return [(k * v * -np.expm1(w) - pressed - normal * b * slid) / (a * normal), slid]
+
+        run = solve_ivp(rates, (0, 600 * period), [0, 0], "LSODA", period * np.arange(592, 601), rtol=1e-9, atol=1e-11)
+        return bool(np.ptp(run.y[0]) < 1e-3)
+
+    for period, lost in ((natural / 2, half), (natural, whole)):  # a window at the latter: 0.3 MPa is followed again
+        assert follows(lost / 1.08, period)
+        assert not follows(lost * 1.01, period)
+    assert follows(0.3e6, natural)
+
+
 def test_outputs_that_hardly_swing_and_transients_that_outlast_the_run():
     """Errors of the integration are no irregular motion, and what fades over millions of periods has not settled."""
     faint = ss.response(press(), [3.0], input="push", output="shear-stress", amplitudes=[0.1], rtol=1e-8)

@@ -44,11 +44,13 @@ IRREGULARLY = 1e-2  # difference of periods, in ranges, above which lasting diff
 TIGHTER, TIGHTEST = 100, 1e-12  # share and least of the tolerance, where errors of the integration hide the answer
 MOST_SHARE = 0.99  # largest amplitude tried for limits, in steady values: just below a change of sign
 DECADES = 3  # of amplitude searched below that, and once more where needed
-HALVINGS = 7  # bisections of the logarithm of amplitude over that range: limits are right to 6 %
+STEPS = 12  # amplitudes tried upwards over that range, each 1.8 times the one before: a narrower window may be missed
+HALVINGS = 4  # bisections of the logarithm of amplitude within such a step: limits are right to 4 %
 RISING = Tested(
     "numbers > 0 that rise, in s", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0))
 )
 SIZES = Tested("numbers > 0, in SI units", lambda given: np.size(given) == 0 or _positive(given))
+TOO_MANY_STEPS = "too many steps"  # says nothing of the motion
 COMPARED = 5  # last periods that are compared: repetition up to every 4th is found
 
 
@@ -280,7 +282,7 @@ class _Forced:
             return status != PERIODIC or abs(own / gain - 1) > DEPARTED
 
         def lost(amplitude: float) -> bool:
-            return at(amplitude)[0] not in (PERIODIC, NOT_SETTLED)
+            return at(amplitude)[0] not in (PERIODIC, NOT_SETTLED, TOO_MANY_STEPS)
 
         return _edge(departs, most), _edge(lost, most)
 
@@ -305,14 +307,20 @@ def _unsettled(apart: list[float]) -> str:
 
 
 def _edge(beyond: Callable[[float], bool], most: float) -> float:
-    """Smallest amplitude for which `beyond` holds, by bisection of logarithms; inf if it never does up to `most`."""
-    if not beyond(most):
-        return math.inf
-    low, high = most / 10**DECADES, most
+    """Smallest amplitude for which `beyond` holds; inf if it never does up to `most`.
+
+    Amplitudes are tried upwards and the first step is bisected: motion that larger amplitudes drive may repeat again.
+    """
+    low = most / 10**DECADES
     if beyond(low):
-        low, high = low / 10**DECADES, low
+        most, low = low, low / 10**DECADES
         if beyond(low):
             return 0.0
+    rising = np.geomspace(low, most, STEPS + 1)[1:]
+    high = next((float(one) for one in rising if beyond(float(one))), math.inf)
+    if math.isinf(high):
+        return high
+    low = max(low, high * (low / most) ** (1 / STEPS))
     for _ in range(HALVINGS):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if beyond(middle) else (middle, high)

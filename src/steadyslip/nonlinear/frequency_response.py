@@ -53,8 +53,9 @@ class FrequencyResponse(ReadOnly):
         (``blow-up``, ``contact lost``, ...); numbers are NaN where it did.
     linear_to, lost_at : ndarray (n,)
         Amplitude up to which the gain is within 5 % of that of small ones, and amplitude at which steady sliding is
-        lost: motion ends, or no longer repeats with the input. NaN where not asked for, inf where larger than the
-        steady value of what swings, and 0 where less than a millionth of that.
+        lost: motion ends, or no longer repeats with the input; as a rule it takes two periods first, and soonest at
+        half the period of a resonance. Stick-slip once in every period is not told apart. NaN where not asked for, inf
+        where larger than the steady value of what swings, and 0 where less than a millionth of that.
     resonances : ndarray (r, 3)
         Largest small-amplitude answers within the range of the periods, wherever they lie between them: period (s),
         gain, phase (degrees); the largest gain first.
@@ -143,7 +144,7 @@ class FrequencyResponse(ReadOnly):
                 place = format_quantity(self.periods[least], "s")
                 lines.append(f"{words} an amplitude of {self.told(found[least])}, at period {place}")
             elif np.any(np.isinf(found)):
-                lines.append(f"{words} no amplitude below the steady value")
+                lines.append(f"{words} no amplitude below the steady value, at these periods")
         return lines
 
     def to_dict(self) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import time
 import numpy as np
 from quick import QUICK, parsed
 
-from steadyslip.experiments.numerics.pooling import Told, pooled
+from steadyslip.experiments.numerics.pooling import ExperimentEstimate, pooled
 
 MEAN = np.array([-4.5, 1.2])
 
@@ -25,7 +25,9 @@ def trial(rng: np.random.Generator, count: int, spread: np.ndarray, seed: int) -
         own = MEAN + spread * rng.standard_normal(2)
         deviation = np.array([0.03, 0.04]) * 10 ** rng.uniform(-0.3, 0.3, 2)
         covariance = np.outer(deviation, deviation) * np.array([[1.0, 0.8], [0.8, 1.0]])
-        told.append(Told(np.arange(2), rng.multivariate_normal(own, covariance), covariance, np.array([1.0])))
+        told.append(
+            ExperimentEstimate(np.arange(2), rng.multivariate_normal(own, covariance), covariance, np.array([1.0]))
+        )
         truth.append(own)
     found = pooled(told, 2, np.ones(2), 1000, seed)
     other = found.mean[:, :, 0] + found.spread * rng.standard_normal((1000, 2))

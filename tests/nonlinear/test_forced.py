@@ -335,7 +335,7 @@ def test_refusals():
         ss.response(press(), [1.0], on="face")
     with pytest.raises(ss.ParameterError, match="on: missing; allowed: guide, seal"):
         ss.response(two_bodies(), [1.0])
-    with pytest.raises(ss.NotAvailable, match="nothing that an input of kind injection acts on"):
+    with pytest.raises(ss.NotAvailable, match="injection needs a contact of law pore-fluid; this rig has none"):
         ss.response(press(), [1.0], input="injection")
 
 

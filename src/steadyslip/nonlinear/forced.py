@@ -195,7 +195,8 @@ class _Forced:
             on = possible[0]
         if on not in possible:
             if not possible:
-                raise NotAvailable(f"this rig has nothing that an input of kind {self.kind} acts on")
+                wanted = "a contact of law pore-fluid" if self.kind == "injection" else "a place to act on"
+                raise NotAvailable(f"input {self.kind} needs {wanted}; this rig has none")
             came = "missing" if on is None else f"got {on!r}"
             raise ParameterError([Problem("on", f"{came}; allowed: {', '.join(possible)}")])
         return on + ending, on or None

@@ -267,7 +267,7 @@ class Tracer:
                     piece.end = f"most_points = {self.most} reached"
                     break
                 if self.flow.steps > self.most_steps:
-                    piece.end = f"{(self.most_steps - self.begun) / 1e6:.3g} million steps of integration taken, all "
+                    piece.end = f"{(self.flow.steps - self.begun) / 1e6:.2g} million steps of integration taken, all "
                     piece.end += "that are spent on this part; ask for the rest with between=(low, high)"
                     break
             lost = {ENDS["retraces"], ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}

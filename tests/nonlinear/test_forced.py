@@ -12,13 +12,16 @@ from command import run
 
 ROCK = {"a": 0.010, "b": 0.008, "d_c": 1e-5, "mu_ref": 0.6, "v_ref": 1e-5}
 OSCILLATING = {  # amplitude, period: mean shear over mean normal stress, gain, phase in degrees
+    (1e4, 1.0): (0.599998, 0.0262987, -97.9275),
     (1e4, 3.0): (0.599998, 0.0986039, -108.112),
     (1e4, 10.0): (0.599996, 0.689867, -66.4816),
     (1e4, 100.0): (0.600000, 0.603783, -3.03887),
+    (1e6, 1.0): (0.585716, 0.0198970, -94.0483),
     (1e6, 3.0): (0.584806, 0.0644824, -98.2545),
     (1e6, 10.0): (0.583600, 0.259649, -68.7987),
     (1e6, 100.0): (0.599816, 0.603919, -3.27344),
 }
+"""An integration elsewhere, after 20 periods: those of 1 s had not settled by then, and are off by up to 3e-3."""
 
 
 def press(**law):
@@ -31,20 +34,9 @@ def press(**law):
     )
 
 
-def test_an_oscillating_normal_stress():
-    """Figures of an integration elsewhere, those that had settled."""
-    found = ss.response(press(), [3.0, 10.0, 100.0], output="shear-stress", amplitudes=[1e4, 1e6])
-    for (amplitude, period), (mean, gain, phase) in OSCILLATING.items():
-        at = [*found.amplitudes].index(amplitude), [*found.periods].index(period)
-        assert found.mean_friction[at] == pytest.approx(mean, rel=2e-6)
-        assert found.gains[at] == pytest.approx(gain, rel=1e-5)
-        assert found.phases[at] == pytest.approx(phase, rel=1e-4)
-
-
-@pytest.mark.campaign
-def test_a_fast_oscillation_is_waited_for():
-    """After 20 periods of 1 s the motion still differs by 3e-3 from what it settles to; LSODA says what that is."""
-    a, b, d_c, mu, v, alpha, sigma, k, size, period = 0.010, 0.008, 1e-5, 0.6, 1e-5, 0.2, 25e6, 1e10, 1e6, 1.0
+def settled(size, period):
+    """Mean friction, gain and phase (degrees) of `press` after 160 periods, by LSODA."""
+    a, b, d_c, mu, v, alpha, sigma, k = 0.010, 0.008, 1e-5, 0.6, 1e-5, 0.2, 25e6, 1e10
 
     def rates(t, y):
         x, phi = y  # Φ = Θ + (α/b) ln σ is continuous
@@ -53,14 +45,25 @@ def test_a_fast_oscillation_is_waited_for():
         speed = v * np.exp(((mu * sigma - k * x) / normal - mu - b * theta) / a)
         return [speed - v, -speed / d_c * (np.log(speed / v) + theta)]
 
-    times = period * (80 + np.arange(256) / 256)
-    settled = solve_ivp(rates, (0, times[-1]), [0.0, 0.0], "LSODA", times, rtol=1e-11, atol=[1e-18, 1e-13])
-    shear = mu * sigma - k * settled.y[0]
+    times = period * (160 + np.arange(256) / 256)
+    found = solve_ivp(rates, (0, times[-1]), [0.0, 0.0], "LSODA", times, rtol=1e-11, atol=[1e-18, 1e-13])
+    shear = mu * sigma - k * found.y[0]
     first = 1j * np.fft.rfft(shear)[1] / 128 / size
-    found = ss.response(press(), [period], output="shear-stress", amplitudes=[size])
-    assert found.gains[0, 0] == pytest.approx(abs(first), rel=1e-6)
-    assert found.phases[0, 0] == pytest.approx(np.degrees(np.angle(first)), rel=1e-6)
-    assert found.mean_friction[0, 0] == pytest.approx(np.mean(shear) / sigma, rel=1e-7)
+    return np.mean(shear) / sigma, abs(first), np.degrees(np.angle(first))
+
+
+def test_an_oscillating_normal_stress():
+    """All rows of the table: as printed, to six digits, or, where its motion had not settled, as LSODA settles."""
+    found = ss.response(press(), [1.0, 3.0, 10.0, 100.0], output="shear-stress", amplitudes=[1e4, 1e6])
+    for (amplitude, period), printed in OSCILLATING.items():
+        at = [*found.amplitudes].index(amplitude), [*found.periods].index(period)
+        own = found.mean_friction[at], found.gains[at], found.phases[at]
+        if period == 1.0:
+            true = settled(amplitude, period)
+            assert own == pytest.approx(true, rel=1e-6)
+            assert true == pytest.approx(printed, rel=4e-3)
+        else:
+            assert own == pytest.approx(printed, rel=5e-6)
 
 
 def test_small_amplitudes_answer_as_perfettini():

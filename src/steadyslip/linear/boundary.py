@@ -18,7 +18,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
-from steadyslip.model.range import require_range
+from steadyslip.model.range import require_digits, require_range
 
 
 @dataclass(frozen=True)
@@ -80,15 +80,21 @@ def boundary(
     UnknownNameError, ParameterError
         If the name is unknown or the range is not inside the parameter's domain.
     NotAvailable
-        If the numbers of the rig leave the range of floating point.
+        If the numbers of the rig leave the range of floating point, or rounding hides eigenvalues.
     """
-    require_range(operating_point(rig, branch=branch))
+    _require_answers(rig, branch)
     full = rig.resolve(name)
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, [rig.read(full, one) for one in between])
     if limits is not None:
         operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
     return Search(rig, full, _kept(rig, full), branch).boundaries(limits)
+
+
+def _require_answers(rig: Rig, branch: int) -> None:
+    point = operating_point(rig, branch=branch)
+    require_range(point)
+    require_digits(point)
 
 
 def _kept(rig: Rig, name: str) -> tuple[str, ...]:
@@ -103,9 +109,9 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     Raises
     ------
     NotAvailable
-        If the numbers of the rig leave the range of floating point.
+        If the numbers of the rig leave the range of floating point, or rounding hides eigenvalues.
     """
-    require_range(operating_point(rig, branch=branch))
+    _require_answers(rig, branch)
     present = present_zeros(rig)
     found = []
     for name, address in rig.parameters().items():

@@ -15,7 +15,8 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.laws.contact import ContactInputs
-from steadyslip.linear.pencil import best_spectrum, matrix_function
+from steadyslip.linear.pencil import matrix_function
+from steadyslip.linear.spectrum import spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, ContactPort, Mechanism
 from steadyslip.model import Model
@@ -128,7 +129,7 @@ def modes(rig: Machine) -> tuple[Mode, ...]:
     point = operating_point(rig)
     if not point.exists:
         raise explain_absence(rig, point)
-    found = best_spectrum(point)
+    found = spectrum(point)
     return tuple(mode_of(rig, point, complex(s)) for s in found if np.isfinite(s) and s.imag >= 0)
 
 

@@ -122,21 +122,6 @@ def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexAr
     return values[order], errors[order]
 
 
-def best_spectrum(point: OperatingPoint) -> ComplexArray:
-    """Eigenvalues (1/s), (..., n), as from `spectrum`; refined for a single rig without a written-out polynomial.
-
-    The state matrix of such a rig adds stiffnesses of several links, so that rounding of the stiffest may hide others.
-    """
-    found = spectrum(point)
-    if point.shape or point.model.delays or is_written_out(point.model):
-        return found
-    checked = checked_spectrum(point)
-    if not checked.refined:
-        return found
-    short = max(found.shape[-1] - len(checked.values), 0)
-    return np.append(checked.values, np.full(short, np.nan + 0j))
-
-
 def _checked(
     point: OperatingPoint, matrix: _Matrix, values: ComplexArray, errors: Array, refined: bool
 ) -> CheckedSpectrum:

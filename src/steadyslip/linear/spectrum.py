@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasipolynomial as with_delays
 from steadyslip.linear.argument import UNKNOWN
+from steadyslip.linear.digits import precise_eigenvalues
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz
 from steadyslip.linear.roots import Array, ComplexArray, roots
-from steadyslip.model.eigenvalues import eigenvalues_of
+from steadyslip.model.eigenvalues import digits_lost, eigenvalues_of
 from steadyslip.model.linearisation import delays_of_terms, is_written_out
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial
@@ -22,18 +23,33 @@ _ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the
 def spectrum(point: OperatingPoint) -> ComplexArray:
     """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost.
 
-    n is the number of eigenvalues of the rig with all delays zero.
+    n is the number of eigenvalues of the rig with all delays zero. Where rounding hides some (`digits_lost`), those of
+    a single rig are computed with many digits; of an array they are NaN.
     """
     if not point.model.delays:
-        return roots(characteristic(point)) if is_written_out(point.model) else eigenvalues_of(point)
+        return roots(characteristic(point)) if is_written_out(point.model) else _of_state_matrix(point)
     c, h = quasipolynomial(point)
     return with_delays.rightmost(c, h, c.shape[-1] - 1)
 
 
+@question
+def _of_state_matrix(point: OperatingPoint) -> ComplexArray:
+    found, lost = eigenvalues_of(point), digits_lost(point)
+    if not np.any(lost):
+        return found
+    better = precise_eigenvalues(point, found[np.isfinite(found)]) if not point.shape else None
+    if better is None:
+        return np.where(lost[..., None], np.nan, found)
+    return np.append(better, np.full(max(found.shape[-1] - len(better), 0), np.nan + 0j))
+
+
 def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where all roots lie left of the imaginary axis and the equations are well posed."""
-    if not point.model.delays:
+    if not point.model.delays and is_written_out(point.model):
         return is_hurwitz(characteristic(point))
+    if not point.model.delays:
+        s = spectrum(point)
+        return np.asarray(np.all((s.real < 0) | np.isnan(s), axis=-1) & ~is_ill_posed(point))
     return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
 
 
@@ -111,14 +127,31 @@ def crossing_frequency(point: OperatingPoint) -> float:
 
 
 def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
-    """True where the leading oscillation has a damping ratio (with delays a phase) of at most `share` in size."""
+    """True where an oscillation neither grows nor decays (see `_negligible`); with delays one of a phase up to `share`.
+
+    With delays the leading one alone is asked.
+    """
     if not point.model.delays:
-        return np.asarray(np.abs(0.5 * nearness(point)[0]) <= share)
+        s = spectrum(point)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.any((s.imag != 0) & (np.abs(s.real) <= _negligible(s, share)), axis=-1))
     return np.asarray((np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING))
 
 
+def _negligible(s: ComplexArray, share: float) -> Array:
+    """Size (1/s) of a real part up to which an eigenvalue (..., n) counts as one on the imaginary axis.
+
+    It is `share` of the eigenvalue's own size, or of the geometric mean of all if that is less: a link so stiff that
+    its own oscillation is hardly damped within a period may still decay faster than all else.
+    """
+    size = np.abs(s)
+    some = np.isfinite(size) & (size > 0)
+    total = np.sum(np.log(np.where(some, size, 1.0)), axis=-1, keepdims=True)
+    return np.asarray(share * np.minimum(size, np.exp(total / np.maximum(some.sum(axis=-1, keepdims=True), 1))))
+
+
 def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
-    """True where a root grows with Re s > `share` |s|, or the equations are ill-posed; roots on the axis do not count.
+    """True where a root grows, or the equations are ill-posed; roots on the axis do not count (see `_negligible`).
 
     Parameters
     ----------
@@ -128,7 +161,7 @@ def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray
     s = spectrum(point)
     with np.errstate(all="ignore"):
         size = np.abs(s)
-        grows = s.real > share * size
+        grows = s.real > _negligible(s, share)
         least = np.min(size, axis=-1, keepdims=True, where=~np.isnan(size), initial=np.inf)
         grows &= ~(np.asarray(neutral)[..., None] & (size <= least))
         return np.asarray(np.any(grows, axis=-1) | is_ill_posed(point))

@@ -21,7 +21,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.descriptor import Matrices, blocks_of, descriptor
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.range import out_of_range_error, require_range
+from steadyslip.model.range import hidden_by_stiffest, out_of_range_error, require_range
 from steadyslip.model.sliding import explain_absence, steady_state
 
 if TYPE_CHECKING:
@@ -104,16 +104,10 @@ def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
     if right.values.size == own.size and (not own.size or np.all(np.min(apart, axis=0) <= allowed)):
         return
     rates = np.abs(right.values)
-    stiff = max(point.model.with_role("stiffness"), key=lambda name: float(point.named()[name]), default="")
-    which = (
-        f"; {stiff} = {float(point.named()[stiff]):.4g} {point.model.roles[stiff].unit} is the largest" if stiff else ""
-    )
     raise NotAvailable(
         "no state matrix in double precision has the eigenvalues of this rig, which lie between "
-        f"{np.min(rates, initial=np.inf):.3g} and {np.max(rates, initial=0.0):.3g} 1/s: rounding of the largest hides "
-        f"the least{which}; write links that are as good as rigid as rigid (stiffness = 'rigid' in a file, "
-        "steadyslip.joined), raise masses and dampings that are as good as none, or take eigenvalues, which tells them "
-        "all"
+        f"{np.min(rates, initial=np.inf):.3g} and {np.max(rates, initial=0.0):.3g} 1/s: {hidden_by_stiffest(point)}, "
+        "raise masses and dampings that are as good as none, or take eigenvalues, which has them all"
     )
 
 

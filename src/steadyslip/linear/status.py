@@ -18,6 +18,7 @@ from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
+from steadyslip.model.eigenvalues import digits_lost
 from steadyslip.model.linearisation import characteristic_terms, is_written_out
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range
@@ -81,6 +82,8 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     They do at an edge, and where terms cancel that are many orders of magnitude larger than their sum; not where
     another disturbance grows anyway.
     """
+    if np.any(digits_lost(point)):  # then eigenvalues come from many digits, which no array of rigs has
+        return False
     chance = np.random.default_rng(0)
     arguments = [
         value * (1 + np.finfo(float).eps * chance.uniform(-8.0, 8.0, LAST_DIGITS)) for value in point.arguments

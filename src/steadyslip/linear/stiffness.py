@@ -23,11 +23,10 @@ from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_many_windows_error
-from steadyslip.linear.pencil import best_spectrum
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.linear.roots import Array, ComplexArray, quietly
-from steadyslip.linear.spectrum import is_ill_posed
+from steadyslip.linear.spectrum import is_ill_posed, spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -134,7 +133,7 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> ComplexArray:
-        return best_spectrum(part)
+        return spectrum(part)
 
     found = in_chunks(point, kernel)
     if point.model.delays and np.any(lost := np.all(np.isnan(found), axis=-1)):
@@ -164,8 +163,8 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
     def kernel(part: OperatingPoint) -> Array:
         with np.errstate(invalid="ignore"):
-            rate = np.max(np.where(np.isnan(found := best_spectrum(part).real), -np.inf, found), axis=-1)
-        known = np.all(np.isfinite(quasipolynomial(part)[0]), axis=(-2, -1))
+            rate = np.max(np.where(np.isnan(found := spectrum(part).real), -np.inf, found), axis=-1)
+        known = np.isfinite(rate) & np.all(np.isfinite(quasipolynomial(part)[0]), axis=(-2, -1))
         return np.where(is_ill_posed(part), np.inf, np.where(known, rate, np.nan))
 
     return point.wrap(in_chunks(point, kernel), "growth_rate", "1/s")

@@ -7,7 +7,7 @@ number of terms does not grow with states and powers of s.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -118,8 +118,8 @@ def _in_ring(entry: Polynomial, ring: Any) -> Any:
     return total
 
 
-def machine_determinant(model: Model, rows: Rows) -> Polynomial:
-    """Determinant of the characteristic matrix of a machine.
+def machine_determinant(model: Model, rows: Rows, tensions: Sequence[sp.Symbol] = ()) -> Polynomial:
+    """Determinant of the characteristic matrix of a machine, whose rows of `tensions` are those of links' forces.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def machine_determinant(model: Model, rows: Rows) -> Polynomial:
     if any(row[j] for i, (_, row) in enumerate(table) for j in inside.difference(kept) if i not in inside):
         raise InternalError("memory variables to act on other equations through friction only")
     placeholders = Placeholders()
-    forces = {one.velocity for one in model.coordinates}
+    forces = {one.velocity for one in model.coordinates}.union(tensions)
     matrix = []
     for place in core:
         name, row = table[place]

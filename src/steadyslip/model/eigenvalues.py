@@ -16,10 +16,14 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model.descriptor import blocks_of, descriptor
 from steadyslip.model.equations import Model
-from steadyslip.model.linearisation import characteristic_rows, sets_of_delays
+from steadyslip.model.linearisation import characteristic_rows, is_written_out, sets_of_delays
 from steadyslip.model.point import OperatingPoint, stacked
 
 Delays = tuple[sp.Expr, ...]
+
+MOVED = 1e-6
+"""Share of an eigenvalue by which rounding may move it: as much as a check of eigenvalues allows."""
+_ROUNDING = 4 * np.finfo(float).eps  # relative, of what a few operations make of the rig's numbers
 
 
 @question
@@ -48,9 +52,24 @@ def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.compl
     padding if massless bodies leave fewer states.
     """
     with np.errstate(all="ignore"):
-        found = _eigenvalues(point, late)
+        found = _eigenvalues(point, late)[0]
         order = np.lexsort((-found.imag, -found.real), axis=-1)
         return np.take_along_axis(found, order, axis=-1)
+
+
+@question
+def digits_lost(point: OperatingPoint) -> NDArray[np.bool_]:
+    """True where rounding of the state matrix moves an eigenvalue by more than `MOVED` of it, (...).
+
+    An entry of that matrix adds the stiffnesses of several links, so that rounding of the stiffest may hide others. To
+    first order an eigenvalue moves by |w| |A| |v| times the relative rounding of A; w and v are its eigenvectors, with
+    w v = 1. False where the characteristic polynomial is written out, or there are delays.
+    """
+    if point.model.delays or is_written_out(point.model):
+        return np.zeros(point.shape, dtype=bool)
+    with np.errstate(all="ignore"):
+        found, sizes = _eigenvalues(point, ())
+        return np.asarray(np.any(_ROUNDING * sizes > MOVED * np.abs(found), axis=-1))
 
 
 def _polynomial(point: OperatingPoint, late: Delays) -> Array:
@@ -72,8 +91,9 @@ def _polynomial(point: OperatingPoint, late: Delays) -> Array:
         return np.asarray(c.real * (sign * np.exp(logarithm))[..., None])
 
 
-def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
-    """Eigenvalues of the state matrix in any order, (..., n)."""
+@question
+def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.complex128], Array]:
+    """Eigenvalues of the state matrix in any order, and by how much a relative change of its entries moves them."""
     blocks = blocks_of(point, (), (), late)
     rate_x, rate_z, balance_x, balance_z = (blocks[i] for i in (0, 2, 6, 8))  # in the order of `Descriptor`
     good = np.all([np.all(np.isfinite(one), axis=(-2, -1)) for one in (rate_x, rate_z, balance_x, balance_z)], axis=0)
@@ -83,22 +103,31 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
         whole = np.where(good[..., None, None], whole, np.eye(balance_z.shape[-1]))
         state = rate_x - rate_z @ np.linalg.solve(whole, np.where(good[..., None, None], balance_x, 0.0))
         good = good & np.all(np.isfinite(state), axis=(-2, -1))
-        found = np.linalg.eigvals(np.where(good[..., None, None], state, 0.0)).astype(complex)
-        return np.where(good[..., None], found, np.nan)
+        found, sizes = _of_matrix(np.where(good[..., None, None], state, 0.0))
+        return np.where(good[..., None], found, np.nan), sizes
     flat = [block.reshape(good.size, *block.shape[-2:]) for block in blocks]
     rows = [_single_rig(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
-    width = max((len(row) for row in rows if row is not None), default=0)
-    table = np.full((len(rows), width), np.nan, dtype=complex)
+    width = max((len(row[0]) for row in rows if row is not None), default=0)
+    table, moved = np.full((len(rows), width), np.nan, dtype=complex), np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
-        if row is not None and len(row) == width:
-            table[i] = row
-    return table.reshape(*good.shape, width)
+        if row is not None and len(row[0]) == width:
+            table[i], moved[i] = row
+    return table.reshape(*good.shape, width), moved.reshape(*good.shape, width)
 
 
-def _single_rig(model: Model, blocks: list[Array]) -> NDArray[np.complex128] | None:
-    """Eigenvalues of a single rig; None if the balances do not determine the motion."""
+def _of_matrix(a: Array) -> tuple[NDArray[np.complex128], Array]:
+    """Eigenvalues of matrices (..., n, n), and by how much a relative change of all entries moves each, (..., n)."""
+    found, right = np.linalg.eig(a)
+    singular = np.linalg.det(right) == 0  # of an eigenvalue that is there twice with one eigenvector
+    left = np.linalg.inv(np.where(singular[..., None, None], np.eye(a.shape[-1]), right))
+    sizes = np.einsum("...ij,...jk,...ki->...i", np.abs(left), np.abs(a), np.abs(right))
+    return found.astype(complex), np.where(singular[..., None], 0.0, sizes)
+
+
+def _single_rig(model: Model, blocks: list[Array]) -> tuple[NDArray[np.complex128], Array] | None:
+    """Eigenvalues of a single rig and how they move; None if the balances do not determine the motion."""
     try:
-        return np.asarray(np.linalg.eigvals(descriptor(model, (), blocks).solved((), ()).a), dtype=complex)
+        return _of_matrix(descriptor(model, (), blocks).solved((), ()).a)
     except NotAvailable:
         return None
 

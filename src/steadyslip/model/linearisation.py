@@ -43,10 +43,11 @@ class Linearisation:
     Attributes
     ----------
     columns : tuple of sympy.Symbol
-        Displacements, velocities, memory variables, integral, unknown friction stresses.
+        Displacements, velocities, memory variables, integral, unknown friction stresses, kept stresses.
     rows : dict
         For each column the gradient of its rate, with respect to columns, accelerations, delayed symbols and inputs;
-        for a velocity that of the balance of forces, for a friction stress that of its law minus friction.
+        for a velocity that of the balance of forces, for a friction stress that of its law minus friction, for a kept
+        stress that of its definition minus the stress.
     outputs : dict
         Gradients of the observables.
     """
@@ -58,14 +59,15 @@ class Linearisation:
 
 
 @question
-def linearise(model: Model) -> Linearisation:
-    """Differentiate a Model at steady sliding."""
+def linearise(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> Linearisation:
+    """Differentiate a Model at steady sliding; the intermediate stresses `kept` are not eliminated but unknowns."""
     velocities = {one.displacement: one.velocity for one in model.coordinates}
     columns: dict[sp.Symbol, None] = {}
     for item in model.variables:  # velocities of massless bodies are columns too, though they are no variables
         columns |= {item.symbol: None} | ({velocities[item.symbol]: None} if item.symbol in velocities else {})
     columns |= dict.fromkeys(contact.friction for contact in model.contacts if contact.unknown is contact.friction)
     inputs = [s for name, s in model.inputs.items() if name != "time"]
+    columns |= dict.fromkeys(kept)
     basis = [*columns, *(one.acceleration for one in model.coordinates), *model.late, *inputs]
     intermediate: dict[sp.Symbol, Gradient] = {}
 
@@ -82,10 +84,12 @@ def linearise(model: Model) -> Linearisation:
         return total
 
     for name, definition in model.definitions.items():
-        intermediate[name] = gradient(definition)
+        if name not in kept:
+            intermediate[name] = gradient(definition)
     rows = {symbol: gradient(rate) for symbol, rate in model.rate_of.items()}
     balances = {one.velocity: one.balance for one in model.coordinates if one.balance is not None}
     balances |= {c.friction if c.unknown is c.friction else c.velocity: c.balance for c in model.contacts}
+    balances |= {symbol: model.definitions[symbol] - symbol for symbol in kept}
     rows |= {symbol: gradient(balance) for symbol, balance in balances.items()}
     outputs = {name: gradient(expression) for name, (expression, _) in model.observables.items()}
     return Linearisation(model, tuple(columns), rows, outputs)
@@ -143,9 +147,22 @@ def _determinant(model: Model) -> Polynomial | None:
     if model.is_single:
         return _single_determinant(model)
     try:
-        return machine_determinant(model, characteristic_rows(model))
+        tensions = _loading_tensions(model)
+        return machine_determinant(model, characteristic_rows(model, tensions), tensions)
     except TooManyTerms:
         return None
+
+
+def _loading_tensions(model: Model) -> tuple[sp.Symbol, ...]:
+    """Forces of links (as stresses) on which the normal stress or the friction of a contact depends.
+
+    Such a force acts on a contact and on the bodies that the link joins. In a determinant that has it as an unknown,
+    the terms of these that cancel for every stiffness of the link cancel exactly.
+    """
+    springs = [contact.spring for contact in model.contacts if contact.spring in model.definitions]
+    using = [e for symbol, e in model.definitions.items() if symbol not in springs]
+    using += [contact.balance for contact in model.contacts] + list(model.rates)
+    return tuple(spring for spring in springs if any(sp.sympify(e).has(spring) for e in using))
 
 
 def is_written_out(model: Model) -> bool:
@@ -178,16 +195,17 @@ def _single_determinant(model: Model) -> Polynomial:
 
 
 @question
-def characteristic_rows(model: Model) -> dict[sp.Symbol, list[Polynomial]]:
+def characteristic_rows(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> dict[sp.Symbol, list[Polynomial]]:
     """Characteristic matrix; each entry has coefficients by exponents of s and of exp(−s delay) of each delay.
 
-    Columns are displacements, memory variables, integral, unknown friction stresses. Rows, named as in `Linearisation`,
-    are balances of forces, s times variables minus their rates, and friction stresses minus their laws.
+    Columns are displacements, memory variables, integral, unknown friction stresses and the stresses `kept`. Rows,
+    named as in `Linearisation`, are balances of forces, s times variables minus their rates, and stresses minus their
+    laws.
     """
-    linear = linearise(model)
+    linear = linearise(model, kept)
     bodies = {one.displacement: one for one in model.coordinates}
     places = {one.velocity: one.displacement for one in model.coordinates}
-    frictions = {contact.friction for contact in model.contacts}
+    stresses = {contact.friction for contact in model.contacts}.union(kept)
     columns = [symbol for symbol in linear.columns if symbol not in places]
     late = [
         (symbol, places.get(base, base), (int(base in places), *(int(delay == own) for own in model.delays)))
@@ -208,7 +226,7 @@ def characteristic_rows(model: Model) -> dict[sp.Symbol, list[Polynomial]]:
                 parts |= {(1, *nothing): row[body.velocity], (2, *nothing): row[body.acceleration]}
             parts |= {powers: row[symbol] for symbol, base, powers in late if base is other}
             entry = {powers: sign * e for powers, e in parts.items()}
-            if other is column and column not in bodies and column not in frictions:
+            if other is column and column not in bodies and column not in stresses:
                 entry[(1, *nothing)] = entry.get((1, *nothing), sp.Integer(0)) + 1
             entries.append({powers: e for powers, e in entry.items() if e != 0})
         found[row_symbol] = entries

@@ -19,7 +19,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
 from steadyslip.core.expressions import ArrayFunction, occurrences
 from steadyslip.core.questions import question
-from steadyslip.model.eigenvalues import coefficients_from_eigenvalues
+from steadyslip.model.eigenvalues import coefficients_from_eigenvalues, digits_lost
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import (
     characteristic_coefficients,
@@ -101,7 +101,8 @@ def _steady_function(model: Model) -> ArrayFunction:
 def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
     """True for each rig whose values and slopes of the equations in steady sliding are finite, shape of the point.
 
-    Without steady sliding: True if the equation for the normal stress is finite, so that its absence is certain.
+    Without steady sliding: True if the equation for the normal stress is finite, so that its absence is certain. False
+    for rigs of an array whose eigenvalues rounding hides; those of a single rig are computed with many digits.
     """
     with np.errstate(all="ignore"):
         c, _ = quasipolynomial(point)
@@ -112,6 +113,8 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
         values &= ~_underflows(point)
+        if point.shape:
+            values &= ~digits_lost(point)
         known = ~out_of_range(point.model, point.arguments, point.shape)
         return np.asarray(known & (~point.exists | (slopes & values)))
 
@@ -160,7 +163,9 @@ def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
         least = np.min(size, initial=1.0, where=size != 0) if np.ndim(value) else size or 1.0
         if not (least > 1 / ORDINARY and np.max(size, initial=0.0) < ORDINARY):
             return False
-    return (complete and not np.any(_underflows(point))) or _is_rational(point.model)
+    return ((complete and not np.any(_underflows(point))) or _is_rational(point.model)) and not np.any(
+        digits_lost(point)
+    )
 
 
 @question
@@ -180,6 +185,30 @@ def require_range(point: OperatingPoint) -> None:
     """
     if not in_range(point):
         raise out_of_range_error(point)
+
+
+def require_digits(point: OperatingPoint) -> None:
+    """Raise NotAvailable if rounding hides eigenvalues of a single rig in arrays, with which edges are searched.
+
+    Raises
+    ------
+    NotAvailable
+        Naming the largest stiffness.
+    """
+    if np.any(digits_lost(point)):
+        raise NotAvailable(f"in double precision no edge of this rig can be searched: {hidden_by_stiffest(point)}")
+
+
+def hidden_by_stiffest(point: OperatingPoint) -> str:
+    """Clause on why eigenvalues of a single rig are hidden, and what to do."""
+    stiff = max(point.model.with_role("stiffness"), key=lambda name: float(point.named()[name]), default="")
+    which = (
+        f"; {stiff} = {float(point.named()[stiff]):.4g} {point.model.roles[stiff].unit} is the largest" if stiff else ""
+    )
+    return (
+        f"rounding of the largest terms hides the least{which}; write links that are as good as rigid as rigid "
+        "(stiffness = 'rigid' in a file, steadyslip.joined)"
+    )
 
 
 def warn_of_range(count: int, size: int) -> None:

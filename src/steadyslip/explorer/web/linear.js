@@ -1,7 +1,7 @@
 // Linear stability of a rig at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
 // The equations themselves are generated (steadyslip/explorer/equations.py).
 import { modeOf } from "./modes.js";
-import { dampingOfPairs, roots } from "./polynomials.js";
+import { roots } from "./polynomials.js";
 
 /** @typedef {import("./polynomials.js").Complex} Complex */
 /** @typedef {{low: number, high: number}} Interval */
@@ -252,9 +252,10 @@ export class Linear {
 
   /** True if a root on the axis decides stability, because no other root grows. @param {Complex[]} found @param {boolean} neutral true if one root is zero */
   edgeDecides(found, neutral) {
-    const { edge } = this.facts, least = Math.min(...found.map((s) => Math.hypot(s.re, s.im)));
-    const grows = found.some(({ re, im }) => re > edge * Math.hypot(re, im) && !(neutral && Math.hypot(re, im) <= least));
-    return (neutral || Math.abs(0.5 * dampingOfPairs(found)) <= edge) && !grows;
+    const { edge } = this.facts, sizes = found.map((s) => Math.hypot(s.re, s.im)), least = Math.min(...sizes), some = sizes.filter((one) => one > 0);
+    const mean = Math.exp(some.reduce((sum, one) => sum + Math.log(one), 0) / Math.max(some.length, 1));
+    const onAxis = (i) => edge * Math.min(sizes[i], mean), grows = found.some(({ re }, i) => re > onAxis(i) && !(neutral && sizes[i] <= least));
+    return (neutral || found.some(({ re, im }, i) => im && Math.abs(re) <= onAxis(i))) && !grows;
   }
 
   /** Stable intervals of k > 0 and their ends; in closed form where there is one, which loses no digits. */

@@ -161,20 +161,3 @@ export function roots(given) {
   }
   return found.sort((a, b) => b.re - a.re || b.im - a.im);
 }
-
-/**
- * Damping ratios' kin: scale-free distances of the least damped pair and of the least damped real root from the axis.
- * @param {Complex[]} found
- * @returns {number} of the pair, NaN if there is none
- */
-export function dampingOfPairs(found) {
-  let least = Infinity;
-  for (let i = 0; i < found.length; i++) {
-    for (let j = i + 1; j < found.length; j++) {
-      const a = found[i], b = found[j], real = a.im === 0 && b.im === 0;
-      const size = real ? a.re * b.re : a.re * a.re + a.im * a.im;
-      if (real ? size > 0 : a.re === b.re && a.im === -b.im) least = Math.min(least, -(a.re + b.re) / Math.sqrt(size));
-    }
-  }
-  return least === Infinity ? NaN : least;
-}

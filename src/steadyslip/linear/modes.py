@@ -66,16 +66,17 @@ class Mode(Displayed):
         if len(leads) == 2 and self._opposed(*leads):
             parts[0] += WORDS["opposed"]
         if rest:
-            shares = [WORDS["share"].format(name=_called(name), share=format_percent(sizes[name])) for name in rest]
-            parts.append(", ".join(shares))
+            moves = [WORDS["share"].format(name=_called(name), share=format_percent(sizes[name])) for name in rest]
+            parts.append(", ".join(moves))
         if still:
             parts.append(f"{_listed(still)} {_does('still', still)}")
         text = ", ".join(parts)
         if self.energy:
-            most = max(self.energy, key=lambda name: self.energy[name])
-            text += WORDS["energy"].format(
-                share=format_percent(round(self.energy[most], 3)), name=most.partition(".")[2]
-            )
+            shares = {
+                name: round(share, 3) for name, share in self.energy.items()
+            }  # kinetic and elastic are often alike
+            most = max(shares, key=lambda name: shares[name])
+            text += WORDS["energy"].format(share=format_percent(shares[most]), name=most.partition(".")[2])
         return text
 
     def _opposed(self, one: str, other: str) -> bool:

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 import steadyslip as ss
 from command import run
+from steadyslip.nonlinear import forced
 
 ROCK = {"a": 0.010, "b": 0.008, "d_c": 1e-5, "mu_ref": 0.6, "v_ref": 1e-5}
 OSCILLATING = {  # amplitude, period: mean shear over mean normal stress, gain, phase in degrees
@@ -114,6 +115,8 @@ def test_what_cannot_swing_any_more():
     assert beside.status[0, 0] == "periodic"
     assert beside.status[1, 0] in ("every 2nd period", "irregular", "blow-up")
     assert "lost from an amplitude of" in str(found)
+    assert f"deg, linear to {found.told(found.linear_to[0])}, lost from {found.told(found.lost_at[0])}" in str(found)
+    assert f"\n{beside.status[1, 0]}: " in str(beside)
     assert json.loads(json.dumps(found.to_dict()))["gains"][1] == [None]
 
 
@@ -320,15 +323,30 @@ def test_a_machine_of_one_body_answers_as_its_slider():
     periods, amplitudes = [5.0, 20.0], [1e6]
     one = ss.response(slider, periods, output="shear-stress", amplitudes=amplitudes)
     other = ss.response(machine, periods, output="face.friction_force", amplitudes=amplitudes)
-    assert other.input == "face.press"
+    assert (other.input, other.on, other.names) == ("normal-stress", "face", ("face.press", "face.friction_force"))
+    assert other.title == "face.friction-force under normal-stress at face"
+    assert other.steady_friction == pytest.approx(one.steady_friction)
     for name in ("gain", "phase", "gains", "phases", "shift", "distortion", "mean_friction"):
         np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=1e-6)
+
+
+def test_every_status_is_explained(monkeypatch):
+    """In a line below the tables; Ctrl-C during a simulation ends the response instead of counting as a status."""
+    for status, words in (("too many steps", "says nothing of the motion"), ("contact lost", "normal stress fell")):
+        with monkeypatch.context() as patch:
+            patch.setattr(forced, "simulate", lambda *a, word=status, **o: replace(ss.simulate(*a, **o), status=word))
+            found = str(ss.response(press(), [5.0], amplitudes=[1e5]))
+        assert f"\n           5 s  {status}\n{status}: " in found
+        assert words in found
+    monkeypatch.setattr(forced, "simulate", lambda *a, **o: replace(ss.simulate(*a, **o), status="interrupted"))
+    with pytest.raises(KeyboardInterrupt):
+        ss.response(press(), [5.0], limits=True)
 
 
 def test_refusals():
     with pytest.raises(ss.UnknownNameError, match="unknown input 'heat'"):
         ss.response(press(), [1.0], input="heat")
-    with pytest.raises(ss.UnknownNameError, match="unknown output"):
+    with pytest.raises(ss.UnknownNameError, match=r"unknown output 'noise'; allowed: .*, shear-stress"):
         ss.response(press(), [1.0], output="noise")
     with pytest.raises(ss.ParameterError, match="periods"):
         ss.response(press(), [2.0, 1.0])
@@ -340,6 +358,9 @@ def test_refusals():
         ss.response(two_bodies(), [1.0])
     with pytest.raises(ss.NotAvailable, match="injection needs a contact of law pore-fluid; this rig has none"):
         ss.response(press(), [1.0], input="injection")
+    late = replace(press(), drive=ss.machine.PID(velocity=1e-5, kp=1e9, ki=1e8, delay=0.01))
+    with pytest.raises(ss.NotAvailable, match=r"^the response of a rig with a delay is not offered; set"):
+        ss.response(late, [1.0])
 
 
 def test_the_command(tmp_path):
@@ -348,11 +369,14 @@ def test_the_command(tmp_path):
     ss.write_rig(press(), rig)
     words = ["response", str(rig), "--output", "friction", "--periods", "1s", "100s", "--points", "5"]
     found = run(*words, "--amplitude", "1 MPa", "-o", str(table), "-o", str(picture))
-    assert "friction under normal_disturbance" in found.stdout
+    assert found.stdout.startswith("friction under normal-stress: gain")
     assert "amplitude 1 MPa" in found.stdout
-    lines = table.read_text().splitlines()
-    assert lines[0].startswith("amplitude (Pa),period (s),gain (1/Pa),")
+    lines = [line.split(",") for line in table.read_text().splitlines()]
+    assert lines[0][:3] == ["amplitude (Pa)", "period (s)", "gain (1/Pa)"]
     assert len(lines) == 11
+    means = [float(line[lines[0].index("mean friction (1)")]) for line in lines[1:]]
+    assert means[:5] == pytest.approx([0.6] * 5, rel=1e-12)
+    assert means[5] == pytest.approx(settled(1e6, 1.0)[0], rel=1e-6)
     assert picture.read_text().startswith("<?xml")
     wrong = run(*words, "--amplitude", "1 mm")
     assert (wrong.returncode, "--amplitude" in wrong.stderr) == (2, True)

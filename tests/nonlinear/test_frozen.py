@@ -69,6 +69,7 @@ def test_injection_unloads():
     found = ss.frozen_verdicts(press(wet), ss.protocol.InjectionRamp(at=0, by=8e6, duration=80), until=100)
     ((time, verdict),) = found.crossings
     assert (time, verdict) == (pytest.approx(50, abs=0.01), "stable")
+    assert "stable, effective normal stress 10 MPa" in str(found)
 
 
 @pytest.mark.parametrize(
@@ -106,6 +107,8 @@ def test_a_machine_of_two_contacts():
     )
     assert drained.crossings[0][0] < found.crossings[0][0]
     assert {*drained.slip_rates} == {"face", "other"}
+    assert ", effective normal force of other " in str(drained)
+    assert drained.to_dict()["labels"]["contacts.face.contact.preload"] == "contacts.face.contact.preload"
 
 
 def test_nothing_changes_where_nothing_matters():
@@ -115,6 +118,16 @@ def test_nothing_changes_where_nothing_matters():
     assert "the same at every moment" in str(found)
     stopped = ss.frozen_verdicts(press(), ss.protocol.VelocityRamp(at=1, to=0.0, duration=20), until=60)
     assert stopped.crossings[-1][1] == "no steady sliding"
+
+
+def test_the_columns_of_an_injection(tmp_path):
+    """The load less the pressure is no preload; with an area it is a force."""
+    wet = press(ss.laws.PoreFluid(preload=15e6, suction=0.0, **WET), area=2.0)
+    found = ss.frozen_verdicts(wet, ss.protocol.InjectionRamp(at=0, by=8e6, duration=80), until=100)
+    found.to_csv(tmp_path / "verdicts.csv")
+    titles, first, *_ = (tmp_path / "verdicts.csv").read_text().splitlines()
+    assert titles.split(",")[1] == "effective normal force (N)"
+    assert float(first.split(",")[1]) == 30e6
 
 
 def test_refusals():

@@ -47,7 +47,7 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
         for period in found.resonances[:1, 0]:
             one.axvline(period, color=GREY, linestyle=":", linewidth=1)
     axes[-1].set_xlabel("period (s)")
-    axes[0].set_title(f"{found.output.replace('_', ' ')} under {found.input.replace('_', ' ')}", fontsize="medium")
+    axes[0].set_title(found.title.replace("-", " "), fontsize="medium")
     axes[0].legend(fontsize="small")
     return axes
 

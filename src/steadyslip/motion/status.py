@@ -17,7 +17,7 @@ LOST, BLOWN_UP = "contact lost", "blow-up"
 REMEDIES = {
     "done": "",
     "contact lost": "the normal {stress} fell to zero; press harder (preload), or change what takes the load off",
-    "blow-up": "the massless model reaches infinite velocity at this time; give {mass} to follow the motion further",
+    "blow-up": "the massless model reaches infinite velocity; give {mass} to follow the motion further",
     "too many steps": "the limit of steps is used up; shorten the run (--until), loosen --rtol, or report at given "
     "times (--samples, in Python times), for which more steps are allowed; in Python most_steps raises the limit",
     "stuck": "no step is small enough: the equations have no solution beyond this point (without mass, friction that "

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,20 +19,27 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
 from steadyslip.motion import simulate
-from steadyslip.nonlinear.frequency_response import IRREGULAR, NOT_SETTLED, PERIODIC, FrequencyResponse
+from steadyslip.nonlinear.frequency_response import IRREGULAR, NOT_SETTLED, PERIODIC, TOO_MANY_STEPS, FrequencyResponse
 from steadyslip.protocol import DisturbanceHarmonic, InjectionHarmonic, NormalStressHarmonic, VelocityHarmonic
 from steadyslip.protocol.shapes import Harmonic
 
 Array = np.ndarray
-INPUTS = {"drive-velocity": "", "normal-stress": ".press", "push": ".push", "injection": ".pores"}
-"""What swings, and how a machine's input of that kind is named behind its body or contact."""
-PIECES: dict[str, type[Harmonic]] = {
-    "drive-velocity": VelocityHarmonic, "normal-stress": NormalStressHarmonic, "push": DisturbanceHarmonic,
-    "injection": InjectionHarmonic,
-}  # fmt: skip
-OF_SLIDERS = {
-    "drive-velocity": "load_velocity", "normal-stress": "normal_disturbance", "push": "disturbance",
-}  # fmt: skip
+
+
+class SwingingInput(NamedTuple):
+    """Names of a kind of input in the models of sliders and machines, and the piece of a protocol that swings it."""
+
+    slider: str  # empty: as of a machine, of the contact without a name
+    machine: str  # behind the name of a body or contact; of the drive whole
+    piece: type[Harmonic]
+
+
+INPUTS = {
+    "normal-stress": SwingingInput("normal_disturbance", ".press", NormalStressHarmonic),
+    "drive-velocity": SwingingInput("load_velocity", "load_velocity", VelocityHarmonic),
+    "push": SwingingInput("disturbance", ".push", DisturbanceHarmonic),
+    "injection": SwingingInput("", ".pores", InjectionHarmonic),
+}
 SAMPLES = 256  # per period: harmonics up to the 127th are resolved
 LEAST_PERIODS, MOST_PERIODS = 10, 2560  # waited for; twice as many each time
 SETTLED = 1e-7  # difference of two periods, in ranges of the output, below which they are equal
@@ -50,7 +57,6 @@ RISING = Tested(
     "numbers > 0 that rise, in s", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0))
 )
 SIZES = Tested("numbers > 0, in SI units", lambda given: np.size(given) == 0 or _positive(given))
-TOO_MANY_STEPS = "too many steps"  # says nothing of the motion
 COMPARED = 5  # last periods that are compared: repetition up to every 4th is found
 
 
@@ -78,8 +84,8 @@ def response(
         What swings: ``normal-stress`` (added to that of the contact), ``drive-velocity``, ``push`` (a stress on the
         block, or force on a body) or ``injection`` (pressure of the fluid around a contact).
     output : str, optional
-        What answers: an observable of the Model, ``friction``, ``shear-stress``, ``v``, ...; of a machine with the
-        name of its contact or body, ``guide.friction``. Unless given friction, of the first contact.
+        What answers: an observable of the Model, ``friction``, ``shear-stress`` (or ``shear_stress``), ``v``, ...; of a
+        machine with the name of its contact or body, ``guide.friction``. Unless given friction, of the first contact.
     on : str, optional
         Of a machine: the contact that is pressed or injected at, or the body that is pushed; needed where there are
         several.
@@ -128,7 +134,7 @@ def response(
     """
     forced = _Forced(rig, input, on, output, rtol)
     periods, amplitudes = (np.ravel(np.asarray(given, dtype=float)) for given in (periods, amplitudes))
-    answer = transfer(rig, forced.name, forced.output, periods)
+    answer = transfer(rig, *forced.names, periods)
     shape = (len(amplitudes), len(periods))
     numbers = np.full((len(_NUMBERS), *shape), np.nan)
     status = np.full(shape, "", dtype=object)
@@ -146,9 +152,10 @@ def response(
                     step(1)
     found = dict(zip(_NUMBERS, numbers, strict=True))
     return FrequencyResponse(
-        rig, forced.name, forced.output, forced.units, periods, np.abs(answer), np.degrees(np.angle(answer)),
-        amplitudes, **found, status=status.astype(str), linear_to=bounds[0], lost_at=bounds[1],
-        resonances=resonances(rig, forced.name, forced.output, periods[0], periods[-1]), stable=forced.decay < 0,
+        rig, forced.kind, forced.on, spelled(forced.output), forced.names, forced.units, periods, np.abs(answer),
+        np.degrees(np.angle(answer)), amplitudes, **found, steady_friction=forced.friction(forced.steady),
+        status=status.astype(str), linear_to=bounds[0], lost_at=bounds[1],
+        resonances=resonances(rig, *forced.names, periods[0], periods[-1]), stable=forced.decay < 0,
     )  # fmt: skip
 
 
@@ -157,6 +164,12 @@ _NUMBERS = ("gains", "phases", "shift", "mean_friction", "distortion")
 
 def _positive(given: Any) -> bool:
     return NUMBERS.passes(given) and bool(np.all(np.asarray(given) > 0))
+
+
+def spelled(output: str) -> str:
+    """Name of an observable as users type it: with hyphens, but for the name of a body or contact before it."""
+    owner, dot, own = output.rpartition(".")
+    return owner + dot + own.replace("_", "-")
 
 
 def amplitude_unit(rig: Slider | Machine, input: str = "normal-stress", on: str | None = None) -> str:
@@ -172,8 +185,14 @@ class _Forced:
         model = build_model(rig)
         if self.kind not in INPUTS:
             raise UnknownNameError("input", input, INPUTS)
-        self.name, self.on = self._input(model, on)
+        if model.delays:
+            raise NotAvailable(
+                "the response of a rig with a delay is not offered; set the delay to 0, or ask for its stability with "
+                "analyze, stable_values or boundary"
+            )
+        name, self.on = self._input(model, on)
         self.output = self._output(model, output)
+        self.names = (name, self.output)
         piece = self._piece(1.0, 1.0)
         unit = next(a.role.unit for name, a in parameters(piece).items() if name == "amplitude")
         self.units = (unit_of(rig, piece, unit), model.observables[self.output][1])
@@ -183,13 +202,13 @@ class _Forced:
 
     def _input(self, model: Model, on: str | None) -> tuple[str, str | None]:
         """Name in the model of the oscillating input, and the body or contact on which it acts."""
-        ending = INPUTS[self.kind]
-        if self.kind == "drive-velocity":
-            return "load_velocity", None
+        of_slider, ending, _ = INPUTS[self.kind]
+        if ending == of_slider:
+            return ending, None
         if isinstance(self.rig, Slider) and on is not None:
             raise ParameterError([Problem("on", f"got {on!r}; a slider is one block, leave it out")])
-        if isinstance(self.rig, Slider) and self.kind in OF_SLIDERS:
-            return OF_SLIDERS[self.kind], None
+        if isinstance(self.rig, Slider) and of_slider:
+            return of_slider, None
         possible = [name.removesuffix(ending) for name in model.inputs if name.endswith(ending)]
         if on is None and len(possible) == 1:
             on = possible[0]
@@ -204,14 +223,14 @@ class _Forced:
     def _output(self, model: Model, output: str | None) -> str:
         if output is None:
             return next(name for name in model.observables if name.rpartition(".")[2] == "friction")
-        name = output if output in model.observables else output.replace("-", "_")
-        if name not in model.observables:
-            raise UnknownNameError("output", output, model.observables)
-        return name
+        known = {spelled(name): name for name in model.observables}
+        if spelled(output) not in known:
+            raise UnknownNameError("output", output, known)
+        return known[spelled(output)]
 
     def _piece(self, amplitude: float, period: float) -> Harmonic:
         on: dict[str, Any] = {} if self.on is None else {"on": self.on}
-        return PIECES[self.kind](amplitude=amplitude, period=period, **on)
+        return INPUTS[self.kind].piece(amplitude=amplitude, period=period, **on)
 
     def swung(self, amplitude: float, period: float, settled: float = SETTLED) -> tuple[str, tuple[float, ...]]:
         """Simulate to the final motion: its description, and the numbers named in `_NUMBERS` (NaN if it has none)."""
@@ -250,6 +269,8 @@ class _Forced:
         run = simulate(
             self.rig, self._piece(amplitude, period), until=count * period, times=times, events=False, rtol=rtol
         )
+        if run.interrupted:
+            raise KeyboardInterrupt
         return {name: np.asarray(run[name]) for name in self.steady}, run.status
 
     def _numbers(self, columns: dict[str, Array], last: Array, amplitude: float) -> tuple[float, ...]:
@@ -257,13 +278,16 @@ class _Forced:
         first = 1j * parts[1] / amplitude  # the input is a sine, which is -i e^(iωt)
         higher = math.sqrt(float(np.sum(np.abs(parts[2:]) ** 2))) / abs(parts[1]) if parts[1] else math.nan
         shift = float(np.mean(last)) - self.steady[self.output]
-        friction = math.nan
-        for shear, normal in (("shear_stress", "normal_stress"), ("friction_force", "normal_force")):
-            own = self.output.rpartition(".")[0] + "." if "." in self.output else ""
-            if own + shear in columns:
-                means = [float(np.mean(columns[own + one][-SAMPLES:])) for one in (shear, normal)]
-                friction = means[0] / means[1]
+        friction = self.friction({name: float(np.mean(own[-SAMPLES:])) for name, own in columns.items()})
         return abs(first), float(np.degrees(np.angle(first))), shift, friction, higher
+
+    def friction(self, means: Mapping[str, float]) -> float:
+        """Mean friction over mean normal stress (or force) where the output is; NaN if that is no contact."""
+        own = self.output.rpartition(".")[0] + "." if "." in self.output else ""
+        for shear, normal in (("shear_stress", "normal_stress"), ("friction_force", "normal_force")):
+            if own + shear in means:
+                return means[own + shear] / means[own + normal]
+        return math.nan
 
     def limits(self, period: float, gain: float) -> tuple[float, float]:
         """Amplitudes up to which the gain is linear, and from which steady sliding is lost."""

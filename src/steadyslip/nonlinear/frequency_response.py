@@ -16,9 +16,18 @@ from steadyslip.files.output import write_text
 from steadyslip.linear.frequency import transfer
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.motion.status import remedy
 
 Array = np.ndarray
 PERIODIC, NOT_SETTLED, IRREGULAR = "periodic", "not settled", "irregular"
+TOO_MANY_STEPS = "too many steps"  # says nothing of the motion
+EXPLAINED = {
+    NOT_SETTLED: "the motion still drifts after the most periods that are waited for, so it has no answer yet",
+    IRREGULAR: "the motion repeats in no few periods of the input: steady sliding is lost",
+    TOO_MANY_STEPS: "the simulation took all the steps that are allowed before it had settled, which says nothing of "
+    "the motion; try a larger rtol (in Python), or fewer short periods",
+}
+BEYOND = "beyond the steady value"
 MOST_TOLD = 4  # resonances listed in the text
 
 
@@ -29,8 +38,14 @@ class FrequencyResponse(ReadOnly):
     Attributes
     ----------
     rig : Slider or Machine
-    input, output : str
-        As in `steadyslip.build_model`: a name of ``inputs``, and one of ``observables``.
+    input : str
+        What swings: ``normal-stress``, ``drive-velocity``, ``push`` or ``injection``.
+    on : str or None
+        Body or contact of a machine that it acts on.
+    output : str
+        What answers: ``friction``, ``shear-stress``, ``guide.friction-force``, ...
+    names : tuple of str
+        The same in `steadyslip.build_model`: a name of ``inputs``, and one of ``observables``.
     units : tuple of str
         Of input and output.
     periods : ndarray (n,)
@@ -46,6 +61,8 @@ class FrequencyResponse(ReadOnly):
         Mean of the output less its steady value.
     mean_friction : ndarray (m, n)
         Mean friction over mean normal stress (or force), of the slider or of the contact whose output it is; else NaN.
+    steady_friction : float
+        The same in steady sliding.
     distortion : ndarray (m, n)
         Root of the sum of squares of all higher harmonics, over the amplitude of the first.
     status : ndarray of str (m, n)
@@ -54,8 +71,8 @@ class FrequencyResponse(ReadOnly):
     linear_to, lost_at : ndarray (n,)
         Amplitude up to which the gain is within 5 % of that of small ones, and amplitude at which steady sliding is
         lost: motion ends, or no longer repeats with the input; as a rule it takes two periods first, and soonest at
-        half the period of a resonance. Stick-slip once in every period is not told apart. NaN where not asked for, inf
-        where larger than the steady value of what swings, and 0 where less than a millionth of that.
+        half the period of a resonance. Stick-slip once in every period repeats and is not lost. NaN if not asked for,
+        inf where larger than the steady value of what swings, and 0 where less than a millionth of that.
     resonances : ndarray (r, 3)
         Largest small-amplitude answers within the range of the periods, wherever they lie between them: period (s),
         gain, phase (degrees); the largest gain first.
@@ -65,7 +82,9 @@ class FrequencyResponse(ReadOnly):
 
     rig: Slider | Machine = field(repr=False)
     input: str
+    on: str | None
     output: str
+    names: tuple[str, str] = field(repr=False)
     units: tuple[str, str]
     periods: Array = field(repr=False)
     gain: Array = field(repr=False)
@@ -76,6 +95,7 @@ class FrequencyResponse(ReadOnly):
     shift: Array = field(repr=False)
     mean_friction: Array = field(repr=False)
     distortion: Array = field(repr=False)
+    steady_friction: float = field(repr=False)
     status: Array = field(repr=False)
     linear_to: Array = field(repr=False)
     lost_at: Array = field(repr=False)
@@ -84,7 +104,7 @@ class FrequencyResponse(ReadOnly):
 
     def transfer(self, periods: Any) -> Array:
         """Small-amplitude transfer function G(iω) at other periods (s), complex, SI units."""
-        return transfer(self.rig, self.input, self.output, np.asarray(periods, dtype=float))
+        return transfer(self.rig, *self.names, np.asarray(periods, dtype=float))
 
     @property
     def shown_units(self) -> tuple[tuple[float, str], tuple[float, str]]:
@@ -103,12 +123,12 @@ class FrequencyResponse(ReadOnly):
         return above / below, "" if given == answered else f"{answered}/{divisor}"
 
     def __str__(self) -> str:
-        lines = [f"{self.output} under {self.input}: gain and phase of small amplitudes"]
+        lines = [f"{self.title}: gain and phase of small amplitudes"]
         if not self.stable:
             lines.append("  steady sliding is UNSTABLE: this answer is never reached, any disturbance outgrows it")
         for i in _some(len(self.periods)):
             period = format_quantity(self.periods[i], "s")
-            lines.append(f"  {period:>12}  {self._gain(self.gain[i])}  {self.phase[i]:.4g} deg")
+            lines.append(f"  {period:>12}  {self._gain(self.gain[i])}  {self.phase[i]:.4g} deg{self._limits_at(i)}")
         for period, gain, phase in self.resonances[:MOST_TOLD]:
             place = format_quantity(period, "s")
             lines.append(f"resonance  period {place}, gain {self._gain(gain)}, phase {phase:.4g} deg")
@@ -116,7 +136,12 @@ class FrequencyResponse(ReadOnly):
             lines.append(f"amplitude {self.told(amplitude)}")
             for i in _some(len(self.periods)):
                 lines.append(f"  {format_quantity(self.periods[i], 's'):>12}  {self._at(j, i)}")
-        return "\n".join([*lines, *self._limits()])
+        return "\n".join([*lines, *self._explained(), *self._limits()])
+
+    @property
+    def title(self) -> str:
+        """Output and input in words, such as ``shear-stress under normal-stress``."""
+        return f"{self.output} under {self.input}" + (f" at {self.on}" if self.on else "")
 
     def told(self, amplitude: float) -> str:
         """Format an amplitude of the input for display."""
@@ -135,6 +160,21 @@ class FrequencyResponse(ReadOnly):
             f"{100 * self.distortion[j, i]:.3g} %"
         )
 
+    def _explained(self) -> list[str]:
+        """One line for each status in the tables that is not an answer."""
+        found = dict.fromkeys(self.status.ravel().tolist())
+        return [f"{one}: {self._explanation(one)}" for one in found if one != PERIODIC]
+
+    def _explanation(self, status: str) -> str:
+        if status.startswith("every"):
+            return "the motion does not repeat with the input, but later: steady sliding is lost"
+        return EXPLAINED.get(status) or remedy(status, isinstance(self.rig, Machine), self._area)
+
+    def _limits_at(self, i: int) -> str:
+        """Both limits of amplitude at a period, for its row; empty where they were not asked for."""
+        ends = [self.told(one[i]) if np.isfinite(one[i]) else BEYOND for one in (self.linear_to, self.lost_at)]
+        return "" if np.isnan(self.linear_to[i]) else ", linear to {}, lost from {}".format(*ends)
+
     def _limits(self) -> list[str]:
         lines = []
         limits = (("linear to within 5 % up to", self.linear_to), ("steady sliding is lost from", self.lost_at))
@@ -152,8 +192,9 @@ class FrequencyResponse(ReadOnly):
         arrays = ("periods", "gain", "phase", "resonances", "amplitudes", "gains", "phases", "shift", "mean_friction",
                   "distortion", "linear_to", "lost_at")  # fmt: skip
         return {
-            "input": self.input, "output": self.output, "units": list(self.units), "stable": self.stable,
-            **{name: _plain(getattr(self, name)) for name in arrays}, "status": self.status.tolist(),
+            "input": self.input, "on": self.on, "output": self.output, "units": list(self.units),
+            "stable": self.stable, **{name: _plain(getattr(self, name)) for name in arrays},
+            "steady_friction": _plain(np.array(self.steady_friction)), "status": self.status.tolist(),
         }  # fmt: skip
 
     def to_csv(self, path: str | PathLike[str]) -> None:
@@ -168,13 +209,15 @@ class FrequencyResponse(ReadOnly):
         """
         ((given, amplitude_unit), (answered, shift_unit)), (ratio, unit) = self.shown_units, self.gain_unit
         titles = (f"amplitude ({amplitude_unit})", "period (s)", f"gain ({unit or '1'})", "phase (deg)",
-                  f"shift ({shift_unit})", "distortion (1)", "status", f"linear to ({amplitude_unit})",
-                  f"lost at ({amplitude_unit})")  # fmt: skip
+                  f"shift ({shift_unit})", "mean friction (1)", "distortion (1)", "status",
+                  f"linear to ({amplitude_unit})", f"lost at ({amplitude_unit})")  # fmt: skip
         limits = (given * self.linear_to, given * self.lost_at)
-        nothing = np.zeros_like(self.periods)
-        columns: list[tuple[Any, ...]] = [(ratio * self.gain, self.phase, nothing, nothing, ["linear"] * len(nothing))]
+        nothing, steady = np.zeros_like(self.periods), np.full_like(self.periods, self.steady_friction)
+        columns: list[tuple[Any, ...]] = [
+            (ratio * self.gain, self.phase, nothing, steady, nothing, ["linear"] * len(nothing))
+        ]
         for j in range(len(self.amplitudes)):
-            own = (self.shift[j] * answered, self.distortion[j], self.status[j])
+            own = (self.shift[j] * answered, self.mean_friction[j], self.distortion[j], self.status[j])
             columns.append((ratio * self.gains[j], self.phases[j], *own))
         rows: list[tuple[Any, ...]] = [titles]
         for amplitude, own in zip((0.0, *(given * self.amplitudes)), columns, strict=True):

@@ -51,7 +51,10 @@ class FrozenVerdicts(ReadOnly):
     t : ndarray (n,)
         Moments, s.
     values : dict of str to ndarray (n,)
-        Parameters of the rig that the protocol changes, SI units: velocity of the drive, preloads.
+        Parameters of the rig that the protocol changes, SI units: velocity of the drive, preloads; a preload less the
+        injected pressure is the effective normal stress.
+    labels : dict of str to str
+        Words for them: their names, or ``effective normal stress``.
     growth_rate : ndarray (n,)
         Of the leading eigenvalue, 1/s; NaN where there is no steady sliding.
     critical_stiffness : ndarray (n,)
@@ -70,6 +73,7 @@ class FrozenVerdicts(ReadOnly):
     run: History = field(repr=False)
     t: Array = field(repr=False)
     values: dict[str, Array] = field(repr=False)
+    labels: dict[str, str] = field(repr=False)
     growth_rate: Array = field(repr=False)
     critical_stiffness: Array = field(repr=False)
     crossings: tuple[tuple[float, str], ...]
@@ -110,15 +114,22 @@ class FrozenVerdicts(ReadOnly):
         return {name: self.run[f"{name}.slip_rate"] for name in self.rig.contacts}
 
     def _at(self, time: float) -> str:
-        known = self.rig.parameters()
-        found = ((name, float(np.interp(time, self.t, own))) for name, own in self.values.items())
-        return ", ".join(f"{n} {format_quantity(v, known[n].role.unit, area=self.rig.area_of(n))}" for n, v in found)
+        found = {name: float(np.interp(time, self.t, own)) for name, own in self.values.items()}
+        shown = ((value, *self._shown(name)) for name, value in found.items())
+        return ", ".join(f"{label} {format_quantity(factor * value, unit)}" for value, label, factor, unit in shown)
+
+    def _shown(self, name: str) -> tuple[str, float, str]:
+        """Label, factor and display unit of a changed parameter; forces where the rig has an area."""
+        factor, unit = outside(self.rig.parameters()[name].role.unit, self.rig.area_of(name))
+        label = self.labels[name]
+        return label.replace("normal stress", "normal force") if unit == "N" else label, factor, unit
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-ready dict, SI units; missing values are null."""
         return {
             "t": self.t.tolist(),
             "values": {name: own.tolist() for name, own in self.values.items()},
+            "labels": self.labels,
             "growth_rate": _plain(self.growth_rate),
             "critical_stiffness": _plain(self.critical_stiffness),
             "crossings": [list(one) for one in self.crossings],
@@ -137,11 +148,10 @@ class FrozenVerdicts(ReadOnly):
         NotAvailable
             If the file cannot be written.
         """
-        known = self.rig.parameters()
         columns = {"time (s)": self.t}
         for name, own in self.values.items():
-            factor, unit = outside(known[name].role.unit, self.rig.area_of(name))
-            columns[f"{name} ({unit})"] = factor * own
+            label, factor, unit = self._shown(name)
+            columns[f"{label} ({unit})"] = factor * own
         columns["growth rate (1/s)"] = self.growth_rate
         if isinstance(self.rig, Slider):
             factor, unit = outside("Pa/m", self.rig.area)
@@ -230,7 +240,8 @@ def frozen_verdicts(
     crossings = tuple(slow.crossings(t, rates))
     begun = 0.0 if rates[0] > 0 else next((time for time, verdict in crossings if verdict == UNSTABLE), np.nan)
     changed = {name: own for name, own in values.items() if np.ptp(own) > 0}
-    found = FrozenVerdicts(rig, run, t, changed, rates, critical, crossings, np.nan, np.nan)
+    labels = {name: slow.effective.get(name, name) for name in changed}
+    found = FrozenVerdicts(rig, run, t, changed, labels, rates, critical, crossings, np.nan, np.nan)
     departure = _departure(found, begun)
     between = (t >= begun) & (t <= departure)
     grown = np.trapezoid(np.where(np.isnan(rates), 0.0, rates)[between], t[between]) if np.any(between) else np.nan
@@ -246,10 +257,14 @@ class _Slow:
             raise NotAvailable("a push or creep has no verdict of its own; change velocity, normal stress or injection")
         _refuse_remembered(rig)
         self.changes: dict[str, dict[int, float]] = {}  # of parameters by a unit of a channel
+        self.effective: dict[str, str] = {}  # words for loads less an injected pressure
         for channel, kind, target in self.acting.named().values():
             if kind == "press":
-                name, share = _load_of(rig, target.removesuffix(PORES))
-                self.changes.setdefault(name, {})[channel] = -share if target.endswith(PORES) else share
+                contact, injected = target.removesuffix(PORES), target.endswith(PORES)
+                name, share = _load_of(rig, contact)
+                self.changes.setdefault(name, {})[channel] = -share if injected else share
+                if injected:
+                    self.effective[name] = "effective normal stress" + (f" of {contact}" if contact else "")
 
     def moments(self, end: float) -> Array:
         """Times (s) of evaluation: evenly spaced, and just before and after each jump."""

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from javascript import Script
+from steadyslip.core.expressions import numpy_asinh_exp
 from steadyslip.kernels import build, primitives
 from steadyslip.kernels.nodes import PRIMITIVES, Program, primitive
 from steadyslip.kernels.primitives import FARTHEST, HUGE, TINY
@@ -145,13 +146,17 @@ def test_powers(languages):
 
 
 def test_asinh_exp(languages):
-    sizes = [0.0, 1e-300, 1e-30, 1e-6, 0.3, 1.0, 50.0, 1e150, 1e300]
-    powers = [0.0, 1e-9, 0.7, 30.0, 300.0, 690.0, 700.0, 709.0, 800.0, 1390.0, 1410.0, 1e4]
+    """Also that of NumPy; e^y may be beyond floating point where the product is not, and the reverse."""
+    sizes = [0.0, TINY, 1e-300, 1e-30, 1e-6, 0.3, 1.0, 50.0, 1e150, 1e300, 1e308, HUGE]
+    powers = [0.0, 1e-9, 0.7, 30.0, 300.0, 690.0, 700.0, 709.0, 800.0, 1060.0, 1100.0, 1390.0, 1399.9, 1400.1, 1410.0]
+    powers += [1417.9, 1420.0, 1450.0, 1460.0, 1500.0, 2100.0, 1e4, 1e16, 1e100, 1e308]
     pairs = np.array([(x * side, y * sense) for x in sizes for side in (1, -1) for y in powers for sense in (1, -1)])
     found = languages(*pairs.T)["asinh_exp"]
+    with np.errstate(all="ignore"):
+        found = np.vstack([found, numpy_asinh_exp(*pairs.T)])
     with mpmath.workdps(60):
         for k, (x, y) in enumerate(pairs):
-            truth = mpmath.asinh(mpmath.mpf(x) * mpmath.exp(mpmath.mpf(max(y, -1400.0))))
+            truth = mpmath.asinh(mpmath.mpf(x) * mpmath.exp(mpmath.mpf(y)))
             for value in found[:, k]:
                 assert in_units(value, truth) <= 15, (x, y, value, truth)
 

@@ -27,6 +27,7 @@ ONE = 0x3FF0000000000000  # the bits of 1.0
 LN2_HIGH, LN2_LOW = 0.6931471805598903, 5.497923018708371e-14  # 42 bits of ln 2: n LN2_HIGH is exact for |n| < 2^11
 LN2 = math.log(2.0)
 TINY, HUGE = 2.0**-1022, (2.0 - 2.0**-52) * 2.0**1023  # smallest and largest float with 53 significant bits
+LEAST, MOST = 9.859676543759770e-305, 1.0142320547350045e304  # e^-700 and e^700
 LARGE = 2.0**500  # its square does not overflow; for larger z, asinh z = ln 2z to the last bit
 QUARTER = (1.570796325802803, 9.920935774287987e-10, 2.2517417706346578e-18, 3.5215598651832e-27)  # pi/2 as a sum
 FARTHEST = 2.0**45  # spacing of floats there is 1/128: beyond, the angle within a turn is hardly known
@@ -81,7 +82,7 @@ def exp(x: Any) -> Any:
     high = (1 / 39916800 * r + 1 / 3628800) * r2 + (1 / 362880 * r + 1 / 40320)
     top = (1 / 6227020800 * r + 1 / 479001600) * r4 + high
     value = (top * (r4 * r4) + (middle * r4 + low)) * scale
-    limit = select(x > 0.0, 1.0142320547350045e304, 9.859676543759770e-305)
+    limit = select(x > 0.0, MOST, LEAST)
     return select(abs(x) > 700.0, limit, value)
 
 
@@ -169,10 +170,13 @@ def asinh(x: Any) -> Any:
 
 
 def asinh_exp(x: Any, y: Any) -> Any:
-    """asinh(x e^y) to 15 units, without overflow; y is clipped to -1400 from below."""
-    z = abs(x)
-    half = exp(0.5 * y)
-    product = (z * half) * half  # overflows or underflows only where x e^y does
+    """asinh(x e^y) to 15 units for x = 0 and |x| >= 2.2e-308; smaller |x| count as 2.2e-308 where the result is large.
+
+    Nothing overflows or underflows on the way unless x e^y does.
+    """
+    z, is_far = abs(x), y < -1400.0  # beyond, e^(y/2) is below the range of `exp`
+    half, factor = exp(0.5 * select(is_far, y + 1400.0, y)), select(is_far, LEAST, 1.0)
+    product = ((z * factor) * half) * (factor * half)  # overflows or underflows only where x e^y does
     near = log1p(product + product * product / (1.0 + sqrt(1.0 + product * product)))
     value = select(product > LARGE, log(z) + y + LN2, near)
     return select(x >= 0.0, value, -value)

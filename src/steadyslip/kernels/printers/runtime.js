@@ -54,9 +54,10 @@ export const cosh = (x) => Math.cosh(Math.min(Math.abs(x), 700));
 /** Inverse hyperbolic sine, as finite as log. @param {number} x */
 export const asinh = (x) => (Math.abs(x) > LARGE ? Math.sign(x) * (log(Math.abs(x)) + Math.LN2) : Math.asinh(x));
 
-/** asinh(x e^y) without overflow. @param {number} x @param {number} y */
+/** asinh(x e^y) without overflow or underflow on the way, as in the kernels. @param {number} x @param {number} y */
 export function asinh_exp(x, y) {
-  const size = Math.abs(x), half = exp(y / 2), product = size * half * half;
+  const size = Math.abs(x), far = y < -1400, factor = far ? 9.859676543759770e-305 : 1; // e^-700
+  const half = exp((far ? y + 1400 : y) / 2), product = size * factor * half * (factor * half);
   const z = product > LARGE ? log(size) + y + Math.LN2 : Math.asinh(product);
   return x >= 0 ? z : -z;
 }

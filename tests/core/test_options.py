@@ -147,11 +147,11 @@ def test_a_default_given_by_name_is_allowed():
 
 DECLARE = {"parameter", "part", "parts", "option", "samples", "measure"}  # said once in the text of a law or a measure
 LEFT = {  # parameters that their functions check themselves, with words of their own
-    "protocol", "records", "record", "initial", "times", "between", "columns", "options", "changes", "present", "fits",
-    "paths", "over", "of", "x", "v", "step", "fixed", "free", "separate", "weights", "folder", "area", "conditions",
-    "candidates", "compute", "cluster", "normal_stress", "sampling", "rate", "time", "friction", "shear", "normal",
-    "displacement", "velocity", "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick",
-    "precision", "rtol", "amplitude", "amplitudes", "periods", "doublings", "most_points", "method", "points", "result",
+    "protocol", "record", "initial", "times", "between", "columns", "options", "over", "of", "x", "v", "step",
+    "fixed", "free", "separate", "weights", "folder", "area", "conditions", "candidates", "compute", "cluster",
+    "normal_stress", "sampling", "rate", "time", "friction", "shear", "normal", "displacement", "velocity",
+    "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick", "precision", "rtol",
+    "amplitude", "amplitudes", "periods", "doublings", "most_points", "method", "points", "result",
     "pore_pressure",
 }  # fmt: skip
 PUBLIC = {
@@ -175,6 +175,11 @@ def test_every_public_function_is_checked_before_it_is_called(name):
     for wrong in roles.keys() & named:
         with pytest.raises(ss.ParameterError, match=rf"{wrong}: got <object object"):
             function(**dict.fromkeys(needed) | {wrong: object()})
+    if several := roles.keys() - named:
+        assert len(several) == 1
+        place = len(needed) + 2
+        with pytest.raises(ss.ParameterError, match=rf"argument {place}: got <object object"):
+            function(*dict.fromkeys(needed).values(), "text", object())
 
 
 @pytest.mark.parametrize("kind", VALUES)

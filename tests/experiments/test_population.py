@@ -259,7 +259,7 @@ def test_what_cannot_be_a_population_is_refused(fits):
         ss.population(list(fits.values())[:2])
     with pytest.raises(ss.ParameterError, match="finite numbers"):
         ss.population(fits, conditions={"temperature": [1.0, 2.0]})
-    with pytest.raises(ss.ParameterError, match="allowed: a Fit"):
+    with pytest.raises(ss.ParameterError, match=r"fits\.1: got namespace.*; allowed: a Fit"):
         ss.population([SimpleNamespace(), *fits.values()])
     with pytest.raises(ss.ParameterError, match="got none"):
         ss.population([])

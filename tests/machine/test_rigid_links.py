@@ -130,6 +130,9 @@ def test_what_cannot_be_joined_says_why(tmp_path):
         ss.machine.joined(machine, "screws")
     with pytest.raises(ss.NotAvailable, match=r"links\.stop cannot be rigid: it ends at the ground"):
         ss.machine.joined(machine, "stop")
+    for place, given in ((2, (["screw"],)), (3, ("screw", ["stop"]))):
+        with pytest.raises(ss.ParameterError, match=rf"^argument {place}: got \[.*; allowed: the name of a link"):
+            ss.machine.joined(machine, *given)
     path = tmp_path / "axis.toml"
     path.write_text(AXIS.format(stiffness=1e5).replace("stiffness = 900.0", 'stiffness = "rigid"'), encoding="utf-8")
     with pytest.raises(ss.RigFileError, match=r"links\.coupling cannot be rigid: it ends at the drive"):

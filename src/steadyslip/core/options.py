@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
 
@@ -86,7 +86,7 @@ class Made(Tested):
         return super().refused(value)
 
 
-def _made(names: str, maker: str, instead: str = "") -> Role:
+def _made(names: str, maker: str, instead: str = "") -> Tested:
     """Role of objects of classes with the given names, which the function `maker` returns.
 
     Classes are compared by name because core must not import them.
@@ -97,6 +97,24 @@ def _made(names: str, maker: str, instead: str = "") -> Role:
         lambda value: any(kind.__name__ in wanted for kind in type(value).__mro__),
         f"; {instead}" if instead else "",
     )
+
+
+def _is_list(value: Any) -> bool:
+    """True for iterables other than texts."""
+    return isinstance(value, Iterable) and not isinstance(value, (str, bytes))
+
+
+def _several(each: Tested, words: str, *, alone: bool = True) -> Tested:
+    """Role of lists of values of a role, or one of these if `alone` is true; iterables other than lists pass unread."""
+
+    def passes(value: Any) -> bool:
+        if isinstance(value, (list, tuple)):
+            return all(map(each.passes, value))
+        if each.passes(value):
+            return alone
+        return _is_list(value)
+
+    return Tested(words, passes)
 
 
 def slider(instead: str) -> Role:
@@ -122,7 +140,7 @@ CONTENT = Tested("the text of a file", lambda value: isinstance(value, str))
 MAKERS = {
     "Slider": "read_rig", "Machine": "read_rig", "Slider | Machine": "read_rig",
     "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
-    "Cycle": "cycles",
+    "Cycle": "cycles", "Protocol": "read_protocol",
 }  # fmt: skip
 INTEGRATION = {"rtol": within(tolerance), "arrest": within(below_one), "most_steps": within(steps)}
 BY_WORD: dict[str, Role] = INTEGRATION | {
@@ -130,7 +148,11 @@ BY_WORD: dict[str, Role] = INTEGRATION | {
 }  # fmt: skip
 BY_ANNOTATION: dict[str, Role] = {
     "bool": FLAG, "str": NAME, "Sequence[str]": NAMES, "str | Sequence[str]": NAMES, "Vary": BY_NAME,
-    "str | PathLike[str]": PLACE, **{names: _made(names, maker) for names, maker in MAKERS.items()},
+    "str | PathLike[str]": PLACE, "Paths": _several(PLACE, "a list of paths", alone=False),
+    "Iterable[str]": _several(CONTENT, "a list of texts"),
+    "Record | Sequence[Record]": _several(_made("Record", ""), "a Record, such as read_record gives, or several"),
+    "Mapping[str, Fit] | Sequence[Fit]": Tested("Fits, by label or in a list", _is_list),
+    **{names: _made(names, maker) for names, maker in MAKERS.items()},
 }  # fmt: skip
 
 
@@ -147,7 +169,8 @@ def role_of(name: str, annotation: str) -> Role | None:
 def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Decorator that checks the arguments of a function before it is called; default values always pass.
 
-    `roles` are needed where `role_of` cannot tell the role, such as the range of a number.
+    `roles` are needed where `role_of` cannot tell the role, such as the range of a number. Each of a variable number
+    of arguments (``*links``) is checked, and named in errors by its place: ``argument 2``.
 
     Raises
     ------
@@ -163,18 +186,23 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
             for name, item in parameters.items()
             if (role := roles.get(name) or role_of(name, str(item.annotation))) is not None
         }
+        single = [name for name, item in parameters.items() if item.kind is not item.VAR_POSITIONAL]
+        several = next((name for name, item in parameters.items() if item.kind is item.VAR_POSITIONAL), None)
+        count = len(single) if several is None else list(parameters).index(several)
 
         @functools.wraps(function)
         def called(*args: P.args, **kwargs: P.kwargs) -> R:
             problems = []
-            for name, value in (dict(zip(defaults, args, strict=False)) | kwargs).items():
+            given = [(name, name, value) for name, value in zip(single, args[:count], strict=False)]
+            given += [(several or "", f"argument {i}", value) for i, value in enumerate(args[count:], count + 1)]
+            for name, shown, value in (*given, *((name, name, value) for name, value in kwargs.items())):
                 if name not in known or value is (default := defaults[name]):
                     continue
                 try:
                     known[name].checked(value)
                 except ParameterError as error:
                     other = ", or None" if default is None else ""
-                    problems += [Problem(name, fault.message + other) for fault in error.problems]
+                    problems += [Problem(shown, fault.message + other) for fault in error.problems]
             if problems:
                 raise ParameterError(problems)
             return function(*args, **kwargs)

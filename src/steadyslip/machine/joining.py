@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, UnknownNameError
-from steadyslip.core.options import checked
+from steadyslip.core.options import Tested, checked
 from steadyslip.machine.bodies import Body, RotatingBody, SlidingBody
 from steadyslip.machine.links import Link, Screw, Shaft, Spring
 from steadyslip.machine.machine import Machine
@@ -15,9 +15,10 @@ from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 from steadyslip.machine.surfaces import Surface
 
 _RATIO_TOLERANCE = 1e-12  # relative; products of a few ratios that should be 1 differ from it by some 1e-16
+_LINK = Tested("the name of a link; further names are arguments of their own", lambda value: isinstance(value, str))
 
 
-@checked()
+@checked(links=_LINK)
 def joined(machine: Machine, *links: str) -> Machine:
     """Copy of a machine in which given links are rigid: each is removed, and its two bodies become one.
 

@@ -155,7 +155,9 @@ def _in_order(fits: Mapping[str, Fit]) -> LawComparison:
 
 
 @checked()
-def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, **options: Any) -> LawComparison:
+def compare_laws(
+    rig: Slider, records: Record | Sequence[Record], laws: Sequence[str] | None = None, **options: Any
+) -> LawComparison:
     """Fit several rate-and-state laws to the same records.
 
     Parameters

@@ -315,7 +315,7 @@ def population(
     """
     labelled = dict(fits) if isinstance(fits, Mapping) else _labelled(fits)
     problems = [
-        Problem(str(label), f"got {one!r}; allowed: a Fit")
+        Problem(f"fits.{label}", f"got {one!r}; allowed: a Fit")
         for label, one in labelled.items()
         if not isinstance(one, Fit)
     ]

@@ -43,7 +43,7 @@ def make_plan(
     many = (records,) if isinstance(records, Record) else tuple(records)
     if not many or not all(isinstance(record, Record) for record in many):
         raise ParameterError(
-            [Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
+            [Problem("records", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
         )
     plan_protocol = None if protocol is None else in_units_of(rig, Protocol.of(protocol))
     if plan_protocol is not None:

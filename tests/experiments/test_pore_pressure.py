@@ -140,3 +140,17 @@ def test_columns_of_it_are_known_by_name(tmp_path, name):
     head = f"time (s),load displacement (um),shear stress (MPa),normal stress (MPa),{name}"
     np.savetxt(path, rows, delimiter=",", header=head, comments="")
     np.testing.assert_allclose(ss.read_record(path).pore_pressure, own["pore_pressure"])
+
+
+def test_columns_without_a_known_name_are_told(tmp_path):
+    """A pressure whose name says nothing is left out, as a temperature is, with a note; given its role, it is read."""
+    own, path = columns(), tmp_path / "pore.csv"
+    cells = [own["time"], own["shear"] / 1e6, own["normal"] / 1e6, own["pore_pressure"] / 1e6, 20 + 0 * own["time"]]
+    head = "Time (s),Shear stress (MPa),Normal stress (MPa),P downstream (MPa),Temperature (degC)"
+    np.savetxt(path, np.column_stack(cells), delimiter=",", header=head, comments="", fmt="%.12g")
+    found = ss.read_record(path)
+    assert found.pore_pressure is None
+    assert "left out: 'P downstream (MPa)', 'Temperature (degC)'; to use a column give its role" in str(found)
+    named = ss.read_record(path, pore_pressure="P downstream (MPa)")
+    np.testing.assert_allclose(named.pore_pressure, own["pore_pressure"])
+    assert "left out: 'Temperature (degC)'" in str(named)

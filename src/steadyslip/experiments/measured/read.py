@@ -16,7 +16,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.measured.clean import cleaned, without_placeholders
-from steadyslip.experiments.measured.columns import ROLES, Column, assign_columns, missing_roles
+from steadyslip.experiments.measured.columns import ROLES, Column, assign_columns, listed, missing_roles
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
 
@@ -65,7 +65,7 @@ def read_record(
         is computed from displacement and velocity if both were measured.
     **columns
         Columns by role: ``time``, ``displacement`` and ``velocity`` (of the load point), ``friction``, ``shear``,
-        ``normal``.
+        ``normal``, ``pore_pressure``. A column that has none is left out, with a note.
 
     Returns
     -------
@@ -101,6 +101,9 @@ def read_record(
         own = without_placeholders(raw.values[column.place], column.name, notes)
         si[role] = own * (column.factor / (size if column.force else 1.0))
         notes.append(f"{role}: column {column.name!r}" + _format_unit(column, size, area is None))
+    taken = {column.place for column in found.values()}
+    if unread := [repr(name) for i, name in enumerate(raw.names) if i not in taken]:
+        notes.append(f"left out: {listed(unread)}; to use a column give its role, such as pore_pressure=NAME")
     if normal_stress is not None:
         level = _checked("normal_stress", "Pa", normal_stress)
         si["normal"] = np.full(raw.values.shape[1], level)

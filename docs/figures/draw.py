@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import steadyslip as ss
 from steadyslip.figures.style import BLACK, BLUE, GREY, VERMILION
@@ -34,7 +35,8 @@ def panels(*heights):
 
 # --- slow slip ---------------------------------------------------------------------------------------
 
-KAPPAS = (0.70, 0.75, 0.78, 0.82, 0.86, 0.89, 0.93, 0.97)
+KAPPAS = (0.70, 0.75, 0.78, 0.82, 0.86, 0.89, 0.93, 0.97, 0.99, 0.999, 0.9999, 0.99999)
+SILENT = (1.02, 1.06, 1.1)
 MEASURED = {0.89: 0.080, 0.78: 1.42, 0.75: 2.60}  # κ: mm/s; Leeman et al. 2016, published peak velocities, rounded
 
 
@@ -48,30 +50,57 @@ def fault(evolution, mass=500, **cutoffs):
 
 
 def peaks(rig):
-    """Peak velocities (mm/s) over `KAPPAS`, after the motion has settled."""
-    kick = [ss.protocol.VelocityStep(at=0.1, to=10.5 * um / s), ss.protocol.VelocityStep(at=0.2, to=10 * um / s)]
+    """Peak velocities (mm/s) of the stable cycles over `KAPPAS`."""
+    edge = ss.critical_stiffness(rig)
+    branch = ss.cycles(rig.with_values({"stiffness": edge}), "stiffness", between=(0.6 * edge, 1.3 * edge))
+    return [one.peak_velocity / (mm / s) for kappa in KAPPAS for one in branch.at(kappa * edge) if one.stable]
+
+
+def calmed(rig):
+    """Largest velocities (mm/s) over `SILENT`, long after a kick."""
+    kick = [ss.protocol.VelocityStep(at=0.1, to=15 * um / s), ss.protocol.VelocityStep(at=0.5, to=10 * um / s)]
     found = []
-    for kappa in KAPPAS:
-        softer = rig.with_values({"stiffness": kappa * ss.critical_stiffness(rig)})
-        run = ss.simulate(softer, kick, until=1500 * s)
-        found.append(np.max(run["v"][run["t"] > 1000]) / (mm / s))
+    for kappa in SILENT:
+        stiff = rig.with_values({"stiffness": kappa * ss.critical_stiffness(rig)})
+        run = ss.simulate(stiff, kick, until=1500, times=np.linspace(1400, 1500, 200))
+        found.append(max(run["v"]) / (mm / s))
     return found
 
 
 def slow_slip():
-    (ax,) = panels(62)
+    over, near = panels(66, 52)
+    laws = ((ss.laws.Aging(), "aging", "o", "white"), (ss.laws.Slip(), "slip", "s", BLACK))
     rows = (
-        (fault(ss.laws.Aging()), "a, b constant", "-", "o"),
-        (fault(ss.laws.Aging(), mass=5e6), "the same, $10^4$ times the mass", ":", "^"),
-        (fault(ss.laws.Aging(), b_cutoff_velocity=1000 * um / s), "$v_b$ = 1000 µm/s, aging", "--", "s"),
-        (fault(ss.laws.Slip(), b_cutoff_velocity=300 * um / s), "$v_b$ = 300 µm/s, slip", "-.", "D"),
+        ({}, "a, b constant", "-"),
+        ({"mass": 5e6}, "the same, $10^4$ times the mass", ":"),
+        ({"b_cutoff_velocity": 1000 * um / s}, "$v_b$ = 1000 µm/s", "--"),
+        ({"b_cutoff_velocity": 300 * um / s}, "$v_b$ = 300 µm/s", "-."),
     )
-    for rig, label, line, mark in rows:
-        ax.plot(KAPPAS, peaks(rig), line, marker=mark, color=BLACK, markerfacecolor="white", label=label)
-    ax.plot([*MEASURED], [*MEASURED.values()], "*", color=VERMILION, markersize=8, label="measured")
-    ax.set(yscale="log", ylim=(0.03, 2e5), xlabel="κ = k/k$_{cr}$", ylabel="peak velocity (mm/s)")
-    ax.legend(loc="upper right")
-    return [ax]
+    silent = np.zeros(len(SILENT))
+    for given, row, line in rows:
+        for evolution, law, mark, face in laws:
+            rig = fault(evolution, **given)
+            found = peaks(rig)
+            silent = np.maximum(silent, calmed(rig))
+            style = {"linestyle": line, "marker": mark, "color": BLACK, "markerfacecolor": face, "markersize": 2.8}
+            over.plot(KAPPAS, found, label=f"{row}, {law}", **style)
+            near.plot(1 - np.array(KAPPAS), found, label=f"{row}, {law}", **style)
+    over.plot(SILENT, silent, "-", marker="x", color=BLUE, label="above k$_{cr}$, all laws")
+    stars = {"color": VERMILION, "markersize": 8, "label": "measured"}
+    over.plot([*MEASURED], [*MEASURED.values()], "*", **stars)
+    near.plot([1 - kappa for kappa in MEASURED], [*MEASURED.values()], "*", **stars)
+    over.axvline(1, color=GREY, linewidth=0.8, zorder=0)
+    for ax in (over, near):
+        ax.set(yscale="log", ylim=(0.005, 600), ylabel="peak velocity (mm/s)")
+    over.set(xlabel="κ = k/k$_{cr}$", xlim=(0.68, 1.12))
+    near.set(xscale="log", xlabel="1 $-$ κ", xlim=(0.4, 7e-6))
+    shown = [Line2D([], [], color=BLACK, linestyle=line, label=row) for _, row, line in rows]
+    shown += [
+        Line2D([], [], color=BLACK, linestyle="", marker=mark, markerfacecolor=face, label=f"{law} law")
+        for _, law, mark, face in laws
+    ]
+    over.figure.legend(handles=[*shown, *over.get_lines()[-3:-1]], loc="outside upper center", ncols=2)
+    return [over, near]
 
 
 # --- a step of normal stress -------------------------------------------------------------------------

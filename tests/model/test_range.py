@@ -12,11 +12,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
+from explored import Explored
 from steadyslip.core.expressions import PreciseFunction
 from steadyslip.linear.polynomials import is_hurwitz
-from steadyslip.linear.status import without_edge
+from steadyslip.linear.status import WORDS, without_edge
 from steadyslip.linear.stiffness import in_chunks, interval_ends
-from steadyslip.model.linearisation import characteristic_coefficients
+from steadyslip.model.linearisation import characteristic_coefficients, is_written_out
 from steadyslip.model.point import operating_point
 from steadyslip.model.posed import resolved
 from steadyslip.model.range import in_range, surely_in_range
@@ -300,22 +301,26 @@ BRISTLES = {
 }
 
 
-def massless(law):
-    """A body without mass that rubs, between the drive and one with mass."""
+def massless(law, delay=0.0, masses=1):
+    """A body without mass that rubs, between the drive, or a controller with delay, and bodies with mass."""
+    spring, mass = ss.machine.Spring, ss.machine.SlidingBody
+    bodies = {"carriage": mass()} | {f"table{i}": mass(mass=0.6 + 0.1 * i) for i in range(masses)}
+    links = {
+        f"belt{i}{j}": spring(between=(one, other), stiffness=1.3e4 + 7e2 * i + 3e2 * j)
+        for i, one in enumerate(bodies) for j, other in enumerate(bodies) if i < j
+    } | {"air": spring(between=("table0", "ground"), damping=2.0)}  # fmt: skip
+    drive = ss.machine.PositionPD(body="carriage", kp=1e5, delay=delay, velocity=1e-3) if delay else None
+    if drive is None:
+        links["screw"] = spring(between=("drive", "carriage"), stiffness=1e5)
+    surface = ss.machine.Surface(body="carriage", friction=law, contact=LEVEL)
     return ss.Machine(
-        bodies={"carriage": ss.machine.SlidingBody(), "table": ss.machine.SlidingBody(mass=0.6)},
-        links={
-            "screw": ss.machine.Spring(between=("drive", "carriage"), stiffness=1e5),
-            "belt": ss.machine.Spring(between=("carriage", "table"), stiffness=1.3e4),
-            "air": ss.machine.Spring(between=("table", "ground"), damping=2.0),
-        },
-        contacts={
-            "guide": ss.machine.Surface(
-                body="carriage", friction=law, contact=ss.laws.InclinedSpring(preload=100.0, angle=0.0)
-            )
-        },
-        drive=ss.machine.Pull(velocity=1e-3),
+        bodies=bodies, links=links, contacts={"guide": surface}, drive=drive or ss.machine.Pull(velocity=1e-3)
     )
+
+
+def slider(law, delay=0.0):
+    drive = ss.machine.PD(velocity=1e-3, kp=1e5, delay=delay) if delay else ss.machine.SteadyDrive(velocity=1e-3)
+    return ss.Slider(friction=law, contact=LEVEL, stiffness=0.0 if delay else 1e5, drive=drive)
 
 
 def routh(coefficients):
@@ -349,3 +354,31 @@ def test_above_the_stribeck_velocity_no_sign_is_lost_with_an_exponential(law, cu
             right = "stable" if all(one > 0 for one in routh(exact)) else "unstable"
         assert words == right or (words == "out of range" and ratio > 25), ratio
     assert np.all(told != "out of range") or law != "viscous"
+
+
+@pytest.mark.parametrize("curve", STRIBECK)
+@pytest.mark.parametrize("make", [slider, massless, lambda law: slider(law, 1e-3), lambda law: massless(law, 1e-3),
+                                  lambda law: massless(law, masses=7)])  # fmt: skip
+def test_a_lost_exponential_is_refused_from_the_same_velocity_on_in_every_rig(curve, make):
+    """With a delay and where no polynomial is written out it was told as a verdict; `stable` where none is."""
+    rig = make(BRISTLES["no memory"](**STRIBECK[curve]))
+    ratios = np.array([26.5, 26.8, 27.1, 27.4, 28, 30, 100.0])  # exp(-700) is at 26.46
+    assert set(ss.stability(rig, {"drive.velocity": 1e-3 * ratios})) == {"out of range"}
+    assert {ss.stability(rig.with_values({"drive.velocity": 1e-3 * ratio})) for ratio in ratios} == {"out of range"}
+    if is_written_out(operating_point(rig).model):
+        assert not set(ss.stability(rig, {"drive.velocity": 1e-3 * np.array([5, 20, 26, 26.4])})) & {"out of range"}
+    with pytest.raises(ss.NotAvailable, match=r"v_stribeck = 0\.001 m/s is too small"):
+        ss.growth_rate(rig.with_values({"drive.velocity": 0.03}))
+
+
+@pytest.mark.parametrize("curve", STRIBECK)
+@pytest.mark.parametrize(
+    ("make", "law"),
+    [(make, law) for make in (slider, massless) for law in BRISTLES if (make, law) != (slider, "bristles")],
+)
+def test_a_page_refuses_a_lost_exponential_where_python_does(make, law, curve):
+    rig = make(BRISTLES[law](**STRIBECK[curve]))
+    ratios = np.array([1, 9.5, 20, 25, 26, 26.4, 26.5, 27, 27.4, 28, 30, 100.0])
+    explored, told = Explored(rig), ss.stability(rig, {"drive.velocity": 1e-3 * ratios})
+    for ratio, words in zip(ratios, told, strict=True):
+        assert WORDS[explored(rig.with_values({"drive.velocity": 1e-3 * ratio}))["status"]] == words, ratio

@@ -30,6 +30,7 @@ from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, ROOT_TOLERANCE, joint_equation
+from steadyslip.model.underflow import highest_coefficients, highest_is_lost
 
 SLIP_RATE = "slip_rate"  # name of the slip velocity of a contact on pages
 
@@ -79,7 +80,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
     programs = [
         *steady_programs(model),
         program(model, "allowed", [_allowed(rig, model)]),
-        program(model, "coefficients", coefficients, then=_verdict_values),
+        _coefficient_program(model, coefficients),
         program(model, "statics", _static_terms(model), then=lambda terms: [crossing.share_left(terms, select)]),
         program(model, "observables", observables),
     ]
@@ -144,6 +145,21 @@ def _static_terms(model: Model) -> list[sp.Expr]:
         return list(sp.Add.make_args(characteristic_coefficients(model)[0]))
     without, slope = stiffness_split(model)
     return [without[0], model.parameters["slider.stiffness"] * slope[0]]
+
+
+def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Program:
+    """Program of the coefficients and what `_verdict_values` makes of them; the highest is NaN if it is lost."""
+    levels = highest_coefficients(model)
+
+    def judged(values: list[Node]) -> list[Value]:
+        c, rest = values[: len(coefficients)], iter(values[len(coefficients) :])
+        if levels:
+            lost = highest_is_lost([[(next(rest), next(rest)) for _ in level] for level in levels], select)
+            c[-1] = select(lost > 0, float("nan"), c[-1])
+        return _verdict_values(c)
+
+    further = [e for level in levels for pair in level for e in pair]
+    return program(model, "coefficients", [*coefficients, *further], then=judged)
 
 
 def _verdict_values(c: list[Node]) -> list[Value]:

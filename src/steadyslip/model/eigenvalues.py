@@ -107,7 +107,7 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.comple
         return np.where(good[..., None], found, np.nan), sizes
     flat = [block.reshape(good.size, *block.shape[-2:]) for block in blocks]
     rows = [_single_rig(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
-    width = max((len(row[0]) for row in rows if row is not None), default=0)
+    width = max((len(row[0]) for row in rows if row is not None), default=1)  # one NaN where none is known
     table, moved = np.full((len(rows), width), np.nan, dtype=complex), np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
         if row is not None and len(row[0]) == width:
@@ -125,11 +125,12 @@ def _of_matrix(a: Array) -> tuple[NDArray[np.complex128], Array]:
 
 
 def _single_rig(model: Model, blocks: list[Array]) -> tuple[NDArray[np.complex128], Array] | None:
-    """Eigenvalues of a single rig and how they move; None if the balances do not determine the motion."""
+    """Eigenvalues of a single rig and how they move; None if the balances do not determine a finite motion."""
     try:
-        return _of_matrix(descriptor(model, (), blocks).solved((), ()).a)
+        a = descriptor(model, (), blocks).solved((), ()).a
     except NotAvailable:
         return None
+    return _of_matrix(a) if np.all(np.isfinite(a)) else None
 
 
 def _characteristic_matrix(point: OperatingPoint, late: Delays, place: Array) -> Array:

@@ -1,8 +1,8 @@
 """Range check: values and slopes of the equations in steady sliding must be finite in floating point.
 
 The slopes enter the characteristic polynomial, so its coefficients are checked: an infinite slope, or a product that
-overflows, makes a coefficient infinite or NaN. An exponential that underflows must not change the degree, as
-exp(−(v/v_S)²) does from 27.3 Stribeck velocities on. All stages check the range before they compute.
+overflows, makes a coefficient infinite or NaN. An exponential that underflows must not change the degree
+(`steadyslip.model.underflow`). All stages check the range before they compute.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
@@ -30,13 +29,10 @@ from steadyslip.model.linearisation import (
 )
 from steadyslip.model.point import OperatingPoint, stacked
 from steadyslip.model.steady import out_of_range
+from steadyslip.model.underflow import loses_highest_power
 
 ORDINARY = 1e20
 """Largest size of ordinary numbers, whose inverse is the smallest: products of a dozen stay below 1e308."""
-_LEAST = -700.0
-"""Exponent below which exp underflows or loses digits (the smallest normal float is exp(−708))."""
-_REPLACEMENT = -100.0
-"""Replacement of smaller exponents in the test of their influence; products of seven exp(−100) do not underflow."""
 _REDUCED_DECADES = (0.75, 0.5, 0.25, 0.0)
 """Factors on the decimal exponent of a parameter by which its influence on the range is tested; chosen by trial."""
 
@@ -112,44 +108,11 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
         values = np.ones(point.shape, dtype=bool)
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
-        values &= ~_underflows(point)
+        values &= ~loses_highest_power(point)
         if point.shape:
             values &= ~digits_lost(point)
         known = ~out_of_range(point.model, point.arguments, point.shape)
         return np.asarray(known & (~point.exists | (slopes & values)))
-
-
-def _underflows(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the highest coefficients of the characteristic polynomial vanish only by underflow, shape of point."""
-    small = np.zeros(point.shape, dtype=bool)
-    for one in point.evaluate(_exponents(point.model)):
-        small = small | (np.asarray(one) < _LEAST)
-    if not np.any(small):
-        return small
-    functions = _coefficient_function(point.model), _replaced_function(point.model)
-    c, replaced = (stacked(point.evaluate(one), point) for one in functions)
-    places = np.arange(c.shape[-1])
-    degree, right = (np.max(np.where(one != 0, places, -1), axis=-1) for one in (c, replaced))
-    return np.asarray(small & (degree < right))
-
-
-def _exponentials(model: Model) -> list[sp.Expr]:
-    """Exponentials in the symbolic coefficients of the characteristic polynomial; empty if there are none."""
-    if model.delays or not is_written_out(model):
-        return []
-    return [node for node in occurrences(characteristic_coefficients(model)) if isinstance(node, sp.exp)]
-
-
-@question
-def _exponents(model: Model) -> ArrayFunction:
-    return model.function([node.args[0] for node in _exponentials(model)])
-
-
-@question
-def _replaced_function(model: Model) -> ArrayFunction:
-    """Array function of the coefficients with exponents of exponentials bounded below by `_REPLACEMENT`."""
-    least = {node: sp.exp(sp.Max(node.args[0], _REPLACEMENT)) for node in _exponentials(model)}
-    return model.function([sp.sympify(e).xreplace(least) for e in characteristic_coefficients(model)])
 
 
 def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
@@ -163,7 +126,7 @@ def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
         least = np.min(size, initial=1.0, where=size != 0) if np.ndim(value) else size or 1.0
         if not (least > 1 / ORDINARY and np.max(size, initial=0.0) < ORDINARY):
             return False
-    return ((complete and not np.any(_underflows(point))) or _is_rational(point.model)) and not np.any(
+    return ((complete and not np.any(loses_highest_power(point))) or _is_rational(point.model)) and not np.any(
         digits_lost(point)
     )
 

@@ -118,8 +118,8 @@ export class Linear {
     const settled = this.settle(branch);
     if (settled !== STABLE) return settled;
     programs.coefficients(R, 0, c);
-    const { degree } = this.facts;
-    for (let i = 0; i <= degree; i++) if (!Number.isFinite(c[i])) return UNKNOWN;
+    const { degree } = this.facts, top = c[degree] || c[degree - 1] || 1; // as in steadyslip/model/range.py
+    for (let i = 0; i <= degree; i++) if (!Number.isFinite(c[i]) || !Number.isFinite(c[i] / top)) return UNKNOWN;
     return c[degree + 1] === 1 ? STABLE : UNSTABLE;
   }
 

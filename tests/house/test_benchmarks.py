@@ -1,6 +1,7 @@
 """Every script of benchmarks/ runs: what it measures moves on, and nobody runs them all."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -27,3 +28,4 @@ def test_it_runs(script, tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip(), "nothing is printed"
+    assert not re.search(r"\bnan\b", done.stdout), "a ratio of nothing is printed as a number"

@@ -14,6 +14,7 @@ from rigs_of_theory import LAWS, rig
 from steadyslip.core.checks import in_words
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.linear.boundary import margins
+from steadyslip.linear.digits import precise_eigenvalues
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.model.point import operating_point
 from steadyslip.verdict import checks, numbers
@@ -65,6 +66,21 @@ def test_forces_on_every_body_of_a_machine_add_up(name):
     for one in wrong:
         assert 1e-8 < max(net_forces(machine, one).values()) < 1e-5
         assert not steady_check(machine, point, one).passed
+
+
+@pytest.mark.parametrize("decades", [0, 5, 9, 10, 13])
+def test_bristles_of_any_damping_leave_the_verdict_decided(decades):
+    """From 1e9 times the example's on, rounding of their rate was taken for forces out of balance."""
+    screw = ss.read_rig(EXAMPLES / "lead-screw.toml")
+    damped = screw.with_values({"bristle_damping": screw.value("bristle_damping") * 10.0**decades})
+    found = ss.analyze(damped)
+    assert str(found).startswith("UNSTABLE")
+    assert all(one.passed for one in found.checks)
+    point, own = operating_point(damped), ss.eigenvalues(damped)
+    np.testing.assert_allclose(own, precise_eigenvalues(point, own), rtol=1e-9)
+    assert ss.growth_rate(damped) == pytest.approx(own[0].real, rel=1e-12)
+    other = damped.with_values({"friction.mu_coulomb": 0.13})
+    assert not steady_check(other, point).passed
 
 
 def test_memory_that_does_not_rest_is_found():

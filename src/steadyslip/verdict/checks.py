@@ -47,6 +47,7 @@ Chosen by trial, as `GOOD` is."""
 
 _DECIDING = ("steady sliding", "growing roots")  # checks that must pass for a verdict
 _STEP = 1e-3  # change of ln velocity, ln stress and ln memory by which the typical size of a memory rate is found
+_ROUNDING = 8 * float(np.finfo(float).eps)  # relative, of velocity and memory after a few operations
 _ZERO = 1e-9  # size of a root relative to the largest below which it counts as zero (rounding)
 
 
@@ -74,14 +75,15 @@ def steady_check(rig: Rig, point: OperatingPoint, steady: SteadyMachine | None =
         else [rig.friction]  # type: ignore[attr-defined]
     )
     numbers = [float(one) for one in point.evaluate(_steady_numbers(point.model))]
-    residuals = []
+    residuals: list[tuple[float, float]] = []
     for contact, law, sigma in zip(point.model.contacts, frictions, point.sigmas, strict=True):
         velocity, friction, normal, *memory = (numbers.pop(0) for _ in range(3 + len(contact.memory)))
-        residuals.append(abs(normal - float(sigma)) / float(sigma))
+        residuals.append((abs(normal - float(sigma)) / float(sigma), BALANCE_TOLERANCE))
         residuals += _law_residuals(law, velocity, float(sigma), tuple(memory), friction)
-    residuals += [] if steady is None else net_forces(rig, steady).values()
+    forces = {} if steady is None else net_forces(rig, steady)
+    residuals += [(one, BALANCE_TOLERANCE) for one in forces.values()]
     how = "forces and memory by the laws" + ("" if steady is None else ", forces on bodies added up")
-    return check("steady sliding", how, max(residuals), BALANCE_TOLERANCE)
+    return check("steady sliding", how, *max(residuals, key=lambda pair: pair[0] / pair[1]))
 
 
 def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
@@ -119,12 +121,20 @@ def _steady_numbers(model: Model) -> ArrayFunction:
 
 def _law_residuals(
     law: FrictionLaw, velocity: float, sigma: float, memory: tuple[float, ...], friction: float
-) -> Iterator[float]:
-    """Relative residuals of a friction law in steady sliding: of its stress, then of the rate of each memory."""
+) -> Iterator[tuple[float, float]]:
+    """Relative residuals of a friction law in steady sliding: of its stress, then of the rate of each memory.
+
+    Each with what is allowed: of a stress also what rounding of velocity and memory makes of it, as it does where
+    bristles are damped so much that rounding of their rate is felt.
+    """
     v, s = abs(velocity), sp.Float(sigma)
-    yield abs(float(law.strength(sp.Float(v), s, memory, friction)) - friction) / max(
-        abs(friction), sigma * BALANCE_TOLERANCE
-    )
+
+    def strength(a: float, c: float) -> float:
+        return float(law.strength(sp.Float(v * a), s, tuple(c * m for m in memory), friction))
+
+    own, size = strength(1, 1), max(abs(friction), sigma * BALANCE_TOLERANCE)
+    slopes = [abs(strength(*trial) - own) / _STEP for trial in ((1 + _STEP, 1), (1, 1 + _STEP))]
+    yield abs(own - friction) / size, max(BALANCE_TOLERANCE, _ROUNDING * sum(slopes) / size)
     trials = ((1, 1, 1), (1 + _STEP, 1, 1), (1, 1 + _STEP, 1), (1, 1, 1 + _STEP))
     rest, *others = (
         np.array([float(rate) for rate in law.rates(sp.Float(v * a), s * b, tuple(c * m for m in memory), friction)])
@@ -132,7 +142,7 @@ def _law_residuals(
     )
     for rate, *changed in zip(rest, *others, strict=True):
         size = max(abs(other - rate) for other in changed) / _STEP
-        yield abs(rate) / size if size else float(rate != 0)
+        yield abs(rate) / size if size else float(rate != 0), BALANCE_TOLERANCE
 
 
 # -- eigenvalues

@@ -51,9 +51,14 @@ class CommandedInputs:
             "pore": (PORES, 1.0) if pores else (NORMAL, -1.0),
         }
         self.changes = [one for one in loading.changes if one[0] in self.courses]
+        self.ramps = [(i, ramp) for i, (_, _, change) in enumerate(self.changes) for ramp in change.ramps]
         self.base = {name: float(course.at(time[:1])[0]) for name, course in self.courses.items()} | {"load": 0.0}
         self.times = time - time[0]
         self.nodes = self._nodes()
+
+    def _ramps_of(self, change: int) -> list[int]:
+        """Places in `ramps` of those of one change; empty for −1."""
+        return [j for j, (i, _) in enumerate(self.ramps) if i == change]
 
     def _nodes(self) -> Array:
         """Fixed nodes of the input table, s: both ends; samples along curves and along ramps of free duration."""
@@ -106,14 +111,17 @@ class CommandedInputs:
 
     def _table(self, times: Array, first: int, directions: int) -> InputTable:
         jobs = len(times)
-        begins = np.array([[change.time for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
-        lengths = np.array([[change.duration for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
+        since, ramped, _ = np.array([ramp for _, ramp in self.ramps]).reshape(-1, 3).T
+        begins = np.tile([self.changes[i][2].time for i, _ in self.ramps], (jobs, 1)) + since
+        lengths = np.tile(ramped, (jobs, 1))
         for k, (i, what) in enumerate(self.free):
-            if i >= 0:
-                (begins if what == "at" else lengths)[:, i] = times[:, k]
+            if what == "at":
+                begins[:, self._ramps_of(i)] = times[:, k : k + 1] + since[self._ramps_of(i)]
+            elif what == "duration":
+                lengths[:, self._ramps_of(i)] = times[:, k : k + 1]
             elif what == "lag":
                 begins = begins + times[:, k : k + 1]
-        ramps = [i for i, (_, _, change) in enumerate(self.changes) if change.duration > 0]
+        ramps = np.flatnonzero(ramped > 0)
         low, high = float(self.time[0]), float(self.time[-1])
         events = np.hstack([begins, (begins + lengths)[:, ramps]])
         inside = (events > low) & (events < high)
@@ -138,9 +146,9 @@ class CommandedInputs:
             if what == "hold":
                 moves[:, first + k, -1] = -1.0
             if what == "at":
-                moves[:, first + k, i] = 1.0
-            if i in ramps:
-                moves[:, first + k, len(self.changes) + ramps.index(i)] = 1.0
+                moves[:, first + k, self._ramps_of(i)] = 1.0
+            if i >= 0:
+                moves[:, first + k, len(self.ramps) + np.flatnonzero(np.isin(ramps, self._ramps_of(i)))] = 1.0
         moves[:, :, : events.shape[1]] *= inside[:, None, :]
         event = order[:, :-1]
         rates = np.zeros((jobs, directions, event.shape[1]))
@@ -169,12 +177,13 @@ class CommandedInputs:
         for channel, course in self.courses.items():
             before = np.full(middle.shape, course.first - self.base[channel])
             after = before.copy()
-            for i, (own, _, change) in enumerate(self.changes):
+            for j, (i, (_, ramped, share)) in enumerate(self.ramps):
+                own, _, change = self.changes[i]
                 if own != channel:
                     continue
-                begin, length = begins[:, i : i + 1], lengths[:, i : i + 1]
-                height = change.after - change.before
-                if change.duration > 0:
+                begin, length = begins[:, j : j + 1], lengths[:, j : j + 1]
+                height = share * (change.after - change.before)
+                if ramped > 0:
                     length = np.maximum(length, MIN_RAMP * np.ptp(self.time))
                     before += height * np.clip((nodes[:, :-1] - begin) / length, 0.0, 1.0)
                     after += height * np.clip((nodes[:, 1:] - begin) / length, 0.0, 1.0)
@@ -194,18 +203,19 @@ class CommandedInputs:
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
         """Derivatives of the inputs at fixed times in the free times of ramps, (jobs, directions, rows, inputs)."""
-        if not any(change.duration > 0 for _, _, change in self.changes):
+        if not any(ramped > 0 for _, (_, ramped, _) in self.ramps):
             return np.zeros((1, 0, 0, self.inputs))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
         rates = np.zeros((len(nodes), directions, middle.shape[1], self.inputs))
         for k, (place, what) in enumerate(self.free):
-            for i in range(len(self.changes)) if what == "lag" else [place] if place >= 0 else []:
+            for j in range(len(self.ramps)) if what == "lag" else self._ramps_of(place):
+                i, (_, ramped, part) = self.ramps[j]
                 channel, _, change = self.changes[i]
-                if not change.duration > 0:
+                if not ramped > 0:
                     continue
-                begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], MIN_RAMP * np.ptp(self.time))
+                begin, length = begins[:, j : j + 1], np.maximum(lengths[:, j : j + 1], MIN_RAMP * np.ptp(self.time))
                 share = (middle - begin) / length
-                slope = -(change.after - change.before) / length * (share if what == "duration" else 1.0)
+                slope = -part * (change.after - change.before) / length * (share if what == "duration" else 1.0)
                 column, sign = self.columns_and_signs[channel]
                 rates[:, first + k, :, column] += np.where((share > 0) & (share < 1), sign * slope, 0.0)
         return rates

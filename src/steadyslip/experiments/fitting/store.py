@@ -36,7 +36,7 @@ _OPTIONS = {
     "initial": str, "loss": str, "width": {float, None}, "rtol": float,
 }  # fmt: skip
 _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
-_COURSE = (float, [(float,) * len(fields(Change))], [float], [_CURVE], float, int, int, int, int)
+_COURSE = (float, [{(float,) * 8, (float,) * len(fields(Change))}], [float], [_CURVE], float, int, int, int, int)
 _COLUMNS = (*ROLES, "worth")
 _FORMS = {
     "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},

@@ -9,11 +9,13 @@ import numpy as np
 
 from steadyslip.core.areas import total
 from steadyslip.core.checks import as_data, in_words
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
 from steadyslip.experiments.fitting.residuals import residual_checks
+from steadyslip.experiments.loading.loading import Course
+from steadyslip.experiments.loading.servo import overshoot
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -25,6 +27,7 @@ END_SAMPLES = 5  # number of first or last residuals in that mean; also one in t
 OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
 MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
+OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
 )
@@ -322,6 +325,7 @@ def drive_line(fit: FitNumbers) -> str:
         if free
         else ""
     )
+    text += "".join(_servo(course) for course in loads)
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
         text += "; at rest at first, how long is fitted (start.hold)"
     if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):
@@ -338,6 +342,17 @@ def drive_line(fit: FitNumbers) -> str:
         if name in other and fit.values.get(name)
     ]
     return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
+
+
+def _servo(course: Course) -> str:
+    """Clause on the servo behind the changes of a course; empty without."""
+    late = next((change for change in course.changes if change.lag), None)
+    if late is None:
+        return ""
+    beyond = overshoot(late.damping)
+    over = f", and overshoots by {format_percent(beyond)}" if beyond >= OVERSHOOT else ""
+    lag = format_quantity(late.lag, "s")
+    return f"; the servo follows late, in the end {lag} times the change of rate behind the command{over}"
 
 
 def _steep_names(rig: Slider) -> tuple[str, ...]:

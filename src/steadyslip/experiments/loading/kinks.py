@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +14,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import REST_SHARE, reversed_column, samples_off_line
 from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
+from steadyslip.experiments.loading.servo import GAIN, fitted_servo, settling, travel
 from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
@@ -24,6 +27,14 @@ SLOW = 0.02  # share of the highest rate up to which a rate may be a hold, if th
 MOST_CHANGES = 40  # more changes than this, or
 MOST_BETWEEN = 0.35  # a larger share of the time between runs, and the loading is not piecewise linear; chosen by trial
 ENOUGH_SAMPLES = 30  # samples that determine their own noise; chosen by trial
+LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which nothing else changes; chosen by trial
+LEFT = 4.0  # standard errors by which the mean misfit around a change may be above that of normal noise, which is 0.83
+AROUND = 3.0  # times in which a servo settles that count as around a change
+LAG_ERROR = 0.1  # of a servo, relative, by which the time of its command is uncertain too
+NEAR, PER_EFOLD = (
+    30.0,
+    10.0,
+)  # samples on each side of a change kept one by one; beyond, means for each e-fold of distance
 EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
 
 
@@ -46,11 +57,17 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     rest = np.abs(rates) <= np.maximum(AT_REST * top, np.minimum(4 * np.array(errors), slow))
     rest &= len(runs) > 1
     rates = np.where(rest, 0.0, rates)
-    changes = []
-    for k in range(1, len(runs)):
-        scale, worth = max(strays[k - 1 : k + 1]), max(inflation[k - 1 : k + 1])
-        kink = _ChangeFit(time, displacement, runs[k - 1], runs[k], (errors[k - 1], errors[k]), scale, worth)
-        changes.append(kink.change(float(rates[k - 1]), float(rates[k]), blurred))
+    kinks = [
+        _ChangeFit(time, displacement, before, after, pair, max(scales), max(worths))
+        for (before, after), pair, scales, worths in zip(
+            pairwise(runs), pairwise(errors), pairwise(strays), pairwise(inflation), strict=True
+        )
+    ]
+    servo = _servo_of(kinks)
+    changes = [
+        kink.change(*levels, blurred) if servo is None else kink.late_change(*levels, blurred, *servo)
+        for kink, levels in zip(kinks, pairwise(rates.tolist()), strict=True)
+    ]
     found = tuple(_within_record(one, time) for one in _without_overlap(changes))
     return Course(
         float(rates[0]), found, np.where(rest, 0.0, errors), None, float(np.median(strays)),
@@ -103,6 +120,17 @@ def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, fl
     return scale, float(np.sqrt(max(variance, 0.0))), max(noise.inflation, 1.0)
 
 
+def _servo_of(kinks: list[_ChangeFit]) -> tuple[float, float] | None:
+    """Lag (s) and damping ratio of the servo behind all changes; None if steps or ramps fit as well."""
+    kinks = [one.thinned() for one in kinks if one.tells]
+    if not kinks:
+        return None
+    shortest, longest = 0.1 * min(one.spacing for one in kinks), LONGEST_LAG * min(one.reach for one in kinks)
+    servo = fitted_servo(lambda *one: sum(kink.of_servo(*one) for kink in kinks), shortest, longest)
+    better = sum(kink.at_once - kink.of_servo(*servo) for kink in kinks if kink.explained_by(*servo))
+    return servo if better > GAIN else None
+
+
 class _ChangeFit:
     """Change between two runs: the meeting point of their lines, and a ramp or step there."""
 
@@ -134,6 +162,17 @@ class _ChangeFit:
         self.reach += self.zone[1] - self.zone[0]
         rows = slice(*np.searchsorted(time, [self.meet - self.reach, self.meet + self.reach]))
         self.time, self.displacement = time[rows], displacement[rows]
+        self.worth = np.ones(len(self.time))
+
+    def thinned(self) -> _ChangeFit:
+        """The same with means of the samples far from the change, over times that grow with the distance from it."""
+        far = np.abs(self.time - self.meet) / (NEAR * self.spacing)
+        bins = NEAR * np.where(far < 1, far, 1 + PER_EFOLD * np.log(np.maximum(far, 1)) / NEAR)
+        _, own = np.unique((np.floor(bins) + 0.5) * np.where(self.time < self.meet, -1.0, 1.0), return_inverse=True)
+        found, count = copy(self), np.bincount(own)
+        found.time, found.displacement = (np.bincount(own, x) / count for x in (self.time, self.displacement))
+        found.worth = count.astype(float)
+        return found
 
     def change(self, before: float, after: float, blurred: bool) -> Change:
         """Change that fits the displacement best."""
@@ -152,6 +191,45 @@ class _ChangeFit:
         start = self.meet - 0.5 * duration
         low, high = (start - half + end - self.meet for end in (min(self.meets), max(self.meets)))
         return Change(start, duration, before, after, low, high + 2 * half, shortest, longest)
+
+    @property
+    def tells(self) -> bool:
+        """True if the samples around the change can tell how a servo follows it."""
+        return len(self.time) >= ENOUGH_SAMPLES and self.reach > 0
+
+    @cached_property
+    def at_once(self) -> float:
+        """Misfit of the better of a step and the best ramp, per independent sample."""
+        return min(self._misfit(duration) for duration in (0.0, self._ramp()[0])) / self.inflation
+
+    def of_servo(self, lag: float, damping: float) -> float:
+        """Misfit of the two lines joined by a servo, per independent sample."""
+        return self._robust(self._off_servo(lag, damping)) / self.inflation
+
+    def explained_by(self, lag: float, damping: float) -> bool:
+        """True if a servo leaves no more than noise of the samples around the change, as it does not of a glitch."""
+        near = np.abs(self.time - self.meet) <= AROUND * (settling(lag, damping) + self.spacing)
+        count = max(int(np.sum(near)), 1)
+        return bool(self._robust(self._off_servo(lag, damping), near) / count < 1.0 + LEFT / np.sqrt(count))
+
+    def _off_servo(self, lag: float, damping: float) -> Array:
+        since = self.time - (self.meet - lag)
+        beyond = (self.rates[1] - self.rates[0]) * travel(since, lag, damping)
+        return np.asarray(self.displacement - self._lines()[0] - beyond)
+
+    def late_change(self, before: float, after: float, blurred: bool, lag: float, damping: float) -> Change:
+        """Step that a servo follows late; its time is as uncertain as that where the lines meet.
+
+        Where a servo does not explain the samples, a glitch or a slip of the sensor is there too.
+        """
+        if not (self.tells and self.explained_by(lag, damping)):
+            step = self.change(before, after, blurred)
+            if step.duration:
+                return step
+            earlier = {"time": step.time - lag, "earliest": step.earliest - lag}
+            return replace(step, **earlier, longest=0.0, lag=lag, damping=damping)
+        start, half = self.meet - lag, 6 * self.deviation + self.spacing + LAG_ERROR * lag
+        return Change(start, 0.0, before, after, start - half, start + half, lag=lag, damping=damping)
 
     def _uncertain_change(self, before: float, after: float, slack: float) -> Change:
         """Change where the lines do not meet between the runs, because of a glitch or a slip of the sensor."""
@@ -187,13 +265,20 @@ class _ChangeFit:
 
     def _misfit(self, duration: float, rows: Array | slice = slice(None)) -> float:
         """Chi squared of a ramp between the two lines, robust against glitches."""
-        t = self.time - self.origin
-        lines = [level + rate * t for level, rate in zip(self.levels, self.rates, strict=True)]
+        lines = self._lines()
         since = self.time - (self.meet - 0.5 * duration)
         bend = lines[0] + 0.5 * (self.rates[1] - self.rates[0]) * since**2 / max(duration, 1e-300)
         model = np.where(since <= 0, lines[0], np.where(since >= duration, lines[1], bend))
+        return self._robust(self.displacement - model, rows)
+
+    def _lines(self) -> list[Array]:
+        """Displacement on the lines before and after."""
+        t = self.time - self.origin
+        return [level + rate * t for level, rate in zip(self.levels, self.rates, strict=True)]
+
+    def _robust(self, deviations: Array, rows: Array | slice = slice(None)) -> float:
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
-        squares = ((self.displacement - model)[rows] / scale) ** 2
+        squares = self.worth[rows] * (deviations[rows] / scale) ** 2
         return float(OUTLIER * np.sum(np.log1p(squares / OUTLIER)))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly, read_only
+from steadyslip.experiments.loading.servo import ramps
 
 LoadCurve = Callable[[Array], Array]
 FELT = 1e-6  # error of a level, relative to the highest, below which it has no effect on a fit
@@ -36,6 +37,9 @@ class Change:
         Range of the time at which it may begin, s; equal if the column determines it.
     shortest, longest : float
         Range of the duration, s. For a step: zero, and the longest ramp that fits as well.
+    lag, damping : float
+        Of a servo that follows a step late (see `steadyslip.experiments.loading.servo`), s and 1; `time` is then that
+        of the command. Zero where the level changes at once or along a ramp.
     """
 
     time: float
@@ -46,6 +50,13 @@ class Change:
     latest: float
     shortest: float = 0.0
     longest: float = 0.0
+    lag: float = 0.0
+    damping: float = 0.0
+
+    @property
+    def ramps(self) -> tuple[tuple[float, float, float], ...]:
+        """Straight ramps of which it consists: begin after `time` (s), duration (s) and share of the change."""
+        return ramps(self.lag, self.damping) if self.lag else ((0.0, self.duration, 1.0),)
 
     @property
     def free(self) -> bool:
@@ -101,9 +112,11 @@ class Course(ReadOnly):
         """Values at given times (s)."""
         knots, values = [-np.inf], [self.first]
         for change in self.changes:
-            end = change.time + max(change.duration, 1e-12 * (1 + abs(change.time)))
-            knots += [change.time, end]
-            values += [change.before, change.after]
+            level = change.before
+            for since, duration, share in change.ramps:
+                begin = change.time + since
+                knots += [begin, begin + max(duration, 1e-12 * (1 + abs(begin)))]
+                values += [level, level := level + share * (change.after - change.before)]
         knots[0] = (knots[1] if len(knots) > 1 else 0.0) - 1.0
         found = np.interp(time, knots, values)
         return np.asarray(found if self.curve is None else found + self.curve(time))
@@ -115,7 +128,7 @@ class Course(ReadOnly):
 
     def integral(self, time: Array) -> Array:
         """Integral from the first of given times."""
-        knots = [c.time for c in self.changes] + [c.time + c.duration for c in self.changes]
+        knots = [c.time + t for c in self.changes for since, length, _ in c.ramps for t in (since, since + length)]
         inner = [k for k in knots if time[0] < k < time[-1]]
         grid = np.unique(np.concatenate([time, inner]))
         middle = 0.5 * (grid[1:] + grid[:-1])  # the midpoint rule is exact: each interval is in one level or ramp

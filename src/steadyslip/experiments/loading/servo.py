@@ -1,0 +1,93 @@
+"""Response of a servo to a step of the commanded rate: it follows late, and may overshoot.
+
+The rate of the load point answers as a second-order system does, with poles s₁, s₂: a share
+g(t) = 1 − (s₂ exp(s₁ t) − s₁ exp(s₂ t)) / (s₂ − s₁) of the step is made a time t after the command. Far from the step
+the load point is behind the command by the step times `lag` = 2 ζ/ω, so that the lines through its displacement before
+and after meet `lag` after the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import minimize
+
+from steadyslip.core.arrays import Array
+
+DAMPINGS = (0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 1.05, 1.5, 3.0, 10.0)
+"""Damping ratios from which a search starts: overshoot of 53 % down to none, and a single exponential."""
+LAGS = 12  # lags from which it starts, in geometric progression
+GAIN = 14.0
+"""Decrease of chi squared by which a servo must fit better than steps or ramps. Of 120 records without one, with white
+or correlated noise, one reached 13.9, the next 4.8."""
+SETTLED = 1e-3  # share of a step that is left when it counts as made
+PIECES = 24  # straight ramps that stand for a response: its rate is then right to a hundredth of the step
+
+
+def _poles(lag: float, damping: float) -> tuple[complex, complex]:
+    """Poles s₁, s₂ (1/s) of a servo."""
+    damping = damping if abs(damping - 1) > 1e-4 else 1 + 1e-4  # a double pole divides by zero
+    omega, root = 2 * damping / lag, np.sqrt(complex(damping**2 - 1))
+    return complex(omega * (root - damping)), complex(omega * (-root - damping))
+
+
+def rate_share(since: Array, lag: float, damping: float) -> Array:
+    """Share of a step of rate that a servo has made at times `since` the command (s)."""
+    one, other = _poles(lag, damping)
+    t = np.maximum(since, 0.0)
+    return np.asarray(1 - np.real((other * np.exp(one * t) - one * np.exp(other * t)) / (other - one)))
+
+
+def travel(since: Array, lag: float, damping: float) -> Array:
+    """Displacement at times `since` the command (s) by a step of rate of 1, in s: the integral of `rate_share`."""
+    one, other = _poles(lag, damping)
+    t = np.maximum(since, 0.0)
+    late = other / one * np.expm1(one * t) - one / other * np.expm1(other * t)
+    return np.asarray(t - np.real(late / (other - one)))
+
+
+def settling(lag: float, damping: float) -> float:
+    """Time (s) after the command at which all but `SETTLED` of a step is made."""
+    return float(-np.log(SETTLED) / min(-pole.real for pole in _poles(lag, damping)))
+
+
+@lru_cache(maxsize=256)
+def ramps(lag: float, damping: float) -> tuple[tuple[float, float, float], ...]:
+    """Straight ramps that stand for a response: begin after the command (s), duration (s) and share of the step."""
+    t = np.linspace(0.0, settling(lag, damping), 4000)
+    bend = np.sqrt(np.abs(np.gradient(np.gradient(rate_share(t, lag, damping), t), t)))
+    along = np.concatenate([[0.0], np.cumsum(0.5 * (bend[1:] + bend[:-1]) * np.diff(t))])
+    nodes = np.interp(np.linspace(0.0, along[-1], PIECES + 1), along, t)
+    share = rate_share(nodes, lag, damping)
+    share[0], share[-1] = 0.0, 1.0
+    return tuple(zip(nodes[:-1].tolist(), np.diff(nodes).tolist(), np.diff(share).tolist(), strict=True))
+
+
+def overshoot(damping: float) -> float:
+    """Largest share of a step by which the rate passes its new level."""
+    return float(np.exp(-np.pi * damping / np.sqrt(1 - damping**2))) if damping < 1 else 0.0
+
+
+def fitted_servo(misfit: Callable[[float, float], float], shortest: float, longest: float) -> tuple[float, float]:
+    """Lag (s) and damping ratio of the servo that fits best.
+
+    Parameters
+    ----------
+    misfit : callable
+        Chi squared of a lag and a damping ratio.
+    shortest, longest : float
+        Range of lags that are tried, s.
+    """
+    starts = [(lag, damping) for lag in np.geomspace(shortest, longest, LAGS) for damping in DAMPINGS]
+    begin = min(starts, key=lambda one: misfit(*one))
+
+    def cost(x: Array) -> float:
+        lag, damping = np.exp(x)
+        inside = 0.2 * shortest <= lag <= longest and 0.1 <= damping <= 50
+        return float(misfit(lag, damping)) if inside else np.inf
+
+    found = minimize(cost, np.log(begin), method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2})
+    lag, damping = np.exp(found.x)
+    return float(lag), float(damping)

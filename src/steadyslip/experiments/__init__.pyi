@@ -10,8 +10,8 @@ from .answers.predict import Prediction, predict
 from .answers.profiles import Profile, profile
 from .answers.uncertainty import Draws, bootstrap, load_draws, normal_draws, posterior
 from .answers.validation import CrossValidation, cross_validate
+from .fitting.estimate import Estimate
 from .fitting.fit import fit
-from .fitting.numbers import Estimate
 from .fitting.result import Fit, load_fit
 from .from_files import fit_files, population_files
 from .measured.read import read_record, record_from_arrays

@@ -11,6 +11,7 @@ from steadyslip.core.areas import total
 from steadyslip.core.checks import as_data, in_words
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.version import of_another
+from steadyslip.experiments.fitting.estimate import Estimate
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
 from steadyslip.experiments.fitting.residuals import residual_checks
@@ -36,7 +37,7 @@ MAX_JUMP_ERROR = (
 def words(fit: FitNumbers) -> str:
     """Text of a fit: estimates, quality and warnings."""
     names = short_names(fit.names)
-    wide = max(len(name) for name in names)
+    wide = max(len(name) for name in (*names, *(one.name for one in fit.derived)))
     rows = []
     for name, one in zip(names, fit.estimates, strict=True):
         interval = f"   95 %: {one.range()}" if one.determined else ""
@@ -45,6 +46,8 @@ def words(fit: FitNumbers) -> str:
             rows.append(f"  {name:<{wide}}  {one.shown()}{interval}")
         if per_stress is not None:
             rows.append(f"  {'k/σ':<{wide}}  {per_stress}")
+    follows = [one for one in fit.derived if one.unit == "1" or not _stress_assumed(fit)]
+    rows += [f"  {one.name:<{wide}}  {one.shown()}   95 %: {one.range()}" for one in follows]
     sources = ", ".join(record.source for record in fit.plan.records)
     friction = type(fit.plan.rig.friction).__name__
     lines = [f"{friction} friction fitted to {fit.samples} samples of {sources}", *rows, "", *_quality(fit)]
@@ -381,24 +384,25 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
     )
 
 
+def _estimate(one: Estimate) -> dict[str, Any]:
+    return {
+        "value": one.value,
+        "error": one.error if one.determined else None,
+        "low": one.low if np.isfinite(one.low) and one.determined else None,
+        "high": one.high if np.isfinite(one.high) and one.determined else None,
+        "unit": one.unit,
+        "determined": one.determined,
+    } | total(one.value, one.unit, one.area)
+
+
 def as_dict(fit: FitNumbers) -> dict[str, Any]:
     """Data of a fit for JSON, in SI units; None for what does not exist."""
     return {
         "version": fit.version,
         "records": [record.source for record in fit.plan.records],
         "samples": fit.samples,
-        "parameters": {
-            e.name: {
-                "value": e.value,
-                "error": e.error if e.determined else None,
-                "low": e.low if np.isfinite(e.low) and e.determined else None,
-                "high": e.high if np.isfinite(e.high) and e.determined else None,
-                "unit": e.unit,
-                "determined": e.determined,
-            }
-            | total(e.value, e.unit, e.area)
-            for e in fit.estimates
-        },
+        "parameters": {one.name: _estimate(one) for one in fit.estimates},
+        "derived": {one.name: _estimate(one) for one in fit.derived},
         "correlation": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.correlation],
         "driven_by": drive_line(fit),
         "ssq": fit.ssq,

@@ -1,0 +1,53 @@
+"""a − b, critical stiffness and k/k_c of a fit: against its draws, the formula, and the truth."""
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from lab_records import STEP, record, rig, stepped, two_states
+
+TRUE_LEVEL = -0.0035
+
+
+def by_name(fit):
+    return {one.name: one for one in fit.derived}
+
+
+def test_derived_numbers_are_those_of_the_rig_and_their_errors_those_of_draws():
+    fit = stepped()
+    found, fitted = by_name(fit), fit.rig()
+    assert list(found) == ["a - b", "k_c", "k/k_c"]
+    assert found["a - b"].value == fit.values["friction.a"] - fit.values["friction.b"]
+    assert found["k_c"].value == pytest.approx(float(ss.critical_stiffness(fitted)), rel=1e-12)
+    assert found["k/k_c"].value == pytest.approx(float(ss.safety_factor(fitted)), rel=1e-12)
+    draws = ss.experiments.normal_draws(fit, 20_000)
+    stress = fitted.contact.steady_normal_stress
+    level = draws["friction.a"] - draws["friction.b"]
+    edge = -stress * level / draws["friction.d_c"]
+    for name, drawn in (("a - b", level), ("k_c", edge), ("k/k_c", draws["slider.stiffness"] / edge)):
+        assert found[name].error == pytest.approx(np.std(drawn), rel=0.03)
+        assert (found[name].low, found[name].high) == pytest.approx(np.quantile(drawn, [0.025, 0.975]), rel=0.003)
+    assert abs(found["a - b"].value - TRUE_LEVEL) < 3 * found["a - b"].error
+    assert found["a - b"].error < 0.3 * fit.errors["friction.a"]  # a and b go along with each other
+    text = str(fit)
+    assert all(f"  {name} " in text for name in found)
+    assert fit.to_dict()["derived"]["a - b"]["error"] == found["a - b"].error
+
+
+@pytest.mark.campaign
+def test_all_states_count_and_each_record_has_its_own_edge():
+    fit = ss.fit(ss.lab_rig(states=2), record(two_states(), STEP))
+    states = [value for name, value in fit.values.items() if name.endswith(".b")]
+    assert len(states) == 2
+    assert by_name(fit)["a - b"].value == pytest.approx(fit.values["friction.a"] - sum(states), rel=1e-12)
+    heavier = rig().with_values({"contact.steady_normal_stress": 2e7, "slider.stiffness": 4e10})
+    joint = ss.fit(ss.lab_rig(), [record(rig(), STEP), record(heavier, STEP, 1)], separate=["slider.stiffness"])
+    found = by_name(joint)
+    assert list(found) == ["a - b", "k_c@1", "k_c@2", "k/k_c@1", "k/k_c@2"]
+    assert found["k_c@2"].value == pytest.approx(2 * found["k_c@1"].value, rel=1e-3)
+
+
+def test_without_an_edge_there_is_a_minus_b_alone():
+    fit = ss.fit(ss.lab_rig(), record(rig(b=0.008), STEP))
+    assert list(by_name(fit)) == ["a - b"]
+    assert by_name(fit)["a - b"].value == pytest.approx(0.003, abs=4 * by_name(fit)["a - b"].error)

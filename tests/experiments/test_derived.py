@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from lab_records import STEP, record, rig, stepped, two_states
+from lab_records import STEP, columns, record, rig, stepped, two_states
 
 TRUE_LEVEL = -0.0035
 
@@ -51,3 +51,16 @@ def test_without_an_edge_there_is_a_minus_b_alone():
     fit = ss.fit(ss.lab_rig(), record(rig(b=0.008), STEP))
     assert list(by_name(fit)) == ["a - b"]
     assert by_name(fit)["a - b"].value == pytest.approx(0.003, abs=4 * by_name(fit)["a - b"].error)
+
+
+def test_without_a_displacement_the_rate_that_is_assumed_is_named():
+    """With another rate than the record's a came out half: it is the rig's own, which nothing in the record shows."""
+    faster = rig().with_values({"drive.velocity": 3e-6})
+    protocol = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=60.13, to=15e-6),), until=150.0)
+    found = columns(faster, protocol, 500)
+    bare = ss.record_from_arrays(time=found["time"], friction=found["friction"], normal=found["normal"])
+    fit = ss.fit(ss.lab_rig(velocity="3 um/s"), bare, protocol=protocol)
+    assert fit.values["friction.a"] == pytest.approx(0.011, rel=0.01)
+    text = " ".join(str(fit).split())
+    assert "the protocol that was given, from 3 um/s on" in text
+    assert "taken to move at 3 um/s (drive.velocity)" in text

@@ -209,6 +209,7 @@ def lab_rig(
     pores: bool = False,
     stiffness: Any = None,
     v_ref: Any = "1 um/s",
+    velocity: Any = "1 um/s",
 ) -> Slider:
     """Make a rig for fits, with rate-and-state friction and constant normal stress; its values are placeholders.
 
@@ -226,12 +227,15 @@ def lab_rig(
         Of the machine, Pa/m, where it is known; name it in ``fixed`` of `fit`.
     v_ref : float or str
         Rate at which mu_ref holds.
+    velocity : float or str
+        Rate of the load point before the first change of a protocol; needed where no record has a displacement.
     """
     rate = _checked("v_ref", "m/s", v_ref)
     friction = {"evolution": evolution, "v_ref": rate, "normal_memory": {"law": normal_memory}}
     filled = _Placeholders()
     count = int(states) if isinstance(states, np.integer) else states
-    tables = {"friction": friction, "fit": {"states": count}}
+    drive = {"velocity": _checked("velocity", "m/s", velocity)}
+    tables = {"friction": friction, "fit": {"states": count}, "drive": drive}
     rig = _spec(read_tables(tables, {}, "lab_rig", further=TABLES, complete=filled.complete), filled).rig
     rig = with_pores(rig) if pores else rig
     return rig if stiffness is None else replace(rig, stiffness=_checked("stiffness", "Pa/m", stiffness))

@@ -111,7 +111,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
     found += list(fit.at_bounds) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit) + _vague_jumps(fit)
-    found += _possible_ramps(fit) + _missing_memory(fit) + _drained_at_once(fit)
+    found += _assumed_rate(fit) + _possible_ramps(fit) + _missing_memory(fit) + _drained_at_once(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     if other := of_another(fit.version):
@@ -310,7 +310,7 @@ def drive_line(fit: FitNumbers) -> str:
     """Text on the loading of the model, and on its effect on a, b and k."""
     plan = fit.plan
     if plan.protocol is not None:
-        return "the protocol that was given"
+        return f"the protocol that was given, from {_own_rate(fit)} on"
     if plan.drive == "measured":
         return "load point and normal stress as measured, noise included"
     loads = [loading.load for loading in plan.loading if loading.load is not None]
@@ -345,6 +345,21 @@ def drive_line(fit: FitNumbers) -> str:
         if name in other and fit.values.get(name)
     ]
     return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
+
+
+def _own_rate(fit: FitNumbers) -> str:
+    """Rate at which the rig itself is driven, as printed."""
+    return format_quantity(float(operating_point(fit.plan.rig).drive), "m/s")
+
+
+def _assumed_rate(fit: FitNumbers) -> list[str]:
+    """Warning that no displacement confirms the rate before the first change of a protocol."""
+    if fit.plan.protocol is None or any(record.displacement is not None for record in fit.plan.records):
+        return []
+    return [
+        f"no record has a displacement of the load point: it is taken to move at {_own_rate(fit)} (drive.velocity) "
+        "until the protocol changes that; if it moved at another rate, every number above is off"
+    ]
 
 
 def _servo(course: Course) -> str:

@@ -16,7 +16,7 @@ from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
 from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.fitting.comparison import Comparison
-from steadyslip.experiments.fitting.derived import derived_estimates
+from steadyslip.experiments.fitting.derived import Minimum, derived_estimates
 from steadyslip.experiments.fitting.estimate import Estimate
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan
@@ -140,7 +140,8 @@ class FitNumbers(ReadOnly):
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
         """What follows from them: ``a - b``, critical stiffness ``k_c`` (Pa/m) and ``k/k_c``, with errors."""
-        return derived_estimates(self)
+        minimum = Minimum(self.space, self.coordinates, self.covariance, self.degrees)
+        return derived_estimates(minimum, [part.rig for part in self.comparison.parts])
 
     @cached_property
     def as_measured(self) -> dict[str, float] | None:

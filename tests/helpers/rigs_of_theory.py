@@ -44,6 +44,10 @@ ONE_MEMORY = (
     ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10, viscous=5),
 )
 
+STICKING = ss.Slider(
+    friction=ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5),
+    contact=ss.laws.ConstantNormalStress(preload=1e5), stiffness=1e8, mass=100.0, drive=ss.machine.SteadyDrive(1e-3),
+)  # fmt: skip
 
 LAWS = {
     "slip": ONE_MEMORY[0],

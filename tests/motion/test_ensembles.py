@@ -8,7 +8,7 @@ import xarray as xr
 
 import steadyslip as ss
 from dimensionless import A, unit_rig
-from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, rig
 from steadyslip.motion import engine
 
 STEP = ss.protocol.VelocityStep(at=5.0, to=1.5)
@@ -44,10 +44,6 @@ def test_lanes_equal_single_runs():
         assert ensemble.events["peak_velocity"][i] == pytest.approx(max(e.velocity for e in peaks), rel=1e-9)
 
 
-STICKING = ss.Slider(
-    friction=ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5),
-    contact=ss.laws.ConstantNormalStress(preload=1e5), stiffness=1e8, mass=100.0, drive=ss.machine.SteadyDrive(1e-3),
-)  # fmt: skip
 WATCHED = {
     # rig, protocol, start: of slip events, of small oscillations, under inputs that change, with mass, without ln v
     "stick-slip": (unit_rig("aging", 0.5, 0.4, 1e-3), STEP, {"v": 1.2}, 60.0),
@@ -61,6 +57,7 @@ WATCHED = {
     "mass": (unit_rig("slip", 0.5, 0.4, 1e-3, 1e-3), [ss.protocol.Hold(at=5.0, duration=20.0)], {"x": 1.0}, 60.0),
     "Coulomb": (STICKING, ss.protocol.VelocityStep(at=0.01, to=1.1e-3), {}, 0.3),
 }
+RTOL = {"Coulomb": 1e-9}  # rounding of time decides about the last steps of a landing; runs then differ by their errors
 
 
 @pytest.mark.parametrize("case", WATCHED)
@@ -71,9 +68,10 @@ def test_lanes_see_what_single_runs_see(case):
     """
     a_rig, protocol, initial, until = WATCHED[case]
     k = float(a_rig.stiffness) * np.random.default_rng(0).uniform(0.75, 1.5, 24)
-    tally = ss.simulate_many(a_rig, {"stiffness": k}, protocol, until=until, initial=initial).events
+    options = {"until": until, "initial": initial, "rtol": RTOL.get(case, 1e-7)}
+    tally = ss.simulate_many(a_rig, {"stiffness": k}, protocol, **options).events
     for i in (0, 5, 11, 23):
-        run = ss.simulate(a_rig.with_values({"stiffness": k[i]}), protocol, until=until, initial=initial)
+        run = ss.simulate(a_rig.with_values({"stiffness": k[i]}), protocol, **options)
         kinds = [event.kind for event in run.events]
         peaks = [event for event in run.events if event.kind == "velocity peak"]
         assert tally["events"][i] == len(run.slip_events)

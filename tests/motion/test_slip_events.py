@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from dimensionless import A, unit_rig
-from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, rig
 from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
@@ -212,9 +212,11 @@ def test_steady_sliding_has_no_events_however_long_the_steps(rtol, until):
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
-def test_ringing_has_every_peak_and_trough_down_to_the_error_allowed(rtol):
+@pytest.mark.parametrize("method", ["auto", "rosenbrock", "rodas5p"])
+def test_ringing_has_every_peak_and_trough_down_to_the_error_allowed(rtol, method):
     """None is left out or told twice, and none is told of what the integration may have made itself."""
-    run = ss.simulate(unit_rig("aging", 0.5, 0.51), ss.protocol.VelocityStep(at=5, to=1.03), until=8000.0, rtol=rtol)
+    a_rig, plan = unit_rig("aging", 0.5, 0.51), ss.protocol.VelocityStep(at=5, to=1.03)
+    run = ss.simulate(a_rig, plan, until=8000.0, rtol=rtol, method=method)
     turns = [event for event in run.events if event.kind.startswith("velocity")]
     kinds = [event.kind for event in turns]
     assert kinds == (["velocity peak", "velocity trough"] * len(turns))[: len(turns)]
@@ -223,3 +225,51 @@ def test_ringing_has_every_peak_and_trough_down_to_the_error_allowed(rtol):
     times = np.array([event.time for event in turns])[size > 3 * rtol]
     apart = np.diff(times)
     assert 0.7 * np.median(apart) < apart.min() <= apart.max() < 1.3 * np.median(apart)
+
+
+def extremes(run, kind):
+    return [event for event in run.events if event.kind == kind]
+
+
+def test_no_velocity_peak_is_counted_where_a_run_ends_while_the_block_sticks():
+    """It creeps at a millionth of the drive's velocity; an acceleration from its error would have either sign."""
+    k, until = 1e8 * np.random.default_rng(0).uniform(0.75, 1.5, 8), np.linspace(0.05, 0.3, 81)
+    plan, vary = ss.protocol.VelocityStep(at=0.01, to=1.1e-3), {"stiffness": k[:, None], "protocol.until": until}
+    found = ss.simulate_many(STICKING, vary, ss.Protocol(pieces=(plan,), until=0.3), rtol=1e-8).events
+    for stiffness, counts in zip(k, found["velocity_peaks"], strict=True):
+        run = ss.simulate(STICKING.with_values({"stiffness": stiffness}), plan, until=0.3, rtol=1e-8)
+        times = [event.time for event in extremes(run, "velocity peak")]
+        assert np.min(np.abs(np.subtract.outer(times, until))) > 1e-6
+        np.testing.assert_array_equal(counts, np.searchsorted(times, until))
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-9])
+def test_a_block_that_sticks_has_no_velocity_peaks(rtol):
+    random, stuck = np.random.default_rng(0), 0
+    for _ in range(60):
+        mu, drive, preload, stiffness = random.uniform(0.1, 0.6), *10 ** random.uniform([-5, 4, 6], [-2.3, 7, 10])
+        mass, v_stribeck, viscous = 10 ** random.uniform([0, -5, -3], [4, -2, 0])
+        law = ss.laws.CoulombStribeck(
+            mu_coulomb=mu, mu_static=mu * random.uniform(1.05, 2), v_stribeck=v_stribeck, viscous=viscous
+        )
+        contact = ss.laws.ConstantNormalStress(preload=preload)
+        a_rig = ss.Slider(
+            friction=law, contact=contact, stiffness=stiffness, mass=mass, drive=ss.machine.SteadyDrive(drive)
+        )
+        until = random.uniform(0.3, 6) * mu * preload / stiffness / drive + 20 * np.sqrt(mass / stiffness)
+        plan = ss.protocol.VelocityStep(at=0.01 * until, to=1.1 * drive)
+        run = ss.simulate(a_rig, plan, until=until, rtol=rtol, most_steps=30_000)
+        assert [event for event in extremes(run, "velocity peak") if abs(event.velocity) < 1e-3 * drive] == [], a_rig
+        stuck += len(extremes(run, "arrest"))
+    assert stuck > 60
+
+
+def test_steps_of_the_drive_while_a_block_sticks_are_no_extremes_of_its_velocity():
+    random = np.random.default_rng(3)
+    for _ in range(10):
+        at, to = np.sort(random.uniform(0.02, 0.3, 12)), random.uniform(0.9e-3, 1.2e-3, 12)
+        plan = [ss.protocol.VelocityStep(at=0.01, to=1.1e-3)]
+        plan += [ss.protocol.VelocityStep(at=start, to=v) for start, v in zip(at, to, strict=True)]
+        run = ss.simulate(STICKING, plan, until=0.3, rtol=1e-8)
+        assert min(event.velocity for event in extremes(run, "velocity peak")) > 1e-3
+        assert len(extremes(run, "velocity trough")) <= len(extremes(run, "arrest"))

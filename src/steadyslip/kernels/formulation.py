@@ -10,6 +10,7 @@ import sympy as sp
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import derivative
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.chains import with_short_chains
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Layout, make_layout
@@ -58,6 +59,9 @@ class Formulation:
     constants : Constants
     size : int
         Length of the state.
+    moving : list of int
+        Indices in the state of the variables that velocities of contacts depend on; only for implicit methods with
+        dense output, whose rates at the end of a step have an error of their own (`steadyslip.kernels.step`).
     """
 
     varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # inputs with rates of change; the steady drive is a constant too
@@ -73,6 +77,8 @@ class Formulation:
         self.unknowns = len(reduction.unknowns)
         self.names |= {symbol: f"z{k}" for k, symbol in enumerate(reduction.unknowns)}
         variables.update(reduction.unknowns)
+        self.rated = tuple(inner_symbol(f"rate{i}", real=True) for i in range(self.size))
+        variables.update(self.rated)
         self.constants = Constants(variables)
         self._rates = [self._with_constants(rate) for rate in reduction.rates]
         self.driven = self._rates_with_constants()
@@ -162,6 +168,11 @@ class Formulation:
             if self.timed:
                 entries += [self._with_constants(e) for e in reduction.time_derivative()]
             self.jacobian = self._formulas(entries)
+        self.moving: list[int] = []
+        if self.choice.dense and self.method.implicit:
+            changes = [reduction.change(one.outputs["v"], self.rated) for one in reduction.slidings]
+            self.accelerations = self._formulas([self._with_constants(e) for e in changes])
+            self.moving = [i for i, rate in enumerate(self.rated) if any(e.has(rate) for e in changes)]
         self._write_velocity()
         known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | self._inputs
         known |= {w: f"w{k}" for k, (w, _) in enumerate(reduction.restarts)}
@@ -224,6 +235,7 @@ class Formulation:
             harmonics=choice.harmonics,
             stages=self.method.stages if choice.dense else 0,
             terms=self.terms,
+            moving=len(self.moving),
             extra=choice.dense and self.method.all_stages > self.method.stages,
             massless=massless,
             unknowns=self.unknowns,

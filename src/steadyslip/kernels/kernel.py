@@ -58,7 +58,8 @@ class Kernel(Formulation):
             record.program.store(row, found[self.size + i])
         for place, value in record.further_contact_rows(found[self.size :]):
             record.program.store(place, value)
-        moments = record.moments(point, found[self.size :])
+        rates = [rate - record.rate_error(i) for i, rate in enumerate(found[: self.size])]
+        moments = record.moments(point, found[self.size :], rates=rates)
         for e, value in enumerate(record.event_values(moments) if self.choice.dense else ()):
             record.program.store(self.layout.event_value + e, value)
         if self.choice.dense and self.limit is not None:

@@ -206,6 +206,8 @@ class Layout(NamedTuple):
     stage: int
     polynomial: int
     """Dense output of the last step: per variable, coefficients of powers of the fraction of the step."""
+    rate_error: int
+    """Errors of the rates at the end of the step, of the variables that velocities depend on; of implicit methods."""
     event_value: int
     """Values of the event functions at the end of the step."""
     sign_change: int
@@ -233,7 +235,7 @@ def make_layout(
     *, lanes: int, size: int, kept: int, constants: int, inputs: int, harmonics: int = 0, stages: int = 0,
     terms: int = 0, massless: int = 0, unknowns: int = 0, solved: bool = False, w: int = -1, own: int = 0,
     directions: int = 0, x: int = 0, seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False,
-    contacts: int = 1, further: int = 0,
+    contacts: int = 1, further: int = 0, moving: int = 0,
 ) -> Layout:  # fmt: skip
     """Layout with the groups of the record one after the other."""
     waves, further_ones = inputs * harmonics, max(massless, unknowns, 1) - 1
@@ -242,6 +244,7 @@ def make_layout(
         "amplitude": waves, "omega": waves, "phase": waves,
         "constant": constants, "state_old": size if stages else 0, "stage": size * stages,
         "polynomial": size * terms if stages else 0,
+        "rate_error": moving,
         "event_value": events, "sign_change": events, "event_count": 2 * events, "observable": seen,
         "rate_before": own if seen else 0,
         "guess": further_ones, "scale": further_ones, "unknown_old": max(unknowns - 1, 0),

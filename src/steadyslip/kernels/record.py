@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import cycle, pairwise
 
@@ -143,11 +144,21 @@ class Evaluator:
             return found
         h = self.program.load(Row.STEP_SIZE)
         first = h * self.program.load(Row.W_RATE_OLD) - found[1]
-        last = h * self.program.load(self.kernel.layout.rate + i) - total(slope_of(found))
+        last = h * self.settled_rate(i) - total(slope_of(found))
         found[1] = found[1] + first
         found[2] = found[2] - (2.0 * first + last)
         found[3] = found[3] + (first + last)
         return found
+
+    def rate_error(self, i: int) -> Value:
+        """Error of the rate of variable i at the end of the last step; 0 if velocities do not depend on it."""
+        moving = self.kernel.moving
+        return self.program.load(self.kernel.layout.rate_error + moving.index(i)) if i in moving else 0.0
+
+    def settled_rate(self, i: int) -> Value:
+        """Rate of variable i at the end of the last step without its error."""
+        rate = self.program.load(self.kernel.layout.rate + i)
+        return rate - self.rate_error(i) if i in self.kernel.moving else rate
 
     def state_at_fraction(self, theta: Node) -> list[Value]:
         """State at a fraction of the last step."""
@@ -192,10 +203,17 @@ class Evaluator:
         }
         return Observed(contact, v, acceleration, sigma, h=h, outputs=outputs, **limits)
 
-    def moments(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> list[Observed]:
-        """Arguments of the event functions of all contacts."""
+    def moments(
+        self, point: Values, found: Sequence[Value], h: Value = 1.0, rates: Sequence[Value] = ()
+    ) -> list[Observed]:
+        """Arguments of the event functions of all contacts; accelerations are those at given `rates` of the state."""
         each = len(found) // self.kernel.contacts
-        return [self.moment(point, found[c * each :], h, c) for c in range(self.kernel.contacts)]
+        moments = [self.moment(point, found[c * each :], h, c) for c in range(self.kernel.contacts)]
+        if not (rates and self.kernel.moving):
+            return moments
+        given = point | {s.name: rate for s, rate in zip(self.kernel.rated, rates, strict=True)}
+        accelerations = self.evaluated(self.kernel.accelerations, given, found=True)
+        return [replace(one, acceleration=value) for one, value in zip(moments, accelerations, strict=True)]
 
     def further_contact_rows(self, found: Sequence[Value]) -> list[tuple[int, Value]]:
         """(row, value) of what the record stores about further contacts, from v, acceleration and sigma of all."""

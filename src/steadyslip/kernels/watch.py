@@ -62,7 +62,7 @@ class Watch(Evaluator):
         turning += [0.0] * (len(crossing) - len(turning))
         crossing += [0.0] * (len(turning) - len(crossing))
         wanted = [select(self.turns, a, b) for a, b in zip(turning, crossing, strict=True)]
-        rates = program.load(Row.W_RATE_OLD), program.load(kernel.layout.rate + w)
+        rates = program.load(Row.W_RATE_OLD), self.settled_rate(w)
         first = select(self.turns, self.h * rates[0], own[0] - limit)
         last = select(self.turns, self.h * rates[1], program.load(kernel.layout.state + w) - limit)
         theta: Node = first / (first - last)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -164,7 +164,14 @@ class Reduction(Keeper):
 
     def time_derivative(self) -> list[sp.Expr]:
         """Partial time derivatives of the rates, through the inputs."""
-        return [
-            sp.Add(*(self.derivative(rate, s) * slope for s, slope in zip(self.inputs, (*self.slopes, 1), strict=True)))
-            for rate in self.rates
-        ]
+        return [self._in_time(rate) for rate in self.rates]
+
+    def change(self, expression: sp.Expr, rates: Sequence[sp.Expr]) -> sp.Expr:
+        """Total time derivative of an expression at given rates of the state."""
+        moved = (self.derivative(expression, s) * rate for s, rate in zip(self.state, rates, strict=True))
+        return sp.Add(*moved, self._in_time(expression))
+
+    def _in_time(self, expression: sp.Expr) -> sp.Expr:
+        """Partial time derivative of an expression, through the inputs."""
+        slopes = zip(self.inputs, (*self.slopes, sp.Integer(1)), strict=True)
+        return sp.Add(*(self.derivative(expression, s) * slope for s, slope in slopes))

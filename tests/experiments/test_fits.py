@@ -44,6 +44,21 @@ def test_the_truth_comes_back_from_no_guess(rig, protocol, guess, jumps):
         assert fit.rms == pytest.approx(lab.NOISE, rel=0.06)
 
 
+def test_cutoff_velocities_are_looked_for_at_those_of_the_record():
+    """Both free, wherever the rig has them: a start far below all velocities of the record cannot follow it."""
+    truth = {"a_cutoff_velocity": 3e-4, "b_cutoff_velocity": 3e-6}
+    law = ss.laws.RateState(a=0.010, b=0.012, d_c=2e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.laws.Aging(), **truth)
+    source = replace(lab.rig(), friction=law, stiffness=1e10)
+    rates = {100.0: 3e-6, 160.0: 1e-5, 190.0: 3e-5, 220.0: 1e-4, 250.0: 1e-5, 280.0: 1e-6}
+    steps = tuple(ss.protocol.VelocityStep(at=at, to=rate) for at, rate in rates.items())
+    record = lab.record(source, ss.Protocol(pieces=steps, until=380.0), noise=5e-4, count=4000)
+    for guess in ((1e-7, 1e-3), (1e-9, 1e-9), (1e3, 1e3)):
+        fit = ss.fit(source.with_values(dict(zip(truth, guess, strict=True))), record)
+        assert fit.rms == pytest.approx(5e-4, rel=0.03)
+        for name, value in truth.items():
+            assert abs(np.log(fit[name].value / value)) < 0.05
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_random_truths_come_back(seed):
     """The best minimum is at least as good as the truth itself: no start is trapped for good."""

@@ -80,6 +80,7 @@ PARAMETER_KINDS = {
     "evolution effect": "fall of friction per e-fold of velocity, as the state follows",
     "slip distance": "slip over which a memory fades",
     "reference rate": "velocity at which other parameters hold",
+    "velocity scale": "velocity near which friction begins to depend on velocity otherwise",
     "stress share": "share of the response to normal stress that is not immediate",
     "drainage": "rate at which pore pressure evens out",
     "immediate share": "share of the response to normal stress that is immediate",

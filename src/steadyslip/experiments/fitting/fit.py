@@ -72,8 +72,9 @@ def fit(
     Parameters
     ----------
     rig : Slider
-        Its laws, and the values of what is not free; values of what is free do not matter. Drive velocity and (with a
-        constant contact) normal stress are those of each record.
+        Its laws, and the values of what is not free. Values of what is free do not matter, but for parameters whose
+        kind no law declares (`steadyslip.core.roles.PARAMETER_KINDS`): these start within a decade of them. Drive
+        velocity and (with a constant contact) normal stress are those of each record.
     records : Record or sequence of Record
         Fitted together.
     free : sequence of str, optional

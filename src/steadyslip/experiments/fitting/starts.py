@@ -33,6 +33,8 @@ SPIKE_RATIO = 2.0  # a sample is a spike if it is off its neighbours by more tha
 MAX_STIFFNESS_RATIO = (
     100.0  # largest starting value of k d_c/(aσ): stiffer machines cannot be known apart from friction
 )
+FASTER = 100.0  # largest starting value of a velocity scale, in the fastest rates of the drive: events are faster
+FURTHER = 2  # velocity scales that start independently of each other: v_a and v_b
 _DIRECT = (0.004, 0.01, 0.025)  # starting values of a without a velocity step: the range usual for rocks
 
 
@@ -54,6 +56,8 @@ class Features:
         Range of friction over the whole displacement, 1/m.
     shortest, longest : float
         Range of slip distances that the record resolves, m.
+    slowest, fastest : float
+        Range of the rates of the load point, m/s; without those at rest.
     """
 
     friction: float
@@ -63,6 +67,8 @@ class Features:
     least_slope: float
     shortest: float
     longest: float
+    slowest: float
+    fastest: float
 
 
 @question
@@ -82,7 +88,9 @@ def features(record: Record, rate: float) -> Features:
     direct = drop = None
     if steps:
         direct, drop = _step_response(record, moved, steps[0])
-    return Features(level, direct, drop, slope, float(np.ptp(mu)) / total, shortest, total / 2)
+    rates = [rate, *(one for step in record.steps if step.unit != "Pa" for one in (step.before, step.after) if one > 0)]
+    least_slope = float(np.ptp(mu)) / total
+    return Features(level, direct, drop, slope, least_slope, shortest, total / 2, min(rates), max(rates))
 
 
 def _without_spikes(friction: Array) -> Array:
@@ -186,7 +194,10 @@ def starting_points(
         part = parts[unknown.record or 0]
         own = found[unknown.record or 0]
         alone = sum(one.kind == unknown.kind and one.record == unknown.record for one in space.unknowns) == 1
-        values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, grid[:, 5]), alone)
+        spread = grid[:, 5]
+        if unknown.kind == "velocity scale":
+            spread = grid[:, 6 + sum(one.kind == unknown.kind for one in space.unknowns[:i]) % FURTHER]
+        values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, spread), alone)
     return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
 
 
@@ -194,7 +205,7 @@ def starting_points(
 def _design(count: int) -> Array:
     from scipy.stats import qmc
 
-    return np.asarray(read_only(qmc.Halton(6, rng=12345).random(count)))
+    return np.asarray(read_only(qmc.Halton(6 + FURTHER, rng=12345).random(count)))
 
 
 def search_bounds(parts: Sequence[RecordPart], known: Sequence[Features], space: Space) -> tuple[Array, Array]:
@@ -242,6 +253,8 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         return d_c * (3.0 + 30.0 * spare) ** max(member - 1, 0)
     if unknown.kind == "stress share":
         return alpha
+    if unknown.kind == "velocity scale":
+        return own.slowest * (FASTER * own.fastest / own.slowest) ** spare
     if unknown.kind == "drainage":  # between a few samples and the record
         span, spacing = float(np.ptp(part.record.time)), float(np.median(np.diff(part.record.time)))
         return (0.3 / spacing) * (10 * spacing / span) ** spare

@@ -22,7 +22,7 @@ class StribeckCurve(FrictionLaw):
 
     mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
     mu_static: float = parameter("1", positive, "static friction coefficient μ_S")
-    v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S")
+    v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S", kind="velocity scale")
     viscous: float = parameter("s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0)
     stribeck_exponent: float | None = parameter(
         "1", positive, "Stribeck exponent δ_S; 2 unless given", default=None, standing=2.0

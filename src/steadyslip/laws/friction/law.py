@@ -124,5 +124,5 @@ class State(FrozenRecord):
     )
     b_cutoff_velocity: float | None = parameter(
         "m/s", positive, "velocity above which this state's effect fades; infinite unless given", default=None,
-        letter="v_b",
+        kind="velocity scale", letter="v_b",
     )  # fmt: skip

@@ -47,11 +47,11 @@ class RateState(FrictionLaw, name="rate-state"):
     v_ref: float = parameter("m/s", positive, "reference velocity v*", kind="reference rate", standing=1e-6)
     a_cutoff_velocity: float | None = parameter(
         "m/s", positive, "velocity v_a above which the direct effect fades; infinite unless given", default=None,
-        letter="v_a",
+        kind="velocity scale", letter="v_a",
     )  # fmt: skip
     b_cutoff_velocity: float | None = parameter(
         "m/s", positive, "velocity v_b above which the evolution effect fades (one state); infinite unless given",
-        default=None, letter="v_b",
+        default=None, kind="velocity scale", letter="v_b",
     )  # fmt: skip
     states: tuple[State, ...] = parts(State, "several states, each with its own b and d_c", default=())
     evolution: Evolution = part(Evolution, "evolution of the state", default=Slip(), inline=True)

@@ -124,7 +124,8 @@ MEMORIES = (
 
 def normal_stress_steps():
     above, below = panels(46, 44)
-    times = np.concatenate([[0.0, 0.999], 1 + np.geomspace(1e-5, 25, 60)])
+    soon, later = np.geomspace(1e-5, 0.1, 40, endpoint=False), np.arange(0.1, 21, 0.1)
+    times = np.concatenate([[0.0, 0.999], 1 + soon, 1 + later])
     for (memory, label, line), colour in zip(MEMORIES, (GREY, BLACK, VERMILION, BLUE), strict=True):
         run = ss.simulate(bench(memory), ss.protocol.NormalStressStep(at=1, by=STEP - 5 * MPa), until=27, times=times)
         above.plot(run["slip"] / um - 1, run["shear_stress"] / MPa, line, color=colour, label=label)
@@ -187,7 +188,7 @@ def oscillating_normal_stress():
     lost.plot(beside, shaken.lost_at / MPa, "s-", color=BLACK, markerfacecolor="white", label="sliding lost from")
     gain.set(yscale="log", ylabel="gain τ/σ")
     phase.set(ylabel="phase (deg)")
-    drop.set(ylabel="mean of τ (%)")
+    drop.set(ylabel="shift of mean τ (%)")
     lost.set(yscale="log", xlabel="period (s)", ylabel="amplitude (MPa)")
     for one in (gain, phase, drop, lost):
         one.set(xscale="log", xlim=(0.9, 110))
@@ -223,12 +224,13 @@ def injection():
     fastest = np.maximum.reduceat(found.run["v"], np.searchsorted(found.run["t"], times))
     rate.plot(times, fastest, "-", color=BLACK)
     for one in (stiff, rate):
+        one.set_xlim(0, 1000)
         for time, _ in found.crossings:
             one.axvline(time, color=GREY, linewidth=3, zorder=0)
     rate.axvline(found.departure, color=VERMILION, linestyle=":")
     stiff.set(ylabel="stiffness (GPa/m)", ylim=(4, 9))
     rate.set(yscale="log", xlabel="time (s)", ylabel="slip rate (m/s)")
-    stiff.legend(loc="upper right")
+    stiff.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0))  # between the crossings
     return [stiff, rate]
 
 

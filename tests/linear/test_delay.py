@@ -405,3 +405,22 @@ def test_where_delayed_terms_outweigh_what_acts_at_once_is_told_to_the_last_digi
     """The two sides of that edge are neighbours in floating point: both are asked in the same words."""
     machine = at_random(78, delay=10 ** np.random.default_rng(78).uniform(-3, 2))[0]
     assert [edge.kind for edge in ss.boundary(machine, "drive.velocity")] == ["ill-posed"]
+
+
+def test_a_search_that_cannot_count_somewhere_answers_elsewhere():
+    """A late controller on a body without mass: for some masses its roots turn too often; the verdict needs none."""
+    machine = ss.Machine(
+        bodies={"m": ss.machine.SlidingBody(mass=1.0), "p": ss.machine.SlidingBody()},
+        links={"s": ss.machine.Spring(between=("m", "p"), stiffness=1e5)},
+        contacts={
+            "c": ss.machine.Surface(
+                body="p",
+                friction=ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=74.8),
+                contact=ss.laws.ConstantNormalStress(preload=100.0),
+            )
+        },
+        drive=ss.machine.PositionPD(velocity=1e-3, body="p", kp=1e4, kd=10.0, delay=1e-3),
+    )
+    assert ss.boundary(machine, "bodies.m.mass", between=(1e-3, 1e3)) == ()
+    rates = ss.growth_rate(machine, {"bodies.m.mass": np.array([0.1, 1.0, 10.0])})
+    assert np.all(rates < 0)

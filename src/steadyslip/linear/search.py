@@ -104,6 +104,17 @@ class Boundary(Displayed):
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
 
 
+def _status_where_counted(point: OperatingPoint) -> NDArray[np.int64]:
+    """Status of rigs (n,); UNKNOWN where roots under a delay cannot be counted."""
+    known = np.broadcast_to(can_be_counted(point), point.shape)
+    if np.all(known):
+        return status(point)
+    found = np.full(point.shape, UNKNOWN)
+    if np.any(known):
+        found[known] = status(point.part(np.flatnonzero(known)))
+    return found
+
+
 Sample = tuple[float, int]
 """A value of the parameter and its status."""
 
@@ -173,13 +184,13 @@ class Search:
     # -- status of sliding along the parameter
 
     def status(self, x: Array) -> NDArray[np.int64]:
-        """Status (stable, unstable, ...) at values (n,)."""
-        return status(self.values(x))
+        """Status (stable, unstable, ...) at values (n,); UNKNOWN where roots under a delay cannot be counted."""
+        return _status_where_counted(self.values(x))
 
     def kinds(self, x: Array) -> NDArray[np.int64]:
         """Status at values (n,), plus 4 where the static stiffness is positive, plus 8 where it is ill-posed."""
         point = self.values(x)
-        return _kinds(point, status(point))
+        return _kinds(point, _status_where_counted(point))
 
     def measures(self, x: Array) -> Array:
         """Two measures (2, n) that change sign at an edge: damping of pairs, and of single eigenvalues."""
@@ -221,6 +232,8 @@ class Search:
         at = np.searchsorted(x, low, side="right") - 1
         below, above = kind[at] % _BESIDE, kind[at + 1] % _BESIDE
         real = (below != above) & (below != UNKNOWN) & (above != UNKNOWN)
+        if low.size and self.own.model.delays:  # a change to samples where nothing can be counted is no edge
+            real &= ~np.any(self.status(np.concatenate([low, high])).reshape(2, -1) == UNKNOWN, axis=0)
         if self.role.domain.low == 0:
             real &= low != 0  # zero itself is the end of the domain, no edge
         return [

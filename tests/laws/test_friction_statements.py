@@ -97,6 +97,11 @@ def test_asinh_exp(x, y, sign):
     np.testing.assert_allclose(float(numpy_asinh_exp(sign * x, y)), float(exact), rtol=2e-16 * (abs(y) + 30))
 
 
+def test_asinh_exp_beyond_floating_point_warns_of_nothing():
+    """x e^y = 2e308: its logarithm is taken instead."""
+    assert float(numpy_asinh_exp(17725.0, 700.0)) == pytest.approx(np.log(2 * 17725.0) + 700.0, rel=1e-15)
+
+
 def test_asinh_exp_differentiates():
     x, y = sp.symbols("x y", real=True)
     plain = sp.asinh(x * sp.exp(y))

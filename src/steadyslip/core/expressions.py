@@ -47,7 +47,8 @@ class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like 
 def numpy_asinh_exp(x: Any, y: Any) -> Any:
     """Values of asinh(x exp(y)) for arrays; nothing overflows or underflows on the way unless x exp(y) does."""
     size, half = np.abs(x), np.exp(np.minimum(0.5 * y, 700.0))  # exp overflows beyond 709
-    product = size * half * half  # two factors of e^(y/2), so that none overflows or vanishes unless x e^y does
+    with np.errstate(over="ignore"):  # then the logarithm is taken
+        product = size * half * half  # two factors of e^(y/2), so that none overflows or vanishes unless x e^y does
     # asinh(z) = log(2 z) to rounding for z > 1e8; above 1e150 its logarithm is used, as the product may overflow
     return np.sign(x) * np.where(product > 1e150, np.log(size) + y + np.log(2.0), np.arcsinh(product))
 

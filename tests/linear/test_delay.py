@@ -407,20 +407,30 @@ def test_where_delayed_terms_outweigh_what_acts_at_once_is_told_to_the_last_digi
     assert [edge.kind for edge in ss.boundary(machine, "drive.velocity")] == ["ill-posed"]
 
 
-def test_a_search_that_cannot_count_somewhere_answers_elsewhere():
-    """A late controller on a body without mass: for some masses its roots turn too often; the verdict needs none."""
-    machine = ss.Machine(
+def late_and_light(kd, delay):
+    """A late controller on a body without mass, whose roots form a chain that bends to a line at high frequency."""
+    friction = ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=75.0)
+    return ss.Machine(
         bodies={"m": ss.machine.SlidingBody(mass=1.0), "p": ss.machine.SlidingBody()},
         links={"s": ss.machine.Spring(between=("m", "p"), stiffness=1e5)},
-        contacts={
-            "c": ss.machine.Surface(
-                body="p",
-                friction=ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=74.8),
-                contact=ss.laws.ConstantNormalStress(preload=100.0),
-            )
-        },
-        drive=ss.machine.PositionPD(velocity=1e-3, body="p", kp=1e4, kd=10.0, delay=1e-3),
+        contacts={"c": surface("p", friction, load=100.0)},
+        drive=ss.machine.PositionPD(velocity=1e-3, body="p", kp=1e4, kd=kd, delay=delay),
     )
+
+
+def test_a_chain_of_roots_that_leads_is_no_slower_root():
+    """It bends to Re s = ln(kd/c)/delay, c what friction adds at once; a root far to the left of it was given."""
+    kd, delay, load, v_stribeck = 100.0, 0.01, 100.0, 1e-3
+    machine = late_and_light(kd, delay)
+    at_once = load * (75.0 - 2 * 0.1 * np.exp(-1.0) / v_stribeck)  # at the Stribeck velocity
+    assert ss.growth_rate(machine) == pytest.approx(np.log(kd / at_once) / delay, rel=1e-4)
+    found = ss.eigenvalues(machine)
+    assert len(set(found.tolist())) == len(found)
+
+
+def test_a_search_that_cannot_count_somewhere_answers_elsewhere():
+    """A late controller on a body without mass: for some masses its roots turn too often; the verdict needs none."""
+    machine = late_and_light(10.0, 1e-3)
     assert ss.boundary(machine, "bodies.m.mass", between=(1e-3, 1e3)) == ()
     rates = ss.growth_rate(machine, {"bodies.m.mass": np.array([0.1, 1.0, 10.0])})
     assert np.all(rates < 0)

@@ -13,7 +13,7 @@ infinitely many roots to the right, the faster growing the shorter the delay; `U
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -214,7 +214,7 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
         if found and abs(found[-1].real - real) < 1e-6 * (abs(real) + 1e-3) and found[-1].imag > 0:
             found.append(found[-1].conjugate())
         else:
-            found.append(_root_on(c, h, float(real)))
+            found.append(_root_on(c, h, float(real), found))
     return np.array(found)
 
 
@@ -225,8 +225,11 @@ def nearest_to_axis(c: Array, h: Array) -> complex:
     return complex(rate * _root_on(scaled, own, 0.0))
 
 
-def _root_on(c: Array, h: Array, real: float) -> complex:
-    """Root nearest to the line Re s = `real`, with imaginary part zero or positive, by Newton's method."""
+def _root_on(c: Array, h: Array, real: float, known: Sequence[complex] = ()) -> complex:
+    """Root nearest to the line Re s = `real`, with imaginary part zero or positive, by Newton's method.
+
+    Not one of the `known` roots, if another is found: many may lie on one line.
+    """
     moved = shifted(c, h, np.asarray(real))
     starts = real + 1j * np.array([0.0, *_near_axis(moved, h)])
     s = starts.astype(complex)
@@ -235,7 +238,12 @@ def _root_on(c: Array, h: Array, real: float) -> complex:
         s = np.where(np.isfinite(step), s - step, s)
     s = np.where(np.abs(s.imag) < 1e-12 * np.abs(s), s.real + 0j, s)
     far = np.abs(s.real - real) + np.abs(value(c, h, s)) / _size(c, h, s)
-    best = complex(s[int(np.argmin(np.where(np.isfinite(far), far, np.inf)))])
+    far = np.where(np.isfinite(far), far, np.inf)
+    for one in known:
+        same = np.abs(s.real + 1j * np.abs(s.imag) - one) <= _SAME_ROOT * abs(one)
+        others = ~same & (np.abs(s.real - real) <= _ON_THE_LINE * abs(real)) & np.isfinite(far)
+        far = np.where(same & np.any(others), np.inf, far)
+    best = complex(s[int(np.argmin(far))])
     return complex(best.real, abs(best.imag))
 
 
@@ -244,10 +252,17 @@ def _size(c: Array, h: Array, s: Any) -> Any:
     return sum(evaluate(np.abs(p), np.abs(s)) * np.exp(-s.real * d) for p, d in zip(c, h, strict=True)) + 1e-300
 
 
+_SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
+_ON_THE_LINE = 1e-3  # relative distance of the real part of a root that is one of several on a line
+_BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
+
+
 def _near_axis(c: Array, h: Array) -> Iterator[float]:
     """Frequencies near which a root may lie on the imaginary axis, starting values for Newton's method."""
-    if len(c) == 2:
-        yield from (float(one) for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one))
+    if len(c) == 2:  # sizes of both terms agree there; the next root is within half a turn
+        found = np.array([one for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one)])
+        turn = 2 * np.pi / float(np.max(h)) if np.max(h) > 0 else 0.0
+        yield from np.abs(found[:, None] + turn * _BESIDE_CROSSING).ravel().tolist()
         return
     own = [pieces.omega[0][leader < 0] for pieces, leader in SumsOnAxis(c[None], h[None]).resolved_pieces()]
     omega = np.sort(np.concatenate(own))

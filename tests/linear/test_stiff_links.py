@@ -72,3 +72,30 @@ def test_where_rounding_hides_eigenvalues_arrays_have_none_and_edges_are_refused
     assert np.all(np.isfinite(spectrum(operating_point(stiff))))
     with pytest.raises(ss.NotAvailable, match=r"links\.along-pad1\.stiffness = 1e\+14 N/m is the largest"):
         ss.boundary(stiff, "drive.velocity")
+
+
+BRISTLES = [(1e13, 1e11), (1e20, 1e18), (1e34, 1e23)]
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), BRISTLES)
+@pytest.mark.parametrize(
+    ("stem", "law"), [("machines/telescope", "contacts.bearing.friction"), ("lead-screw", "friction")]
+)
+def test_stiff_bristles_with_damping_leave_the_other_eigenvalues_alone(stem, law, stiffness, damping):
+    """Products of the slopes of the bristles' rate cancel, many orders above what is left."""
+    rig = ss.read_rig(EXAMPLES / f"{stem}.toml")
+    rig = rig.with_values({f"{law}.bristle_stiffness": stiffness, f"{law}.bristle_damping": damping})
+    own = ss.eigenvalues(rig)
+    own = own[np.isfinite(own)]
+    right = precise_eigenvalues(operating_point(rig), own)
+    assert np.max(np.abs(own - right) / np.abs(right)) < 1e-9
+    assert (ss.stability(rig) == "stable") == (right[0].real < 0)
+    assert not ss.analyze(rig).on_edge
+
+
+def test_edges_of_stiff_bristles_are_few():
+    """About a hundred were listed that do not exist."""
+    law = "contacts.bearing.friction"
+    rig = machine("telescope").with_values({f"{law}.bristle_stiffness": 1e20, f"{law}.bristle_damping": 1e18})
+    assert len(ss.boundary(rig, "drive.velocity")) == 2
+    assert len(ss.boundary(rig, f"{law}.viscous")) == 1

@@ -49,8 +49,13 @@ class Placeholders:
     def polynomial(self, expression: sp.Expr) -> sp.Expr:
         """Polynomial with non-polynomial parts replaced by placeholders; equal parts have equal placeholders."""
         e = sp.sympify(expression)
-        if e.is_Symbol or e.is_Rational:
+        if e.is_Symbol or e.is_Integer:
             return e
+        if e.is_Number:  # the ring has whole coefficients
+            if e not in self._known:
+                self._known[e] = inner_symbol(f"e{len(self.names)}")
+                self.names[self._known[e]] = e
+            return self._known[e]
         if e.is_Add or e.is_Mul:
             return e.func(*(self.polynomial(part) for part in e.args))
         if e.is_Pow and e.exp.is_Integer and e.exp.is_positive:
@@ -179,8 +184,39 @@ class _Block:
                 self.values[self.symbols[j]] = value
 
 
+def without_cancellation(matrix: list[list[Polynomial]]) -> Polynomial | None:
+    """Determinant of a small matrix expanded in its symbols, if terms cancel in it; None if none do.
+
+    They do where friction depends on the rate of its own memory, as that of bristles with damping does: the products of
+    that rate's slopes cancel, which rounding would not let them where they are many orders above the rest.
+    """
+    placeholders = Placeholders()
+    entries = [[{powers: placeholders.polynomial(e) for powers, e in entry.items()} for entry in row] for row in matrix]
+    names, found = determinant(entries)
+    kept = sum(abs(number) for terms in found.values() for _, number in terms)
+    if kept == _permanent([[_sum_of_sizes(entry) for entry in row] for row in entries]):
+        return None
+    factors = [placeholders.restored(name) for name in names]
+    return {powers: _nested(terms, factors) for powers, terms in found.items()}
+
+
+def _sum_of_sizes(entry: Polynomial) -> int:
+    """Sum of the sizes of all whole coefficients of an entry."""
+    return sum(int(sum(map(abs, sp.Poly(e, *e.free_symbols or [sp.Dummy()]).coeffs()))) for e in entry.values())
+
+
+def _permanent(matrix: list[list[int]]) -> int:
+    """What a determinant is if no sign changes."""
+    if not matrix:
+        return 1
+    first, *rest = matrix
+    return sum(one * _permanent([row[:j] + row[j + 1 :] for row in rest]) for j, one in enumerate(first) if one)
+
+
 def _small_determinant(matrix: list[list[Polynomial]]) -> Polynomial:
     """Determinant of a small matrix, with expressions as coefficients."""
+    if exact := without_cancellation(matrix):
+        return exact
     placeholders = Placeholders()
     symbols = [
         [{powers: -placeholders.symbol_for(-e) for powers, e in entry.items()} for entry in row] for row in matrix

@@ -22,6 +22,7 @@ from steadyslip.model.determinant import (
     determinant,
     machine_determinant,
     sum_of_terms,
+    without_cancellation,
 )
 from steadyslip.model.equations import Model
 
@@ -183,8 +184,10 @@ def sets_of_delays(model: Model) -> list[tuple[sp.Expr, ...]]:
 
 
 def _single_determinant(model: Model) -> Polynomial:
-    placeholders = Placeholders()
     rows = characteristic_rows(model)
+    if exact := without_cancellation(list(rows.values())):
+        return exact
+    placeholders = Placeholders()
     own, body = placeholders.symbol_for, model.coordinates[0].velocity
     matrix = [
         [{power: own(e) if name == body else -own(-e) for power, e in entry.items()} for entry in row]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,7 +16,6 @@ from steadyslip.linear.stiffness import critical_stiffness
 from steadyslip.machine.slider import Slider
 
 STEP = 1e-2  # of a standard deviation, for slopes: far above rounding, and what is curved is that by less than 1e-2
-_EVOLUTION = re.compile(r"friction\.(states\.\d+\.)?b")
 
 
 @dataclass(frozen=True)
@@ -61,8 +59,10 @@ def derived_estimates(minimum: Minimum, rigs: Sequence[Slider]) -> tuple[Estimat
 
 def _of_record(minimum: Minimum, rig: Slider, record: int) -> list[Estimate]:
     parameters = {name: one.value for name, one in rig.parameters().items() if one.value is not None}
-    evolving = [name for name in parameters if _EVOLUTION.fullmatch(name)]
-    if "friction.a" not in parameters or not evolving:
+    direct, evolving = (
+        [name for name in rig.of_kind(kind) if name in parameters] for kind in ("direct effect", "evolution effect")
+    )
+    if not direct or not evolving:
         return []
     deviations = minimum.deviations
     steps = STEP * np.where(np.isfinite(deviations), deviations, 0.0)
@@ -77,8 +77,9 @@ def _of_record(minimum: Minimum, rig: Slider, record: int) -> list[Estimate]:
     def value(name: str) -> Array:
         return np.broadcast_to(own.get(name, np.array(parameters[name])), len(places)).astype(float)
 
-    level = value("friction.a") - sum(value(name) for name in evolving)
-    found = [(_estimate(minimum, rig.area, "a - b", "1", level, False), {"friction.a", *evolving})]
+    gain, loss = (np.sum([value(name) for name in names], axis=0) for names in (direct, evolving))
+    level = gain - loss
+    found = [(_estimate(minimum, rig.area, "a - b", "1", level, False), {*direct, *evolving})]
     try:
         edge, share = (np.asarray(number(rig, own)) for number in (critical_stiffness, safety_factor))
     except NotAvailable:

@@ -29,6 +29,9 @@ _HALVINGS = 60  # largest number of bisections of a real part: more than the 53 
 _BATCH = 40  # rigs with several delays counted at a time; chosen by trial: memory against speed
 _MOST_PERIODS = 5000  # crossing delays are listed up to so many periods of the fastest; by trial: length of the list
 _LOST = 1e10  # periods within one delay beyond which rounding leaves fewer than six digits of the phase
+_SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
+_ON_THE_LINE = 1e-3  # relative distance of the real part of a root that is one of several on a line
+_BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
 
 
 def value(c: Array, h: Array, s: Any) -> Any:
@@ -250,11 +253,6 @@ def _root_on(c: Array, h: Array, real: float, known: Sequence[complex] = ()) -> 
 def _size(c: Array, h: Array, s: Any) -> Any:
     """Sum of the absolute values of all terms at s, never zero."""
     return sum(evaluate(np.abs(p), np.abs(s)) * np.exp(-s.real * d) for p, d in zip(c, h, strict=True)) + 1e-300
-
-
-_SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
-_ON_THE_LINE = 1e-3  # relative distance of the real part of a root that is one of several on a line
-_BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
 
 
 def _near_axis(c: Array, h: Array) -> Iterator[float]:

@@ -45,12 +45,12 @@ def _of_state_matrix(point: OperatingPoint) -> ComplexArray:
 
 def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where all roots lie left of the imaginary axis and the equations are well posed."""
-    if not point.model.delays and is_written_out(point.model):
+    if point.model.delays:
+        return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
+    if is_written_out(point.model):
         return is_hurwitz(characteristic(point))
-    if not point.model.delays:
-        s = spectrum(point)
-        return np.asarray(np.all((s.real < 0) | np.isnan(s), axis=-1) & ~is_ill_posed(point))
-    return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
+    s = spectrum(point)
+    return np.asarray(np.all((s.real < 0) | np.isnan(s), axis=-1) & ~is_ill_posed(point))
 
 
 def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:

@@ -31,10 +31,8 @@ LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which
 LEFT = 4.0  # standard errors by which the mean misfit around a change may be above that of normal noise, which is 0.83
 AROUND = 3.0  # times in which a servo settles that count as around a change
 LAG_ERROR = 0.1  # of a servo, relative, by which the time of its command is uncertain too
-NEAR, PER_EFOLD = (
-    30.0,
-    10.0,
-)  # samples on each side of a change kept one by one; beyond, means for each e-fold of distance
+NEAR = 30.0  # samples on each side of a change that are kept one by one where a servo is looked for
+PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
 EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
 
 

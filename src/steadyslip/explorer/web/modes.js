@@ -109,6 +109,6 @@ export function words(mode, { moves, hardly, suffix, words: said }) {
   }
   if (rest.length) parts.push(rest.map(([name, size]) => fill(said.share, { name: called(name), share: percent(size) })).join(", "));
   if (still.length) parts.push(`${listed(still)} ${does("still", still)}`);
-  const [most, share] = Object.entries(mode.energy).map(([name, own]) => [name, Math.round(1000 * own) / 1000]).reduce((a, b) => (b[1] > a[1] ? b : a), ["", 0]);
+  const [most, share] = Object.entries(mode.energy).map(([name, own]) => /** @type {[string, number]} */ ([name, Math.round(1000 * own) / 1000])).reduce((a, b) => (b[1] > a[1] ? b : a), ["", 0]);
   return parts.join(", ") + (most ? fill(said.energy, { share: percent(share), name: most.slice(most.indexOf(".") + 1) }) : "");
 }

@@ -53,6 +53,16 @@ def test_without_an_edge_there_is_a_minus_b_alone():
     assert by_name(fit)["a - b"].value == pytest.approx(0.003, abs=4 * by_name(fit)["a - b"].error)
 
 
+def test_a_slip_distance_that_no_rock_has_raises_a_word():
+    """Millimetres taken for micrometres leave a and b as they are."""
+    found = columns(rig(), STEP, 500)
+    for factor, odd in ((1.0, False), (1e3, True), (1e-3, True)):
+        record = ss.record_from_arrays(found["time"], friction=found["friction"], normal=found["normal"],
+                                       displacement=factor * found["displacement"])  # fmt: skip
+        fit = ss.fit(ss.lab_rig(), record)
+        assert any("laboratories find" in warning for warning in fit.to_dict()["warnings"]) is odd
+
+
 def test_without_a_displacement_the_rate_that_is_assumed_is_named():
     """With another rate than the record's a came out half: it is the rig's own, which nothing in the record shows."""
     faster = rig().with_values({"drive.velocity": 3e-6})

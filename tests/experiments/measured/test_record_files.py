@@ -11,24 +11,27 @@ import steadyslip as ss
 from measured_columns import HEADER, ROWS, UNITS, columns, same_record, table
 
 
-def xlook(kind, order=">"):
+def xlook(kind, order=">", channels=32, header=">"):
     """The bytes that XLOOK writes, typed from the description of its format."""
     time, friction, normal, moved = columns()
     table = [("Lp_Disp", "mic", moved), ("Shr_stress", "MPa", friction * normal), ("Nor_stress", "MPa", normal),
              ("Time", "sec", time)]  # fmt: skip
-    raw = b"p9999".ljust(20, b"\0") + struct.pack(">iiii", ROWS, len(table), 0, 0)
+    raw = b"p9999".ljust(20, b"\0") + struct.pack(f"{header}iiii", ROWS, len(table), 0, 0)
     for name, unit, _ in table:
         raw += name.encode().ljust(13, b"\0") + unit.encode().ljust(13, b"\0") + struct.pack(">f", 1.0)
         raw += b"".ljust(50, b"\0") + struct.pack(">i", ROWS)
-    for _ in range(32 - len(table)):
+    for _ in range(channels - len(table)):
         raw += b"no_val".ljust(13, b"\0") + bytes(71)
     return raw + b"".join(np.asarray(values).astype(order + kind).tobytes() for *_, values in table)
 
 
-@pytest.mark.parametrize(("kind", "order"), [("f4", ">"), ("f8", ">"), ("f8", "<")])
-def test_xlook_files_are_read(tmp_path, kind, order):
+@pytest.mark.parametrize(
+    "layout",
+    [("f4", ">"), ("f8", ">"), ("f8", "<"), ("f4", ">", 16), ("f4", "<", 16, "<")],  # 16 channels before 2007
+)
+def test_xlook_files_are_read(tmp_path, layout):
     path = tmp_path / "p9999"
-    path.write_bytes(xlook(kind, order))
+    path.write_bytes(xlook(*layout))
     record = ss.read_record(path)
     time, friction, normal, moved = columns()
     np.testing.assert_allclose(record.time, time, rtol=1e-6)

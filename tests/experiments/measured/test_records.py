@@ -39,6 +39,7 @@ def same(record, clean):
         ("Elapsed time;lp_disp_um;COF;Effective_Normal_stress(MPa)", ";"),
         ("t x_lp_um friction normal_MPa", " "),
         ("# time (s)  load displacement (um)  friction  normal stress (MPa)", " "),
+        ("t[s] x[um] mu[-] sigma[MPa]", " "),
     ],
 )
 def test_columns_are_found_by_their_names(tmp_path, clean, header, mark):
@@ -46,6 +47,21 @@ def test_columns_are_found_by_their_names(tmp_path, clean, header, mark):
     path = write(tmp_path / "r.txt", table, header, mark)
     given = {"displacement": "x_lp_um"} if "x_lp" in header else {}
     same(ss.read_record(path, **given), clean)
+
+
+def test_a_column_named_d_is_a_displacement_only_as_a_small_letter_with_a_length(tmp_path, clean):
+    table = [clean["time"], 1e6 * clean["displacement"], clean["friction"]]
+    found = [ss.read_record(write(tmp_path / "r.csv", table, f"t[s],{name},mu")) for name in ("d[um]", "D[um]", "D")]
+    assert [record.displacement is not None for record in found] == [True, False, False]
+    both = write(tmp_path / "r.csv", [*table[:2], *table[1:]], "t[s],x[mm],disp[um],mu")
+    assert ss.read_record(both).displacement[-1] == pytest.approx(clean["displacement"][-1])
+
+
+@pytest.mark.parametrize(("unit", "odd"), [("um", False), ("m", True)])
+def test_a_displacement_in_another_unit_raises_a_word(tmp_path, clean, unit, odd):
+    table = [clean["time"], 1e6 * clean["displacement"], clean["friction"]]
+    record = ss.read_record(write(tmp_path / "r.csv", table, f"time[s],disp[{unit}],mu"))
+    assert any("unusual in a laboratory" in note for note in record.notes) is odd
 
 
 def test_a_line_of_units_below_the_names(tmp_path, clean):

@@ -29,6 +29,7 @@ OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
 MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
+USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
 )
@@ -112,6 +113,7 @@ def warnings(fit: FitNumbers) -> list[str]:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
     found += list(fit.at_bounds) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit) + _vague_jumps(fit)
     found += _assumed_rate(fit) + _possible_ramps(fit) + _missing_memory(fit) + _drained_at_once(fit)
+    found += _unusual_distances(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     if other := of_another(fit.version):
@@ -284,6 +286,18 @@ def _drained_at_once(fit: FitNumbers) -> list[str]:
         f"the pore pressure changes in {_enumerated(changing)}, and acts at once in this contact, which has no pores; "
         "where drainage takes time, fit its rate (lab_rig(pores=True), or no table [contact] in the file)"
     ]
+
+
+def _unusual_distances(fit: FitNumbers) -> list[str]:
+    """Warning on slip distances that no rock has, as they come out where a displacement is in another unit."""
+    distances = fit.plan.rig.of_kind("slip distance")
+    found = {name: size for name, size in fit.values.items() if name.partition("@")[0] in distances}
+    low, high = USUAL_DISTANCES
+    odd = [f"{name} = {format_quantity(size, 'm')}" for name, size in found.items() if not low <= size <= high]
+    if not odd:
+        return []
+    usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
+    return [f"{_enumerated(odd)}: laboratories find {usual}; is the displacement in the unit that its column says?"]
 
 
 def _lengths(fit: FitNumbers, ramped: RampFit) -> str:

@@ -15,6 +15,7 @@ COARSE, EVEN = 0.6, 1.25  # share of distinct times below which a clock may be c
 AROUND = 25  # rows on each side whose mean spacing is the usual one; chosen by trial
 LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay within floating point
 PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside, a unit is wrong
+USUAL_RATES, USUAL_TRAVEL = (1e-11, 1e-2), 1.0  # mean rate (m/s) and travel (m) of a load point; else a word is said
 PLACEHOLDERS = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
 """Placeholders, of either sign, that instruments and programs write for missing values."""
 PLACEHOLDER_RATIO = (
@@ -99,6 +100,7 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
         steps = 0.5 * (si["velocity"][1:] + si["velocity"][:-1]) * spacing
         si["displacement"] = np.concatenate([[0.0], np.cumsum(steps)])
         notes.append("displacement of the load point integrated from its velocity")
+    notes += _unusual_load(si)
     normal, shear, displacement, velocity = (
         None if name not in si else frozen(si[name]) for name in ("normal", "shear", "displacement", "velocity")
     )
@@ -263,6 +265,18 @@ def _check_stress(si: dict[str, Array], source: str, lines: Array) -> None:
             "that is used; cut it with between = [start, end]"
         )
         raise ParameterError([Problem("normal", message)], title=source)
+
+
+def _unusual_load(si: dict[str, Array]) -> list[str]:
+    """Note on a load point that moves unusually far or fast, as it does where a unit is wrong; no other notes."""
+    travel = float(np.ptp(si["displacement"])) if "displacement" in si else 0.0
+    rate = travel / float(np.ptp(si["time"]))
+    if not travel > 0 or (USUAL_RATES[0] <= rate <= USUAL_RATES[1] and travel <= USUAL_TRAVEL):
+        return []
+    return [
+        f"the load point moves {format_quantity(travel, 'm')}, at {format_quantity(rate, 'm/s')} on average, which is "
+        "unusual in a laboratory; are displacement and time in the units that are said here (mm for um)?"
+    ]
 
 
 def _check_friction(friction: Array, source: str) -> None:

@@ -39,6 +39,7 @@ _SUFFIXES = ("s", "ms", "min", "h", "m", "cm", "mm", "um", "nm", "Pa", "kPa", "M
 _TIMES = {"time", "times", "elapsed", "elapsedtime", "uhrzeit", "datetime", "date", "datum", "tiempo", "tempo"}
 _FRICTION = re.compile(r"friction|fricción|rozamiento|attrito|^reib(ungs?)?(wert|zahl|koeff|beiwert|$)")
 _DISPLACED = re.compile(r"disp|position|slip|ram|verschieb|vorschub|weg$|déplacement|desplaza|spostament")
+LETTERS = ("x", "X", "d")  # letters for a displacement, in a unit of length; D is a diameter or a thickness as well
 _ACROSS = re.compile(r"normalweg|vertikal|normalversch")
 _SHEAR = re.compile(
     r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement|cortante|cizall|tagli|tangenzial"
@@ -129,7 +130,8 @@ def guess_role(name: str, has_unit: str | None) -> str | None:
         return "shear" if stress else "friction"
     if words & {"velocity", "vel", "rate", "speed", "vlp", "v", "vitesse"} or re.search(r"velocity|geschw", joined):
         return "velocity"
-    displaced = _DISPLACED.search(joined) or words & {"lp", "lpd", "d", "weg", "hub"}
+    letter = name.strip() in LETTERS and dimension == unit("m")[1]
+    displaced = letter or _DISPLACED.search(joined) or words & {"lp", "lpd", "weg", "hub"}
     across = words & {"normal", "vertical", "horizontal normal"} or _ACROSS.search(joined)
     if displaced and not (stress or across):
         return "displacement"
@@ -247,14 +249,14 @@ def _fits(role: str, name: str) -> bool:
 
 
 def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[int]:
-    """Candidates whose names mention the load point or effective stress, if there are any; else all."""
+    """Candidates whose names mention the load point or effective stress, or are more than a letter; else all."""
     if len(candidates) < 2:
         return candidates
-    marks = {"displacement": r"load|lp|shear|ram", "velocity": r"load|lp", "normal": r"eff"}
-    if role not in marks:
-        return candidates
-    better = [i for i in candidates if re.search(marks[role], names[i].lower())]
-    return better or candidates
+    marks = {"displacement": (r"load|lp|shear|ram", r"^\W*\w{2}"), "velocity": (r"load|lp",), "normal": (r"eff",)}
+    for mark in marks.get(role, ()):
+        if better := [i for i in candidates if re.search(mark, names[i].strip().lower())]:
+            return better
+    return candidates
 
 
 def _missing(role: str, names: Sequence[str]) -> str:

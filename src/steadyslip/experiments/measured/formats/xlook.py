@@ -1,8 +1,9 @@
 """Reader of binary files of XLOOK, with which many rock-friction laboratories process their records.
 
 A header of 36 bytes (name, numbers of records and columns, two settings), 32 channel descriptions of 84 bytes (name,
-unit, gain, comment, number of elements), then the columns one after another, as floats of four or eight bytes. Headers
-are big-endian; the byte order of columns varies and is the one that gives plausible numbers.
+unit, gain, comment, number of elements), then the columns one after another, as floats of four or eight bytes. Until
+2007 there were 16 channels, and floats of four bytes. Headers are big-endian, as were the machines on which XLOOK ran,
+but for files of versions compiled elsewhere; the byte order of columns is the one that gives plausible numbers.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
-HEAD, CHANNELS, CHANNEL = 36, 32, 84
+HEAD, CHANNEL = 36, 84  # bytes of the header and of each channel's description
+LAYOUTS = ((32, 4), (32, 8), (16, 4))  # numbers of channels, and bytes per number
 UNUSED = "no_val"
 NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 
@@ -24,16 +26,17 @@ def is_xlook(raw: bytes) -> bool:
     return _size(raw) is not None
 
 
-def _size(raw: bytes) -> tuple[int, int, int] | None:
-    """Rows, columns and bytes per number; None if it is no XLOOK file."""
-    body = len(raw) - HEAD - CHANNELS * CHANNEL
-    if body <= 0:
+def _size(raw: bytes) -> tuple[int, int, int, int] | None:
+    """Channels, rows, columns and bytes per number; None if it is no XLOOK file."""
+    if len(raw) <= HEAD:
         return None
-    rows, columns = struct.unpack(">ii", raw[20:28])
-    if rows <= 0 or not 0 < columns <= CHANNELS or body % (rows * columns):
-        return None
-    width = body // (rows * columns)
-    return (rows, columns, width) if width in (4, 8) else None
+    for order in (">", "<"):
+        rows, columns = struct.unpack(f"{order}ii", raw[20:28])
+        for channels, width in LAYOUTS:
+            fits = len(raw) == HEAD + channels * CHANNEL + rows * columns * width
+            if fits and rows > 0 and 0 < columns <= channels:
+                return channels, rows, columns, width
+    return None
 
 
 def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Array]:
@@ -47,9 +50,10 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
     size = _size(raw)
     if size is None:
         raise NotAvailable(f"{source!r} is no XLOOK file: its header does not say as many numbers as it has")
-    rows, columns, width = size
+    channels, rows, columns, width = size
+    body = HEAD + channels * CHANNEL
     names, units = [], []
-    for k in range(CHANNELS):
+    for k in range(channels):
         start = HEAD + k * CHANNEL
         name = _text(raw[start : start + 13])
         if name and not name.startswith(UNUSED):
@@ -58,7 +62,7 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
     names = [*names, *(f"column {k}" for k in range(len(names) + 1, columns + 1))][:columns]
     units = [*units, *([None] * columns)][:columns]
     for kind in (kind for kind in NUMBER_KINDS if int(kind[-1]) == width):
-        values = np.frombuffer(raw, kind, rows * columns, HEAD + CHANNELS * CHANNEL).reshape(columns, rows)
+        values = np.frombuffer(raw, kind, rows * columns, body).reshape(columns, rows)
         found = values.astype(float)
         size_of = np.abs(found[found != 0.0])
         if np.all(np.isfinite(found)) and (not len(size_of) or (size_of.max() < 1e20 and np.median(size_of) > 1e-20)):

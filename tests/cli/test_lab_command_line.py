@@ -145,12 +145,17 @@ def test_laws_are_compared_and_records_fitted_together(tmp_path):
     (tmp_path / "spec.toml").write_text(
         '[friction]\n[fit]\ncompare = ["slip", "aging"]\nseparate = ["friction.mu_ref"]\n'
     )
-    done = run("fit", tmp_path / "one.csv", tmp_path / "two.csv", tmp_path / "spec.toml", "--json", "--bootstrap", "20")
+    files = [tmp_path / name for name in ("one.csv", "two.csv", "spec.toml")]
+    listed = [tmp_path / name for name in ("table.csv", "table.tex")]
+    done = run("fit", *files, "--json", "--bootstrap", "20", *(word for path in listed for word in ("-o", path)))
     assert done.returncode == 0, done.stderr
     data = json.loads(done.stdout)
     assert data["comparison"]["slip"]["weight"] > 0.99
     assert data["samples"] == 1600
     assert data["bootstrap"]["friction.a"]["error"] > 0
+    assert [line["step"] for line in data["steps"]["lines"]] == ["velocity step", "velocity step", "all together"]
+    assert len(listed[0].read_text().splitlines()) == 4
+    assert "all together" in listed[1].read_text()
 
 
 @pytest.mark.usefixtures("unpainted")

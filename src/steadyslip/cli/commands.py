@@ -143,17 +143,31 @@ def fit(
         bool, typer.Option("--skip-bad-lines", help="leave damaged lines out, and say so")
     ] = False,
     bootstrap: Annotated[int, typer.Option(min=0, max=1_000_000, help="also refit this many resampled records")] = 0,
-    output: Annotated[list[Path] | None, outputs("write .nc, .html, .json, .png, .svg or .pdf")] = None,
+    steps: Annotated[bool, typer.Option("--steps", help="also fit every step alone")] = False,
+    output: Annotated[
+        list[Path] | None,
+        outputs("write .nc, .html, .json, .png, .svg or .pdf, or the table of all steps as .csv or .tex"),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Which friction do these records show, and how sure is that?"""
     from steadyslip.core.errors import ParameterError, Problem
-    from steadyslip.experiments import bootstrap as resample, fit_files, population_files
-    from steadyslip.experiments.commands import ENDINGS, as_json as plain, split_files, write_fit, write_population
+    from steadyslip.experiments import bootstrap as resample, fit_files, population_files, step_table
+    from steadyslip.experiments.commands import (
+        ENDINGS,
+        TABLES,
+        as_json as plain,
+        split_files,
+        write_fit,
+        write_population,
+        write_table,
+    )
     from steadyslip.experiments.from_files import spec_of
     from steadyslip.files.output import check_output
 
     check_output(output or (), ENDINGS)
+    listed = [path for path in output or () if path.suffix.lower() in TABLES]
+    others = [path for path in output or () if path not in listed]
     if bootstrap == 1:
         raise ParameterError([Problem("--bootstrap", "got 1; allowed: 0 for none, or 2 or more resampled records")])
     records, spec = split_files(files)
@@ -161,11 +175,15 @@ def fit(
         if bootstrap:
             message = "cannot be combined with [population], whose draws carry the uncertainty"
             raise ParameterError([Problem("--bootstrap", message)])
+        if steps or listed:
+            raise ParameterError(
+                [Problem("--steps", "cannot be combined with [population]; leave it and its table out")]
+            )
         members = population_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
         output_result(members, output or (), as_json, write_population)
         return
     found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
-    for path in output or ():
+    for path in others:
         write_fit(found, comparison, path)
     if not as_json:
         for record in found.plan.records:
@@ -178,19 +196,25 @@ def fit(
         try:
             draws = resample(found, bootstrap)
             stopped = draws.interrupted
-            for path in output or ():
+            for path in others:
                 if path.suffix.lower() == ".html":
                     write_fit(found, comparison, path, draws)
         except KeyboardInterrupt:
             stopped = True
+    table = step_table(found) if (steps or listed) and not stopped else None
+    if table is not None:
+        for path in listed:
+            write_table(table, path)
     if as_json:
         data = plain(found, comparison)
+        if table is not None:
+            data["steps"] = table.to_dict()
         if draws is not None:
             data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
         print_json(data)
-    elif draws is not None:
-        print_text(f"\n{draws}")
-    for path in () if as_json else output or ():
+    for text in () if as_json else filter(None, (draws, table)):
+        print_text(f"\n{text}")
+    for path in () if as_json else others + listed * (table is not None):
         print_text(f"wrote {path}")
     if stopped:
         raise typer.Exit(130)

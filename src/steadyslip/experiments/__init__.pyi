@@ -8,6 +8,7 @@ from .answers.population import Population, load_population, population
 from .answers.precision import Precision, best_protocol, precision
 from .answers.predict import Prediction, predict
 from .answers.profiles import Profile, profile
+from .answers.step_table import StepTable, step_table
 from .answers.uncertainty import Draws, bootstrap, load_draws, normal_draws, posterior
 from .answers.validation import CrossValidation, cross_validate
 from .fitting.estimate import Estimate
@@ -30,6 +31,7 @@ __all__ = [
     "Profile",
     "Record",
     "Spec",
+    "StepTable",
     "best_protocol",
     "bootstrap",
     "compare",
@@ -51,4 +53,5 @@ __all__ = [
     "read_record",
     "read_spec",
     "record_from_arrays",
+    "step_table",
 ]

@@ -11,12 +11,14 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.version import stamped
 from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.answers.population import Population
+from steadyslip.experiments.answers.step_table import StepTable
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.files.output import FIGURES, write_by_ending, write_text
 from steadyslip.files.standalone import write_page
 
-ENDINGS = (".nc", ".html", ".json", *FIGURES)
+TABLES = (".csv", ".tex")
+ENDINGS = (".nc", ".html", ".json", *TABLES, *FIGURES)
 
 
 def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
@@ -52,6 +54,17 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Dra
         write_page(fit, target, "Fit", comparison=comparison, draws=draws)
 
     write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
+
+
+def write_table(found: StepTable, path: Path) -> None:
+    """Write a table of steps as CSV or LaTeX, as the file's ending says.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    (found.to_csv if path.suffix.lower() == TABLES[0] else found.to_latex)(path)
 
 
 def write_population(found: Population, path: Path) -> None:

@@ -33,7 +33,9 @@ class Minimum:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
-def derived_estimates(minimum: Minimum, rigs: Sequence[Slider]) -> tuple[Estimate, ...]:
+def derived_estimates(
+    minimum: Minimum, rigs: Sequence[Slider], calibrated: float | None = None
+) -> tuple[Estimate, ...]:
     """Numbers that follow from the parameters of a rate-and-state law, with errors to first order.
 
     ``a - b`` is a less the sum of all b; ``k_c`` (Pa/m) and ``k/k_c`` are at the velocity and normal stress of the
@@ -45,10 +47,12 @@ def derived_estimates(minimum: Minimum, rigs: Sequence[Slider]) -> tuple[Estimat
     minimum : Minimum
     rigs : sequence of Slider
         Of each record, with its rate and normal stress.
+    calibrated : float, optional
+        Stiffness of the machine, Pa/m; the fitted one over it is ``k/k_cal``.
     """
     found: dict[str, list[Estimate]] = {}
     for record, rig in enumerate(rigs):
-        for one in _of_record(minimum, rig, record):
+        for one in _of_record(minimum, rig, record, calibrated):
             found.setdefault(one.name, []).append(one)
     chosen: list[Estimate] = []
     for name, own in found.items():
@@ -57,7 +61,7 @@ def derived_estimates(minimum: Minimum, rigs: Sequence[Slider]) -> tuple[Estimat
     return tuple(chosen)
 
 
-def _of_record(minimum: Minimum, rig: Slider, record: int) -> list[Estimate]:
+def _of_record(minimum: Minimum, rig: Slider, record: int, calibrated: float | None) -> list[Estimate]:
     parameters = {name: one.value for name, one in rig.parameters().items() if one.value is not None}
     direct, evolving = (
         [name for name in rig.of_kind(kind) if name in parameters] for kind in ("direct effect", "evolution effect")
@@ -88,6 +92,10 @@ def _of_record(minimum: Minimum, rig: Slider, record: int) -> list[Estimate]:
         found.append((_estimate(minimum, rig.area, "k_c", "Pa/m", edge, True), set(own) - {"slider.stiffness"}))
     if np.all(np.isfinite(share)) and np.all(share > 0):
         found.append((_estimate(minimum, rig.area, "k/k_c", "1", share, True), set(own)))
+    stiffness = next((name for name in rig.of_kind("stiffness") if name in own), None)
+    if calibrated is not None and stiffness is not None:
+        ratio = own[stiffness] / calibrated
+        found.append((_estimate(minimum, rig.area, "k/k_cal", "1", ratio, True), {stiffness}))
     lost = {
         one.parameter for one, size in zip(minimum.space.unknowns, deviations, strict=True) if not np.isfinite(size)
     }

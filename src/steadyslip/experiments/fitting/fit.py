@@ -56,6 +56,7 @@ def fit(
     loss: str = "linear",
     width: float | None = None,
     weights: Any = None,
+    calibrated: Any = None,
     errors: str = "auto",
     starts: int = STARTS,
     effort: float = 1.0,
@@ -111,6 +112,8 @@ def fit(
         Residual at which that begins; 1.345 standard deviations of most residuals unless given.
     weights : array_like, optional
         One over each sample's standard deviation, up to a factor; one array for each record.
+    calibrated : float or str, optional
+        Stiffness of the machine from a calibration, Pa/m, to which the fitted one is compared (``k/k_cal``).
     errors : str, optional
         ``auto``: correlation of the residuals is taken into account where it stands out; ``correlated``: always;
         ``independent``: never.
@@ -139,7 +142,7 @@ def fit(
     plan = make_plan(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
         trend_axis=trend_axis, offset=offset, lag=lag, initial=initial, loss=loss, width=width, weights=weights,
-        errors=errors, starts=starts, effort=effort,
+        calibrated=calibrated, errors=errors, starts=starts, effort=effort,
     )  # fmt: skip
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())

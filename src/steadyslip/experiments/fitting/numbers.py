@@ -139,9 +139,9 @@ class FitNumbers(ReadOnly):
 
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
-        """What follows from them: ``a - b``, critical stiffness ``k_c`` (Pa/m) and ``k/k_c``, with errors."""
+        """What follows from them, with errors: ``a - b``, critical stiffness ``k_c`` (Pa/m), ``k/k_c``, ``k/k_cal``."""
         minimum = Minimum(self.space, self.coordinates, self.covariance, self.degrees)
-        return derived_estimates(minimum, [part.rig for part in self.comparison.parts])
+        return derived_estimates(minimum, [part.rig for part in self.comparison.parts], self.plan.calibrated)
 
     @cached_property
     def as_measured(self) -> dict[str, float] | None:

@@ -73,6 +73,8 @@ class Plan:
         Residual from which outliers have less weight.
         weights : tuple of ndarray or None
             One array (n,) for each record; equal weights if None.
+        calibrated : float or None
+            Stiffness of the machine, Pa/m, to which the fitted one is compared.
         rtol : float
             Relative error allowed per step of the model.
         sharp : tuple of Sharp
@@ -95,6 +97,7 @@ class Plan:
     loss: str = "linear"
     width: float | None = None
     weights: tuple[Array, ...] | None = field(default=None, repr=False)
+    calibrated: float | None = None
     rtol: float = 1e-8
     sharp: tuple[Sharp, ...] = field(default=(), repr=False)
     loading: tuple[Loading, ...] = field(default=(), repr=False)

@@ -14,7 +14,7 @@ from steadyslip.core.names import resolve
 from steadyslip.core.records import Address, parameters
 from steadyslip.experiments.fitting.checks import check_changes, check_records
 from steadyslip.experiments.fitting.plan import Plan, with_loading
-from steadyslip.experiments.fitting.settings import faults
+from steadyslip.experiments.fitting.settings import FitSettings, faults
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import spread
 from steadyslip.machine.input_units import in_units_of
@@ -71,6 +71,8 @@ def make_plan(
         raise ParameterError(problems)
     if weights is None:
         many, options["weights"] = _averaged(many)
+    if options.get("calibrated") is not None:
+        options["calibrated"] = FitSettings(calibrated=options["calibrated"]).calibrated
     if plan_protocol is not None:
         options["drive"] = "protocol"
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from steadyslip.core.domains import Domain
+from steadyslip.core.domains import Domain, positive
 from steadyslip.core.entries import Names, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Settings, option, parameter, setting
@@ -60,6 +60,10 @@ class FitSettings(Settings):
     effort: float = parameter(
         "1", _effort, "how long the search may last, as a multiple of what nearly always suffices", default=1.0
     )
+    calibrated: float | None = parameter(
+        "Pa/m", positive, "stiffness of the machine from a calibration, to which the fitted one is compared",
+        default=None,
+    )  # fmt: skip
     windows: bool = option(False, True, doc="every step of a record becomes a record of its own", default=False)
     compare: tuple[str, ...] = setting(
         Names(

@@ -33,7 +33,8 @@ ATTRIBUTES = {
 }  # fmt: skip
 _OPTIONS = {
     "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "lag": bool,
-    "initial": str, "loss": str, "width": {float, None}, "rtol": float,
+    "initial": str, "loss": str, "width": {float, None},
+    "calibrated": {float, None}, "rtol": float,
 }  # fmt: skip
 _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
 _COURSE = (float, [{(float,) * 8, (float,) * len(fields(Change))}], [float], [_CURVE], float, int, int, int, int)

@@ -30,6 +30,7 @@ MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them 
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
+CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
 )
@@ -113,7 +114,7 @@ def warnings(fit: FitNumbers) -> list[str]:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
     found += list(fit.at_bounds) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit) + _vague_jumps(fit)
     found += _assumed_rate(fit) + _possible_ramps(fit) + _missing_memory(fit) + _drained_at_once(fit)
-    found += _unusual_distances(fit)
+    found += _unusual_distances(fit) + _off_calibration(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     if other := of_another(fit.version):
@@ -298,6 +299,16 @@ def _unusual_distances(fit: FitNumbers) -> list[str]:
         return []
     usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
     return [f"{_enumerated(odd)}: laboratories find {usual}; is the displacement in the unit that its column says?"]
+
+
+def _off_calibration(fit: FitNumbers) -> list[str]:
+    """Warning on a fitted stiffness that differs from the calibrated one by more than both are uncertain."""
+    return [
+        f"the fitted stiffness is {one.value:.3g} of the calibrated one ({one.range()}): a channel that comes late "
+        "(lag = true), a servo or a clipped peak makes that; where the calibration holds, name the stiffness in fixed"
+        for one in fit.derived
+        if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
+    ]
 
 
 def _lengths(fit: FitNumbers, ramped: RampFit) -> str:

@@ -1,0 +1,311 @@
+"""Table of a paper: every step of the records fitted alone, then all together; with a sentence on how."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.dimensions import unit
+from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
+from steadyslip.core.format import format_quantity
+from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
+from steadyslip.experiments.fitting.estimate import Estimate
+from steadyslip.experiments.fitting.fit import fit as fit_records
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.search import Progress
+from steadyslip.experiments.fitting.words import short_names
+from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.measured.steps import LoadStep
+from steadyslip.files.output import write_text
+from steadyslip.machine.slider import Slider
+
+SHOWN = {"displacement": "mm", "m": "um", "m/s": "um/s", "Pa": "MPa", "Pa/m": "GPa/m"}
+"""Units of the table in LaTeX, by name of a column or SI unit; others stay as they are."""
+ABOUT = {"record": "", "step": "", "time": "s", "displacement": "m", "rate before": "m/s", "rate after": "m/s",
+         "normal stress": "Pa", "samples": "", "rms": "1"}  # fmt: skip
+"""Columns before those of the estimates, with SI units."""
+DRIVEN = {
+    "measured": "the measured loading",
+    "protocol": "the given protocol",
+    "smoothed": "a smooth curve through the measured displacement",
+}
+"""What drives the model, by `drive` of a fit, where it is not found in the record."""
+GREEK = ("alpha", "beta", "gamma", "eta", "mu", "psi", "sigma", "tau", "theta")
+
+
+@dataclass(frozen=True)
+class FittedStep:
+    """One line of a table: a step of a record, and the fit to the part of the record around it.
+
+    Attributes
+    ----------
+    record : str
+        Where the record comes from.
+    step : LoadStep or None
+        None for the fit to all records together.
+    fit : Fit
+    displacement, normal_stress : float or None
+        Displacement of the load point since the beginning of the record (m), and effective normal stress (Pa), when
+        the step begins; None if not measured.
+    rates : tuple of two float or None
+        Rate of the load point before and after the step, m/s.
+    """
+
+    record: str
+    step: LoadStep | None
+    fit: Fit
+    displacement: float | None = None
+    normal_stress: float | None = None
+    rates: tuple[float | None, float | None] = (None, None)
+
+    def about(self) -> dict[str, Any]:
+        """Values of the columns `ABOUT`; None where there is none."""
+        step = self.step
+        kind = "all together" if step is None else step.kind
+        kind += f" to {format_quantity(step.after, 'Pa')}" if step is not None and step.unit == "Pa" else ""
+        values = (self.record, kind, None if step is None else step.time, self.displacement, *self.rates,
+                  self.normal_stress, self.fit.samples, self.fit.rms)  # fmt: skip
+        return dict(zip(ABOUT, values, strict=True))
+
+    def estimates(self) -> dict[str, Estimate]:
+        """Estimates of the rig's parameters and what follows from them, by short name."""
+        rig = [one for one in self.fit.estimates if one.name.partition("@")[0] in self.fit.plan.free]
+        stiff = self.fit.plan.rig.of_kind("stiffness")
+        names = short_names(tuple(one.name for one in rig))
+        bare = [f"k{one.name.removeprefix(own)}" if (own := one.name.partition("@")[0]) in stiff else name
+                for one, name in zip(rig, (name.removeprefix("friction.") for name in names), strict=True)]  # fmt: skip
+        return dict(zip(bare, rig, strict=True)) | {one.name: one for one in self.fit.derived}
+
+
+@dataclass(frozen=True, eq=False)
+class StepTable(Displayed):
+    """Fits to every step alone and to all records together, as a table.
+
+    Attributes
+    ----------
+    lines : tuple of FittedStep
+        One for each step, in order of records and time; the last is of all together.
+    left_out : tuple of str
+        Sentences on steps that could not be fitted alone.
+    """
+
+    lines: tuple[FittedStep, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def joint(self) -> Fit:
+        """Fit to all records together."""
+        return self.lines[-1].fit
+
+    @property
+    def steps(self) -> tuple[Fit, ...]:
+        """Fits to every step alone."""
+        return tuple(line.fit for line in self.lines[:-1])
+
+    def _estimated(self) -> dict[str, str]:
+        """Names of the estimates of any line, with SI units."""
+        return {name: one.unit for line in self.lines for name, one in line.estimates().items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units."""
+        lines = []
+        for line in self.lines:
+            own = {name: {"value": one.value, "error": one.error if one.determined else None, "unit": one.unit}
+                   for name, one in line.estimates().items()}  # fmt: skip
+            lines.append(line.about() | {"estimates": own})
+        return {"lines": lines, "left_out": list(self.left_out), "methods": self.methods}
+
+    def csv_text(self) -> str:
+        """Table as comma-separated text, SI units in the header; an error is empty where a value is not determined."""
+        names = self._estimated()
+        titles = [f"{name} ({unit})" if unit else name for name, unit in ABOUT.items()]
+        titles += [f"{name}{what} ({unit})" for name, unit in names.items() for what in ("", " error")]
+        target = io.StringIO()
+        writer = csv.writer(target, lineterminator="\n")
+        writer.writerow(titles)
+        for line in self.lines:
+            own = line.estimates()
+            pairs = [(one.value, one.error if one.determined else None) if (one := own.get(name)) else (None, None)
+                     for name in names]  # fmt: skip
+            writer.writerow(map(_plain, [*line.about().values(), *(x for pair in pairs for x in pair)]))
+        return target.getvalue()
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the table as CSV.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        write_text(path, self.csv_text())
+
+    def latex_text(self) -> str:
+        r"""Table as LaTeX: a ``tabular``, with the sentence for the methods section as a comment above it."""
+        names = self._estimated()
+        about = {name: si for name, si in ABOUT.items() if name not in ("samples", "rms")}
+        heads = [name + (f" ({_unit(si, name)})" if si else "") for name, si in about.items()]
+        heads += [
+            f"${_letter(name, self.joint.plan.rig)}$" + (f" ({_unit(si)})" if si != "1" else "")
+            for name, si in names.items()
+        ]
+        rows = []
+        for line in self.lines:
+            own, here = line.estimates(), line.about()
+            cells = [_cell(here[name], _shown(si, name)) for name, si in about.items()]
+            cells += [_with_error(own.get(name)) for name in names]
+            rows.append(" & ".join(cells) + r" \\")
+        body = [f"% {self.methods}", rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
+                " & ".join(heads) + r" \\", r"\hline", *rows[:-1], r"\hline", rows[-1], r"\hline",
+                r"\end{tabular}"]  # fmt: skip
+        return "\n".join(body) + "\n"
+
+    def to_latex(self, path: str | PathLike[str]) -> None:
+        """Write the table as LaTeX.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        write_text(path, self.latex_text())
+
+    @property
+    def methods(self) -> str:
+        """Sentences for the methods section of a paper."""
+        plan, line, law = self.joint.plan, self.lines[-1], self.joint.plan.rig.friction
+        driven = DRIVEN.get(plan.drive, "the commanded loading found in the load point's displacement")
+        states, evolution = len(getattr(law, "states", ()) or (law,)), getattr(law, "evolution", None)
+        kind = f"{law.name} friction"
+        if evolution is not None:
+            kind += f", {evolution.name} law, {states} state{'s' * (states > 1)}"
+        free = [name for name, one in line.estimates().items() if one not in self.joint.derived]
+        trend = f" A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else ""
+        noise = "allowing for correlated residuals" if self.joint.correlated else "for independent residuals"
+        alone = f"{len(self.steps)} step{'s were' if len(self.steps) != 1 else ' was'} fitted alone"
+        return (
+            f"Friction was fitted by least squares with steadyslip {self.joint.version}: {kind}, coupled to a spring "
+            f"and driven by {driven}, with {', '.join(free)} free.{trend} {alone}, and all together; errors are one "
+            f"standard deviation, {noise}."
+        )
+
+    def __str__(self) -> str:
+        lines = []
+        for line in self.lines:
+            where = f"{line.record}: {line.step}" if line.step else f"all together ({line.record})"
+            lines.append(where)
+            lines.append("  " + ", ".join(f"{name} {one.shown()}" for name, one in line.estimates().items()))
+        return "\n".join([*lines, *(f"! {text}" for text in self.left_out), "", self.methods])
+
+
+@checked()
+def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
+    """Fit every step of a fit's records alone, with the rig and options of the fit.
+
+    Parameters
+    ----------
+    fit : Fit
+        To all records together; its line is the last.
+    progress : callable, optional
+        As for `fit`.
+
+    Raises
+    ------
+    ParameterError
+        If no record has a step.
+    """
+    plan = fit.plan
+    level = plan.rig.of_kind("friction level")
+    names = ("trend", "trend_axis", "offset", "lag", "initial", "loss", "width", "calibrated")
+    options = {name: getattr(plan, name) for name in names}
+    options |= {"fixed": [name for name in level if name not in plan.free], "errors": "auto"}
+    options |= {"protocol": plan.protocol} if plan.drive == "protocol" else {"drive": plan.drive}
+    lines, left_out = [], []
+    for i, record in enumerate(plan.records):
+        for step, part in _parts(record):
+            weights = None if plan.weights is None else plan.weights[i][np.isin(record.time, part.time)]
+            try:
+                alone = fit_records(plan.rig, part, plan.free, weights=weights, progress=progress, **options)
+            except SteadyslipError as error:
+                left_out.append(f"{record.source}: {step} could not be fitted alone: {error}")
+                continue
+            lines.append(_fitted_step(record, step, alone))
+    if not lines and not left_out:
+        raise ParameterError([Problem("fit", "no steps were found in its records, so there is nothing to list")])
+    sources = ", ".join(dict.fromkeys(record.source for record in plan.records))
+    lines.append(FittedStep(sources, None, fit))
+    return StepTable(tuple(lines), tuple(left_out))
+
+
+def _parts(record: Record) -> Iterator[tuple[LoadStep, Record]]:
+    """Steps of a record, each with the part of the record around it."""
+    steps = [step for step in record.steps if step.kind != "reslide"]
+    return zip(steps, record.windows(), strict=True) if steps else iter(())
+
+
+def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
+    moved, normal = (None if own is None else float(np.interp(step.time, record.time, own))
+                     for own in (record.displacement, record.normal))  # fmt: skip
+    if moved is not None and record.displacement is not None:
+        moved -= float(record.displacement[0])
+    load = record.loading.load
+    rates = (step.before, step.after) if step.unit == "m/s" else (None, None)
+    if step.unit == "Pa" and load is not None:
+        rates = (float(load.at(np.array([step.time]))[0]),) * 2
+    return FittedStep(record.source, step, alone, moved, normal, rates)
+
+
+def _plain(value: Any) -> str:
+    return "" if value is None else f"{value:.8g}" if isinstance(value, float) else str(value)
+
+
+def _shown(si: str, column: str = "") -> str:
+    """Unit of a column in LaTeX."""
+    return SHOWN.get(column, SHOWN.get(si, si))
+
+
+def _unit(si: str, column: str = "") -> str:
+    return _shown(si, column).replace("um", r"\textmu m")
+
+
+def _letter(name: str, rig: Slider) -> str:
+    """Name of an estimate in the mathematics of LaTeX; ``b`` of the second state is b_2."""
+    *before, last = name.split(".")
+    declared = next((one.role.letter for full, one in rig.parameters().items() if full.endswith(f".{name}")), "")
+    words = (part.split("_") for part in (declared or last).split("/"))
+    number = [part for part in before if part.isdigit()]
+    found = []
+    for head, *tail in words:
+        below = ",".join([*tail, *number])
+        found.append((f"\\{head}" if head in GREEK else head) + (f"_{{{below}}}" if below else ""))
+    return " / ".join(found)
+
+
+def _cell(value: Any, shown: str) -> str:
+    """Text or number (SI) of a cell, in the unit shown."""
+    if value is None:
+        return "--"
+    if isinstance(value, str):
+        return "".join(f"\\{one}" if one in "_%&#$" else one for one in value)
+    return format_quantity(value / unit(shown)[0], "1")
+
+
+def _with_error(one: Estimate | None) -> str:
+    """Value and error in the units of the table, rounded to two digits of the error."""
+    if one is None:
+        return "--"
+    factor = unit(_shown(one.unit))[0]
+    value, error = one.value / factor, one.error / factor
+    if not one.determined:
+        return f"({value:.3g})"
+    if not error > 0:
+        return f"${value:.4g}$"
+    digits = max(1 - int(np.floor(np.log10(error))), 0)
+    return rf"${value:.{digits}f} \pm {error:.{digits}f}$"

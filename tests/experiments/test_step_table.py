@@ -1,0 +1,81 @@
+"""Table of steps: each alone and all together, in numbers that other programs read, and beside a calibration."""
+
+import csv
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+
+TWICE = ss.Protocol(
+    pieces=(ss.protocol.VelocityStep(at=60.13, to=5e-6), ss.protocol.NormalStressStep(at=120.2, by=0.1 * lab.STRESS)),
+    until=200.0,
+)
+
+
+@pytest.fixture(scope="module")
+def joint():
+    rig = lab.rig(alpha=0.3)
+    records = [lab.record(rig, protocol, seed=i) for i, protocol in enumerate((TWICE, lab.HOLD))]
+    guess = ss.lab_rig(normal_memory="linker-dieterich")
+    return ss.fit(guess, records, calibrated="40 GPa/m", fixed=["alpha"])
+
+
+@pytest.fixture(scope="module")
+def table(joint):
+    return ss.experiments.step_table(joint)
+
+
+def test_every_step_is_fitted_alone_and_all_together(joint, table, tmp_path):
+    assert [line.step.kind for line in table.lines[:-1]] == [
+        "velocity step", "normal-stress step", "hold", "velocity step"
+    ]  # fmt: skip
+    assert table.joint is joint
+    assert not table.left_out
+    alone = ss.fit(joint.plan.rig, joint.plan.records[0].windows()[0], fixed=["alpha"], calibrated=4e10)
+    assert table.steps[0].values == alone.values
+    table.to_csv(tmp_path / "t.csv")
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert len(rows) == 5
+    first = rows[0]
+    rates = [float(first[f"rate {when} (m/s)"]) for when in ("before", "after")]
+    assert rates == pytest.approx([1e-6, 5e-6], rel=1e-2)
+    assert float(first["displacement (m)"]) == pytest.approx(60.13e-6, rel=1e-2)
+    assert float(first["normal stress (Pa)"]) == pytest.approx(lab.STRESS, rel=1e-2)
+    assert float(first["a (1)"]) == pytest.approx(alone.values["friction.a"], rel=1e-7)
+    assert float(first["a error (1)"]) == pytest.approx(alone.errors["friction.a"], rel=1e-7)
+    assert rows[1]["step"] == "normal-stress step to 11 MPa"
+    assert rows[-1]["rate after (m/s)"] == ""
+    assert table.to_dict()["lines"][-1]["estimates"]["d_c"]["value"] == joint.values["friction.d_c"]
+
+
+def test_latex_and_methods(joint, table, tmp_path):
+    table.to_latex(tmp_path / "t.tex")
+    text = (tmp_path / "t.tex").read_text()
+    body = [line for line in text.splitlines() if line.endswith(r"\\")]
+    assert len({line.count("&") for line in body}) == 1
+    assert len(body) == 6
+    assert r"$d_{c}$ (\textmu m)" in body[0]
+    one = joint["d_c"]
+    digits = 1 - int(np.floor(np.log10(1e6 * one.error)))
+    assert rf"${1e6 * one.value:.{digits}f} \pm {1e6 * one.error:.{digits}f}$" in body[-1]
+    assert table.methods in text.splitlines()[0]
+    assert "slip law, 1 state" in table.methods
+    assert "4 steps were fitted alone" in table.methods
+
+
+def test_a_calibrated_stiffness_stands_beside_the_fitted_one(joint, tmp_path):
+    ratio = next(one for one in joint.derived if one.name == "k/k_cal")
+    assert ratio.value == pytest.approx(joint.values["slider.stiffness"] / 40e9, rel=1e-12)
+    assert ratio.error / ratio.value == pytest.approx(joint.errors["slider.stiffness"] / joint["stiffness"].value)
+    assert any("of the calibrated one" in warning for warning in joint.to_dict()["warnings"])
+    joint.save(tmp_path / "fit.nc")
+    assert ss.load_fit(tmp_path / "fit.nc").derived == joint.derived
+
+
+def test_records_without_steps_are_refused():
+    record = lab.record(lab.rig(), ss.Protocol(pieces=(), until=60.0), 1)
+    fit = ss.fit(ss.lab_rig(), record, ["mu_ref"])
+    with pytest.raises(ss.ParameterError, match="no steps"):
+        ss.experiments.step_table(fit)

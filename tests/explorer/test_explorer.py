@@ -24,10 +24,10 @@ from steadyslip.explorer.motion import OPTIONS, driver, motion_part
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
+from steadyslip.linear import crossing
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, stable_set
 from steadyslip.linear.roots import roots
-from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
 from steadyslip.model.posed import well_posed
 from steadyslip.model.reducing import reduce_model
@@ -69,8 +69,8 @@ def polynomial_programs(n):
     """A Linear whose equations are two polynomials p and q of n + 1 coefficients, in the record R."""
     names = sp.symbols(f"c:{2 * n + 2}")
     model = SimpleNamespace(arguments=names)
-    whole = program(model, "coefficients", names[: n + 1], then=_verdict_values)
-    several = _stable_set_programs(n)
+    whole = program(model, "coefficients", names[: n + 1], then=lambda c: _verdict_values(c, 1))
+    several = _stable_set_programs(n, 1)
     text = "".join(javascript.text(one) for one in (whole, *several))
     facts = {"parameters": list(map(str, names)), "degree": n, "squares": len(several[0].stores) - 2, "closed": False,
              "contacts": [""], "searched": [False], "joint": False, "observed": []}  # fmt: skip
@@ -87,13 +87,13 @@ def test_polynomials_are_judged_as_in_python(n):
         if rng.random() < 0.3:
             p[n] = 0.0
         judged = script("own.set(all).ask('coefficients', n + 3).slice(n + 1)", all=[*p, *q], n=n)
-        assert judged == [bool(is_hurwitz(p)), bool(ill_posed(p))]
+        assert judged == [bool(is_hurwitz(p, 1)), bool(crossing.is_ill_posed(p, 1))]
         mine = np.array([complex(s["re"], s["im"]) for s in script("roots(p)", p=p)])
         truth = roots(p)
         truth = truth[np.isfinite(truth)]
         truth = truth[np.lexsort((-truth.imag, -truth.real))]
         assert np.all(np.abs(mine - truth) <= BAR * np.abs(truth))
-        found, expected = script("own.stableSet(p, q)", p=p, q=q), stable_set(p, q)
+        found, expected = script("own.stableSet(p, q)", p=p, q=q), stable_set(p, q, 1)
         intervals = np.array([[one["low"], one["high"]] for one in found["intervals"]]).reshape(-1, 2)
         kept = expected.intervals[np.isfinite(expected.intervals[:, 0])]
         assert np.allclose(intervals, kept, rtol=1e-10, atol=0)

@@ -5,6 +5,7 @@ Each law is a class and no edit. What it says of itself (kinds, standing values)
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ import sympy as sp
 
 import lab_records as lab
 import steadyslip as ss
+from rigs_of_theory import V0, rig
 from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.experiments.answers.laws import with_law
 from steadyslip.experiments.spec import spec_from_text
@@ -285,3 +287,53 @@ def test_a_map_shows_it(case, tmp_path):
     plan = ss.Map(rig, {OWN[case]: values}, ["growth_rate"])
     found = ss.run_map(plan, tmp_path / "map.zarr", workers=1).dataset
     assert found["growth_rate"].values == pytest.approx(ss.growth_rate(rig, {OWN[case]: values}))
+
+
+@pytest.fixture
+def written(monkeypatch):
+    """Factory of laws of constant friction, a direct effect, and a term that a user writes with functions of SymPy."""
+    monkeypatch.setattr(ss.laws.FrictionLaw, "registry", dict(BEFORE[0]))
+
+    def made(further):
+        class Law(ss.laws.FrictionLaw, name=f"law-{len(ss.laws.FrictionLaw.registry)}"):
+            a: float = ss.laws.parameter("1", positive, "direct effect")
+
+            def strength(self, v, sigma, memory, tau):
+                return sigma * (0.6 + self.a * sp.log(v / V0) + further(v / V0))
+
+        return Law(a=0.01)
+
+    return made
+
+
+NOT_OFFERED = {
+    "Mod(...)": lambda r: sp.Mod(r, 7), "frac(...)": sp.frac, "floor(...)": sp.floor, "erf(...)": sp.erf,
+    "Heaviside(...)": lambda r: sp.Heaviside(r - 2), "DiracDelta(...)": lambda r: sp.DiracDelta(r - 2),
+    "Integral(...)": lambda r: sp.Integral(sp.exp(-sp.Symbol("u") ** 2), (sp.Symbol("u"), 0, r)),
+    "I": lambda r: sp.I * r, "nan": lambda r: r + float("nan"), "zoo": lambda r: r + sp.zoo,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOT_OFFERED)
+def test_what_a_law_must_not_contain_is_named(name, written):
+    """As the user wrote it, not as its derivative."""
+    law = written(NOT_OFFERED[name])
+    with pytest.raises(ss.NotAvailable, match=rf"of Law contains {re.escape(name)}, which is not offered"):
+        ss.analyze(rig(friction=law))
+
+
+def test_the_larger_of_two_is_a_piecewise_function(written):
+    """In verdicts and in motion alike, with the slope of the larger."""
+    ways = {
+        "max": lambda r: 1e-3 * (sp.Max(r, 1) - sp.Min(3 - r, r)),
+        "by hand": lambda r: 1e-3 * (sp.Piecewise((r, r >= 1), (1, True)) - sp.Piecewise((3 - r, r >= 1.5), (r, True))),
+    }
+    rigs = {way: rig(friction=written(one), drive=ss.machine.SteadyDrive(2 * V0)) for way, one in ways.items()}
+    growth = {way: ss.growth_rate(one) for way, one in rigs.items()}
+    assert growth["max"] == pytest.approx(growth["by hand"], rel=1e-12)
+    v = {
+        way: ss.simulate(one, until=1.0, initial={"x": 1e-6}, times=np.linspace(0, 1, 50))["v"]
+        for way, one in rigs.items()
+    }
+    assert np.allclose(v["max"], v["by hand"], rtol=1e-9, atol=0)
+    assert np.ptp(v["max"]) > 1e-3 * V0

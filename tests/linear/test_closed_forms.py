@@ -248,8 +248,8 @@ def test_roots_keep_their_digits_beside_very_fast_ones():
     wanted = np.array([-1e-3 + 2e-3j, -1e-3 - 2e-3j, -5.0, -1e9])
     c = np.polynomial.polynomial.polyfromroots(wanted).real
     np.testing.assert_allclose(np.sort_complex(roots(c)), np.sort_complex(wanted), rtol=1e-12)
-    assert is_hurwitz(c)
-    assert not is_hurwitz(-c)
+    assert is_hurwitz(c, 1)
+    assert not is_hurwitz(-c, 1)
 
 
 def test_names_of_a_law_never_clash_with_those_of_the_model():

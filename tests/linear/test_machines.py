@@ -148,6 +148,21 @@ def test_a_machine_is_ill_posed_where_friction_falls_at_once():
     assert "ill-posed" in ss.analyze(worse).reason
 
 
+def test_bristles_without_damping_need_a_mass_in_machines_too():
+    """On a body without mass beside one with mass; and two masses that go are not two orders that are missing."""
+    machine = two_mass()
+    bare = {"bodies.table.mass": 0.0, "links.screw.damping": 0.0}
+    stiff = ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.45, v_stribeck=1.0, bristle_stiffness=1e3, bristle_damping=0.0)
+    undamped = replace(machine.with_values(bare), contacts={"guide": surface("table", stiff)})
+    assert ss.stability(undamped) == "unstable"
+    assert ss.growth_rate(undamped) == np.inf
+    assert "ill-posed" in ss.analyze(undamped).reason
+    masses = {f"bodies.{name}.mass": [0.0, 1.0] for name in machine.bodies}
+    assert ss.growth_rate(machine, masses)[0] == pytest.approx(
+        ss.growth_rate(machine.with_values(dict.fromkeys(masses, 0.0))), rel=1e-9
+    )
+
+
 def test_what_cancels_in_the_structure_cancels_exactly():
     """Dashpots between bodies without mass: the highest coefficients are absent, not rounded."""
     bodies = {name: ss.machine.SlidingBody() for name in ("a", "b", "c")}

@@ -70,7 +70,7 @@ def test_jacobian_has_the_roots_of_the_polynomial(contact, mass):
 def test_membership_in_the_stable_set_is_the_sign_of_the_roots(degree, random):
     p = np.array([random.uniform(-1, 1) * 10 ** random.uniform(-2, 2) for _ in range(degree)] + [1.0])
     q = np.array([random.uniform(-1, 1) * 10 ** random.uniform(-2, 2) for _ in range(degree - 1)] + [0.0, 0.0])
-    found = stable_set(p, q)
+    found = stable_set(p, q, 1)
     for _ in range(12):
         k = 10 ** random.uniform(-4, 4)
         inside = bool(np.any((found.intervals[:, 0] < k) & (k < found.intervals[:, 1])))
@@ -84,7 +84,7 @@ def test_a_union_of_intervals():
     """Membership over six decades of k of a polynomial that is stable, unstable and stable again."""
     base = np.polynomial.polynomial.polyfromroots([-0.1 + 1j, -0.1 - 1j, -0.2 + 2j, -0.2 - 2j, -3]).real
     push = np.array([-0.54, -0.32, 0.41, 1.04, 0.0, 0.0])
-    found = stable_set(base, push)
+    found = stable_set(base, push, 1)
     k = np.geomspace(1e-3, 1e3, 4001)
     truth = np.array([np.max(np.roots((base + x * push)[::-1]).real) < 0 for x in k])
     inside = np.any((found.intervals[:, 0] < k[:, None]) & (k[:, None] < found.intervals[:, 1]), axis=-1)
@@ -120,6 +120,22 @@ def test_quasistatic_with_too_much_lift_is_ill_posed():
     r = rig(contact=ss.laws.LinearNormalStress(steady_normal_stress=SIGMA, b1=-2 * f / 0.7), stiffness=1e11)
     assert ss.growth_rate(r) == math.inf
     assert not ss.analyze(r).stable
+
+
+@pytest.mark.parametrize("velocity", [1e-5, 1e-3, 1e-2])
+@pytest.mark.parametrize("stiffness", [1e4, 1e7])
+def test_bristles_without_damping_need_a_mass(velocity, stiffness):
+    """Velocity then has no effect at once on friction; all routes tell so."""
+    friction = ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.45, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=0)
+    r = rig(friction=friction, stiffness=stiffness, drive=ss.machine.SteadyDrive(velocity))
+    masses = {"slider.mass": [0.0, 1e-6 * SIGMA]}
+    assert ss.stability(r) == ss.stability(r, masses)[0] == "unstable"
+    assert ss.growth_rate(r) == ss.growth_rate(r, masses)[0] == math.inf
+    assert np.all(np.isnan(ss.stable_stiffness(r)))
+    assert not ss.analyze(r).stable
+    damped = r.with_values({"slider.damping": 10.0 * SIGMA})
+    assert ss.stability(damped) == ss.stability(damped, masses)[0]
+    assert ss.growth_rate(damped) == pytest.approx(ss.growth_rate(damped, masses)[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -226,7 +226,7 @@ def test_hurwitz_is_the_same_in_any_unit_of_time(rates, decades, flip):
     unit = 10.0 ** (decades / len(rates))
     scaled = c * unit ** -np.arange(len(c))
     if np.all(np.isfinite(scaled)) and np.all(np.abs(scaled) > 1e-300):
-        assert is_hurwitz(scaled) == (not flip)
+        assert is_hurwitz(scaled, 1) == (not flip)
 
 
 @pytest.mark.campaign
@@ -326,8 +326,6 @@ def slider(law, delay=0.0):
 def routh(coefficients):
     """First column of the Routh array of a polynomial, lowest power first, in numbers of any kind."""
     falling = list(coefficients)[::-1]
-    while falling[0] == 0:
-        falling.pop(0)
     above, row = falling[::2], falling[1::2]
     column = [above[0]]
     while row:
@@ -351,7 +349,8 @@ def test_above_the_stribeck_velocity_no_sign_is_lost_with_an_exponential(law, cu
         with mpmath.workdps(50):
             numbers = [mpmath.mpf(float(np.asarray(one))) for one in (*point.arguments, *point.steady)]
             exact = PreciseFunction(point.model.arguments, characteristic_coefficients(point.model))(*numbers)
-            right = "stable" if all(one > 0 for one in routh(exact)) else "unstable"
+            posed = exact[-1] > 0  # friction of undamped bristles does not rise at once with velocity
+            right = "stable" if posed and all(one > 0 for one in routh(exact)) else "unstable"
         assert words == right or (words == "out of range" and ratio > 25), ratio
     assert np.all(told != "out of range") or law != "viscous"
 

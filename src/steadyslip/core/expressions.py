@@ -10,6 +10,8 @@ from typing import Any
 import mpmath
 import numpy as np
 import sympy as sp
+from sympy.functions.elementary.piecewise import ExprCondPair
+from sympy.logic.boolalg import BooleanAtom
 
 from steadyslip.core.errors import NotAvailable
 
@@ -63,6 +65,11 @@ _NUMPY = {
 }  # fmt: skip
 _COMPARED = {sp.Lt: "<", sp.Le: "<=", sp.Gt: ">", sp.Ge: ">=", sp.Eq: "==", sp.Ne: "!="}
 _JOINED = {sp.And: " & ", sp.Or: " | ", sp.Xor: " ^ "}
+_STRUCTURE = (
+    sp.Symbol, sp.Number, sp.NumberSymbol, sp.Add, sp.Mul, sp.Pow, sp.Piecewise, ExprCondPair, sp.Implies,
+    sp.Equivalent, sp.ITE, BooleanAtom,
+)  # fmt: skip
+_NO_NUMBERS = (sp.nan, sp.zoo, sp.I)
 _WORLD = {
     name: getattr(np, name, numpy_asinh_exp)
     for name in (*_NUMPY.values(), "where", "sqrt", "square", "power", "nan", "inf")
@@ -114,6 +121,28 @@ def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
         found[one] = found.get(one, 0) + 1
         if found[one] == 1:
             waiting += one.args
+    return found
+
+
+def supported(e: Any, what: str) -> sp.Expr:
+    """An expression that a law gives, as SymPy's, if values and slopes of all its functions can be computed.
+
+    Raises
+    ------
+    NotAvailable
+        With `what` it is, such as "strength of MyLaw".
+    """
+    found = sp.sympify(e)
+    if found.has(sp.Max, sp.Min):
+        found = found.replace(lambda one: isinstance(one, (sp.Max, sp.Min)), lambda one: one.rewrite(sp.Piecewise))
+    for one in occurrences([found]):
+        known = isinstance(one, (*_NUMPY, *_COMPARED, *_JOINED, *_STRUCTURE)) and one not in _NO_NUMBERS
+        if not known:
+            name = str(one) if one.is_Atom else f"{one.func.__name__}(...)"
+            raise NotAvailable(
+                f"the {what} contains {name}, which is not offered; allowed: numbers, arguments, powers, Piecewise, "
+                f"Max, Min, sign, Abs, exp, log, trigonometric and hyperbolic functions and their inverses"
+            )
     return found
 
 
@@ -333,6 +362,8 @@ def derivative(e: sp.Expr, x: sp.Symbol) -> sp.Expr:
         return sp.S.Zero if own is sp.S.Zero else e.exp * e.base ** (e.exp - 1) * own
     if isinstance(e, sp.Piecewise):
         return sp.Piecewise(*((derivative(branch, x), condition) for branch, condition in e.args))
+    if isinstance(e, sp.sign):
+        return sp.S.Zero
     if isinstance(e, (sp.exp, sp.log, sp.sin, sp.cos, sp.sinh, sp.cosh, sp.tanh, sp.asinh, asinh_exp)):
         inner = [(i, own) for i, part in enumerate(e.args, 1) if (own := derivative(part, x)) is not sp.S.Zero]
         return sp.Add(*(e.fdiff(i) * own for i, own in inner))

@@ -28,6 +28,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
+from steadyslip.model.posed import missing_inertias
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, ROOT_TOLERANCE, joint_equation
 from steadyslip.model.underflow import highest_coefficients, highest_is_lost
@@ -92,7 +93,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         programs.append(program(model, "split", [*without, *slope]))
         programs.append(program(model, "stiffness", [model.axial_share or 1, model.gain]))
         further = {"gain": rig.gain_name()}
-    edges = _stable_set_programs(len(coefficients) - 1)
+    edges = _stable_set_programs(len(coefficients) - 1, 1 if any(missing_inertias(model)) else 0)
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
     facts = {
@@ -156,22 +157,24 @@ def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Progr
         if levels:
             lost = highest_is_lost([[(next(rest), next(rest)) for _ in level] for level in levels], select)
             c[-1] = select(lost > 0, float("nan"), c[-1])
-        return _verdict_values(c)
+        spare = sum((select(abs(inertia) <= 0, 1.0, 0.0) for inertia in rest), start=free)
+        return _verdict_values(c, spare)
 
+    free, inertias = missing_inertias(model)
     further = [e for level in levels for pair in level for e in pair]
-    return program(model, "coefficients", [*coefficients, *further], then=judged)
+    return program(model, "coefficients", [*coefficients, *further, *inertias], then=judged)
 
 
-def _verdict_values(c: list[Node]) -> list[Value]:
+def _verdict_values(c: list[Node], spare: Value) -> list[Value]:
     """Coefficients, 1 or 0 for stable and for ill-posed, and the functions of `crossing.judged`, as nodes."""
-    stable, functions = crossing.judged(c, select)
-    return [*c, *(select(truth, 1.0, 0.0) for truth in (stable, crossing.is_ill_posed(c))), *functions]
+    stable, functions = crossing.judged(c, select, spare)
+    return [*c, *(select(truth, 1.0, 0.0) for truth in (stable, crossing.is_ill_posed(c, spare))), *functions]
 
 
-def _stable_set_programs(degree: int) -> list[Program]:
+def _stable_set_programs(degree: int, spare: int) -> list[Program]:
     """Programs for the stable set of p + k q: edges, polynomial in β² of the crossings, k of its roots, verdict at k.
 
-    They read an array with the coefficients of p, then those of q.
+    They read an array with the coefficients of p, then those of q. Of p + k q the `spare` highest may be 0.
     """
 
     def edges(p: list[Node], q: list[Node], _: Node) -> list[Value]:
@@ -182,7 +185,7 @@ def _stable_set_programs(degree: int) -> list[Program]:
 
     def stable_at(p: list[Node], q: list[Node], k: Node) -> list[Value]:
         both = [one + k * other for one, other in zip(p, q, strict=True)]
-        return [select(crossing.is_hurwitz(both, select), 1.0, 0.0)]
+        return [select(crossing.is_hurwitz(both, select, spare), 1.0, 0.0)]
 
     found = []
     for name, values in (("edges", edges), ("onAxis", on_axis), ("stableAt", stable_at)):

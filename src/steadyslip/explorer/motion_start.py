@@ -179,7 +179,8 @@ def _all_eigenvalues_positive(entries: list[Node]) -> Any:
     less: list[list[Value | None]] = [
         [None if _is_zero(e) else -e for e in entries[size * i : size * (i + 1)]] for i in range(size)
     ]
-    return crossing.is_hurwitz(list(map(as_node, characteristic_polynomial(less))), select) if size else as_node(True)
+    c = list(map(as_node, characteristic_polynomial(less)))
+    return crossing.is_hurwitz(c, select, spare=0) if size else as_node(True)
 
 
 def _is_zero(node: Node) -> bool:

@@ -32,10 +32,17 @@ def routh(c: Polynomial) -> list[Any]:
     return column
 
 
-def is_ill_posed(c: Polynomial) -> Any:
-    """True where a polynomial is ill-posed: highest coefficient < 0, or 0 with the second highest <= 0."""
-    highest, second = c[-1], c[-2]
-    return (highest < 0) | ((highest <= 0) & (second <= 0))
+def is_ill_posed(c: Polynomial, spare: Any) -> Any:
+    """True where the highest coefficient of a polynomial that is not 0 is negative, or more than `spare` are 0.
+
+    `spare` is 1 without mass where the equations have its coefficient, which is 0 then (`model.posed.spare_powers`).
+    """
+    found: Any = (c[-1] < 0) | ((c[-1] <= 0) & (spare < 1))
+    gone: Any = abs(c[-1]) <= 0
+    for place, one in enumerate(c[-2::-1], start=1):
+        found = found | (gone & ((one < 0) | ((one <= 0) & (spare <= place))))
+        gone = gone & (abs(one) <= 0)
+    return found
 
 
 def even_odd(c: Polynomial) -> tuple[list[Any], list[Any]]:
@@ -106,15 +113,15 @@ def linear_split(
     return p, q, straight
 
 
-def is_hurwitz(c: Polynomial, choose: Choose) -> Any:
-    """True if all roots lie left of the axis and the highest coefficient (or, if 0, the second) is positive.
+def is_hurwitz(c: Polynomial, choose: Choose, spare: Any) -> Any:
+    """True if all roots lie left of the axis and the highest coefficient is positive (or, if 0 and spare, the second).
 
     For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
     """
-    return judged(c, choose)[0]
+    return judged(c, choose, spare)[0]
 
 
-def judged(c: Polynomial, choose: Choose) -> tuple[Any, list[Any]]:
+def judged(c: Polynomial, choose: Choose, spare: Any) -> tuple[Any, list[Any]]:
     """`is_hurwitz`, and factors of three functions, one of which changes sign wherever that changes.
 
     The three are the lowest coefficient (one root is zero), the highest (one is infinite), and the last but one
@@ -127,7 +134,7 @@ def judged(c: Polynomial, choose: Choose) -> tuple[Any, list[Any]]:
     scaled = [one / largest for one in c]
     full, less = routh(scaled), routh(scaled[:-1])
     massless = abs(c[-1]) <= 0
-    stable = ((c[-1] > 0) & _all_positive(full)) | (massless & _all_positive(less))
+    stable = ((c[-1] > 0) & _all_positive(full)) | (massless & (spare >= 1) & _all_positive(less))
     determinant = [
         choose(massless, few, one) for one, few in zip(full[1:-1], [*less[1:-1], 1.0][: len(c) - 2], strict=True)
     ]

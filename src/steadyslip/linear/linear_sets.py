@@ -12,6 +12,7 @@ from steadyslip.linear.roots import Array, quietly
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
+from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import characteristic, quasipolynomial
 
 _FAR = 1e12  # edges beyond this factor from the size of a parameter, up or down, are rounding of infinity or zero
@@ -95,7 +96,7 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
         if not np.any(far):
             break
         size = np.where(far, size * factor, size)
-    found, unit = _with_far_edges_removed(stable_set(p, q)), size[..., None]
+    found, unit = _with_far_edges_removed(stable_set(p, q, spare_powers(point))), size[..., None]
     intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
     return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
 
@@ -141,7 +142,7 @@ def linear_set(
         low, high = (1 / APART, APART) if reach is None else (reach[0] / value, reach[1] / value)
         windows = linear_windows(p, q, h, min(low, 1 / APART), max(high, APART))
     else:
-        windows = _with_far_edges_removed(stable_set(p[0], q[0]))
+        windows = _with_far_edges_removed(stable_set(p[0], q[0], spare_powers(point)))
     return (
         None
         if windows is None

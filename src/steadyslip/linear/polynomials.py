@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.linear import crossing
 from steadyslip.linear.roots import Array, ComplexArray, degrees, quietly, roots
@@ -46,16 +46,18 @@ def damping_measures(s: ComplexArray) -> Array:
 
 
 @quietly
-def is_hurwitz(c: Array) -> NDArray[np.bool_]:
-    """True where the highest coefficient is positive and all roots have negative real parts (Routh), (...)."""
+def is_hurwitz(c: Array, spare: ArrayLike) -> NDArray[np.bool_]:
+    """True where all roots have negative real parts (Routh) and the equations are well posed, (...).
+
+    They are not where the highest coefficient is negative, or more than `spare` (...) of the highest are 0.
+    """
     n = c.shape[-1] - 1
     flat = c.reshape(-1, n + 1)
     result = np.zeros(len(flat), dtype=bool)
     degree = degrees(flat)
-    for d in np.unique(degree):
-        if d < max(n - 1, 0):  # the equations have lost more than their inertia: ill-posed
-            continue
-        rows = np.flatnonzero(degree == d)
+    posed = degree >= np.maximum(n - np.broadcast_to(spare, c.shape[:-1]).reshape(-1), 0)
+    for d in np.unique(degree[posed]):
+        rows = np.flatnonzero(posed & (degree == d))
         result[rows] = np.all(routh_column(_in_own_time(flat[rows, : d + 1])) > 0, axis=-1)
     return result.reshape(c.shape[:-1])
 
@@ -121,11 +123,12 @@ class StableSet:
 
 
 @quietly
-def stable_set(p: Array, q: Array) -> StableSet:
+def stable_set(p: Array, q: Array, spare: ArrayLike) -> StableSet:
     """The set of k > 0 for which p(s) + k q(s) has all roots in the left half plane.
 
     Boundaries are k = −p(iβ)/q(iβ) at real roots β >= 0 of Im[p(iβ) conj q(iβ)] = 0, and the k where the
-    highest coefficient vanishes; the intervals between them are tested (theory 3).
+    highest coefficient vanishes; the intervals between them are tested (theory 3). Up to `spare` (...) of the highest
+    coefficients may be 0 (`model.posed.spare_powers`).
     """
     p, q = np.broadcast_arrays(p, q)
     shape, n = p.shape[:-1], p.shape[-1] - 1
@@ -142,7 +145,8 @@ def stable_set(p: Array, q: Array) -> StableSet:
     k, beta = np.take_along_axis(k, order, -1), np.take_along_axis(beta, order, -1)
 
     probes = _between(k, p, q)
-    stable = is_hurwitz(p[:, None, :] + probes[..., None] * q[:, None, :])
+    spare = np.broadcast_to(spare, shape).reshape(-1, 1)
+    stable = is_hurwitz(p[:, None, :] + probes[..., None] * q[:, None, :], np.broadcast_to(spare, probes.shape))
     changes = (stable[:, 1:] != stable[:, :-1]) & np.isfinite(k)
     k = np.ldexp(k, of_p - of_q)
     intervals = _intervals(np.where(np.isnan(k), np.inf, k), stable)

@@ -10,11 +10,12 @@ from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasipolynomial as with_delays
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.digits import precise_eigenvalues
-from steadyslip.linear.polynomials import damping_measures, is_hurwitz
+from steadyslip.linear.polynomials import columns, damping_measures, is_hurwitz
 from steadyslip.linear.roots import Array, ComplexArray, roots
 from steadyslip.model.eigenvalues import digits_lost, eigenvalues_of
 from steadyslip.model.linearisation import delays_of_terms, is_written_out
 from steadyslip.model.point import OperatingPoint
+from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import characteristic, quasipolynomial
 
 _ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the axis: a conjugate pair
@@ -48,7 +49,7 @@ def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
     if point.model.delays:
         return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
     if is_written_out(point.model):
-        return is_hurwitz(characteristic(point))
+        return is_hurwitz(characteristic(point), spare_powers(point))
     s = spectrum(point)
     return np.asarray(np.all((s.real < 0) | np.isnan(s), axis=-1) & ~is_ill_posed(point))
 
@@ -70,15 +71,15 @@ def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
 
 
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3).
+    """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3); see `spare_powers`.
 
     With delays also where in the highest derivative the delayed terms outweigh the undelayed one: then ever faster
     oscillations grow.
     """
     if not point.model.delays:
-        return ill_posed(characteristic(point))
+        return _ill_posed(point, characteristic(point))
     c, _ = quasipolynomial(point)
-    return np.asarray(ill_posed(c[..., 0, :]) | (_counts(point) == with_delays.INFINITE))
+    return np.asarray(_ill_posed(point, c[..., 0, :]) | (_counts(point) == with_delays.INFINITE))
 
 
 def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
@@ -87,7 +88,7 @@ def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
     A delay does so where, on a body without mass, the delayed terms outweigh those that act at once.
     """
     c, _ = quasipolynomial(point)
-    if not point.model.delays or ill_posed(c[0]) or _counts(point) != with_delays.INFINITE:
+    if not point.model.delays or _ill_posed(point, c[0]) or _counts(point) != with_delays.INFINITE:
         return ()
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
     late = [delay for delay, own in zip(delays_of_terms(point.model), c[:, top], strict=True) if own != 0]
@@ -96,9 +97,8 @@ def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
     )
 
 
-def ill_posed(c: Array) -> NDArray[np.bool_]:
-    """True where polynomials (..., n+1) are ill-posed: highest coefficient < 0, or 0 with the second <= 0."""
-    return np.asarray(crossing.is_ill_posed((c[..., -2], c[..., -1])))
+def _ill_posed(point: OperatingPoint, c: Array) -> NDArray[np.bool_]:
+    return np.asarray(crossing.is_ill_posed(columns(c), spare_powers(point)))
 
 
 def static_sum(point: OperatingPoint) -> Array:

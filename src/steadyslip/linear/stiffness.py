@@ -32,6 +32,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import stiffness_split
 from steadyslip.model.point import OperatingPoint, Vary, operating_point, stacked
+from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import in_range, quasipolynomial, require_range, surely_in_range, warn_of_range
 from steadyslip.model.steady import steady_equation
 
@@ -185,7 +186,7 @@ def general_set(point: OperatingPoint) -> StableSet:
     if point.model.delays:
         nothing = np.empty(0)
         return StableSet(sets_of(point, STIFFNESS, _size(point)), nothing, nothing, nothing.astype(bool))
-    return stable_set(*stiffness_polynomials(point))
+    return stable_set(*stiffness_polynomials(point), spare_powers(point))
 
 
 def _size(point: OperatingPoint) -> Array:

@@ -15,7 +15,7 @@ from typing import Any
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import derivative, supported
 from steadyslip.core.symbols import Letters, inner_symbol
 from steadyslip.laws.contact import ContactInputs
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
@@ -46,7 +46,13 @@ class SymbolicContact:
     @cached_property
     def tau_ss(self) -> sp.Expr:
         """Friction stress in steady sliding."""
-        return sp.sympify(self.port.friction.steady_strength(self.speed, self.sigma_ss))
+        law = self.port.friction
+        return of_law(law, "steady_strength", law.steady_strength(self.speed, self.sigma_ss))
+
+
+def of_law(law: object, method: str, found: Any) -> sp.Expr:
+    """What a method of a friction or contact law gave, if the Model can use it."""
+    return supported(found, f"{method} of {type(law).__name__}")
 
 
 class Forces:

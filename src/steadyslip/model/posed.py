@@ -61,6 +61,25 @@ def balance_jacobian(model: Model) -> list[list[sp.Expr]]:
     return rows
 
 
+def missing_inertias(model: Model) -> tuple[int, list[sp.Expr]]:
+    """Number of coordinates that have neither inertia nor contact, and the inertias (which may be 0) of others."""
+    moving = kinematics(model)
+    free = sum(not one.inertial and moving.contact_at(one) is None for one in model.coordinates)
+    return free, [one.inertia for one in model.coordinates if one.inertial]
+
+
+@question
+def spare_powers(point: OperatingPoint) -> np.ndarray:
+    """Number of highest powers of s that the characteristic equation may lose, (...): one for each missing inertia.
+
+    Without inertia, friction or dampings must still determine the velocity at a contact; of a body without contact,
+    springs may determine the place.
+    """
+    free, inertias = missing_inertias(point.model)
+    values = point.evaluate(point.model.function(inertias))
+    return np.asarray(sum((np.asarray(one) == 0 for one in values), start=np.full(point.shape, free)))
+
+
 @question
 def _rising(model: Model) -> tuple[ArrayFunction, int]:
     rows = balance_jacobian(model)

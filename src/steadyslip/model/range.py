@@ -189,7 +189,8 @@ def out_of_range_error(point: OperatingPoint) -> NotAvailable:
 
 
 def _out_of_range_message(point: OperatingPoint) -> str:
-    beyond = "the values of the equations, or their slopes, leave the range of floating point (1e-308 to 1e308)"
+    beyond = "the values of the equations, or their slopes, leave the range of floating point (1e-308 to 1e308) or are "
+    beyond += "no real numbers"
     named = point.named()
     guilty = list(_blamed_parameters(point))
     words = []

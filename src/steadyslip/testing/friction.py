@@ -96,6 +96,13 @@ def check_steady_state(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDIT
         with mpmath.workdps(DIGITS):
             point = symbolic.steady(v, sigma)
             *rates, strength = values(*point)
+            for name, value in (("strength", strength), *(("rates", rate) for rate in rates)):
+                require(
+                    mpmath.isfinite(value),
+                    law,
+                    f"{name}() is no real number {_location(v, sigma)}, as the root or the logarithm of a negative "
+                    "number, or an overflow; if the law does not hold there, narrow velocity_decades or stress_decades",
+                )
             for name, rate, gradient in zip(law.memory(), rates, gradients, strict=True):
                 # size of the terms that must cancel: contribution of each input to the rate
                 terms = sum(abs(d * x) for d, x in zip(gradient(*point), point, strict=True))

@@ -12,7 +12,8 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from steadyslip.core.errors import SteadyslipError
+from steadyslip.core.errors import NotAvailable, SteadyslipError
+from steadyslip.core.expressions import supported
 from steadyslip.core.records import FrozenRecord, parameters, with_values
 
 DIGITS = 50  # decimal digits of all evaluations: rounding stays far below `TOLERANCE` after any cancellation
@@ -63,7 +64,7 @@ def call_with_symbols(law: FrozenRecord, what: str, method: Callable[..., Any], 
 
 
 def require_known_symbols(law: FrozenRecord, what: str, expression: sp.Expr, allowed: Sequence[sp.Symbol]) -> None:
-    """Expressions may depend on what the method was given and on nothing else, rates of change included."""
+    """Expressions may depend on what the method was given and on nothing else, by functions that are supported."""
     foreign = sorted(str(s) for s in expression.free_symbols - set(allowed))
     foreign += sorted(str(d) for d in expression.atoms(sp.Derivative, sp.core.function.AppliedUndef))
     require(
@@ -73,6 +74,10 @@ def require_known_symbols(law: FrozenRecord, what: str, expression: sp.Expr, all
         "A rate of change such as that of the normal stress is not among them: choose memory variables that stay "
         "continuous when velocity and normal stress jump, such as Θ + (α/b) ln σ",
     )
+    try:
+        supported(expression, what)
+    except NotAvailable as error:
+        raise ContractViolation(f"{law!r}: {error}") from error
 
 
 def precise_function(

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from steadyslip.linear.pencil import checked_spectrum
-from steadyslip.linear.polynomials import is_hurwitz, routh_column
+from steadyslip.linear.polynomials import routh_column
 from steadyslip.linear.quasipolynomial import INFINITE
 from steadyslip.linear.roots import roots
-from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
+from steadyslip.linear.spectrum import is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import relative_errors
@@ -20,11 +20,11 @@ from steadyslip.verdict.checks import relative_errors
 def _without_delay(values: OperatingPoint) -> dict[str, Any]:
     """Fields of a rig whose characteristic equation is a polynomial."""
     c = characteristic(values)
-    bad = bool(ill_posed(c))
+    stable = bool(is_stable(values))
     while len(c) > 2 and c[-1] == 0:
         c = c[:-1]
     return {
-        "stable": bool(is_hurwitz(c)) and not bad,
+        "stable": stable,
         "eigenvalues": tuple(complex(s) for s in roots(c)),
         "characteristic_polynomial": tuple(float(x) for x in c),
         "routh": tuple(float(x) for x in routh_column(c)),

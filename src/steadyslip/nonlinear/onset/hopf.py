@@ -31,6 +31,7 @@ from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import characteristic, require_range
 from steadyslip.nonlinear.onset.coefficient import Cubic, coefficients
 from steadyslip.nonlinear.onset.high_precision import coefficient as in_digits
@@ -335,7 +336,8 @@ def _onsets(point: OperatingPoint, name: str) -> Array:
     arguments = list(point.arguments)
     own = np.broadcast_to(arguments[place], point.shape).reshape(-1)
     if name == "slider.stiffness":
-        found = stable_set(*(np.broadcast_to(c, (*point.shape, c.shape[-1])) for c in stiffness_polynomials(point)))
+        p, q = (np.broadcast_to(c, (*point.shape, c.shape[-1])) for c in stiffness_polynomials(point))
+        found = stable_set(p, q, spare_powers(point))
     else:
         found = linear_sets(point, name)
     count = point.size

@@ -11,6 +11,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting import numbers, refit
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.planning import make_plan
+from steadyslip.experiments.fitting.remedies import Remedy
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.numerics.noise import Noise, white
@@ -58,9 +59,9 @@ def made(rig, records, chance, **options):
     )  # fmt: skip
     samples = sum(map(len, plan.records))
     ramps = (refit.RampFit(0.1, 1 / 7, {"friction.a": 0.1}),)
-    memories = (refit.MemoryFit("normal_memory = 'linker-dieterich'", 1 / 9, {"friction.a": 0.2}),)
+    mended = (Remedy("friction.normal_memory = 'linker-dieterich'", 1 / 9, 1 / 11, 0.5, {"friction.a": 0.2}),)
     fit.__dict__.update(
-        model=chance.standard_normal(samples), as_measured={"friction.a": 1 / 3}, as_ramps=ramps, with_memories=memories
+        model=chance.standard_normal(samples), as_measured={"friction.a": 1 / 3}, as_ramps=ramps, remedies=mended
     )  # fmt: skip
     return fit
 
@@ -88,7 +89,7 @@ def same(again, fit):
     ):
         assert getattr(again.plan, name) == getattr(fit.plan, name), name
     assert (again.as_measured, again.as_ramps) == (fit.as_measured, fit.as_ramps)
-    assert again.with_memories == fit.with_memories
+    assert again.remedies == fit.remedies
     for one, other in ((again.coordinates, fit.coordinates), (again.covariance, fit.covariance),
                        (again.model, fit.model), *zip(again.bounds, fit.bounds, strict=True)):  # fmt: skip
         np.testing.assert_array_equal(one, other, strict=True)
@@ -137,7 +138,7 @@ def test_a_fit_is_checked_by_its_residuals(tmp_path):
 
     def left(residuals, **changes):
         one = replace(fit, ssq=float(residuals @ residuals), noise=(white(scatter * np.ones(size)),), **changes)
-        one.__dict__.update(model=record.friction - residuals, as_measured=None, as_ramps=(), with_memories=())
+        one.__dict__.update(model=record.friction - residuals, as_measured=None, as_ramps=(), remedies=())
         return one
 
     noise = scatter * chance.standard_normal(size)

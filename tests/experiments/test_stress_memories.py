@@ -158,10 +158,11 @@ def test_a_law_that_cannot_follow_is_named_and_the_others_are_compared(monkeypat
 def test_a_law_without_memory_says_what_one_would_make_of_it():
     fit = compared().fits["none"]
     said = " ".join(str(fit).split())
-    assert "this law has no memory of it: with normal_memory = 'linker-dieterich' (alpha 0.3" in said
-    assert fit.with_memories[0].ssq < 0.1 * fit.ssq
+    assert "no memory of it: with friction.normal_memory = 'linker-dieterich' (normal_memory.alpha 0.3" in said
+    assert fit.remedies[0].ssq < 0.1 * fit.ssq
+    assert fit.to_dict()["remedies"][0]["choice"] == "friction.normal_memory = 'linker-dieterich'"
     constant = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300), starts=9)
-    assert constant.with_memories == ()
+    assert constant.remedies == ()
     assert "no memory" not in str(constant)
 
 
@@ -171,7 +172,7 @@ def test_white_residuals_speak_for_no_memory():
         pieces=(ss.protocol.VelocityStep(at=30.13, to=3e-6), ss.protocol.NormalStressStep(at=60.41, by=by)), until=120
     )
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol, 1, count=300))
-    assert "residuals are white, which speaks for none" in " ".join(str(fit).split())
+    assert "residuals are noise, which speaks for none" in " ".join(str(fit).split())
 
 
 def test_bic_decides():

@@ -18,6 +18,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
 from steadyslip.experiments.fitting.fit import fit, refit_from
 from steadyslip.experiments.fitting.planning import can_be_free
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
@@ -25,7 +26,6 @@ from steadyslip.machine.slider import Slider
 WIDTH = 100  # characters of a line of text
 SCREENING_EFFORT = 0.1  # share of the effort for each law; the full effort is for those that may be the best
 MAX_SSQ_RATIO = 2.0  # laws above this multiple of the least sum of squares cannot become the best by a longer search
-STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass & Raftery 1995)
 MIN_SHOWN_RATIO = 2.0  # ratio of sums of squares above which text gives the ratio, below the percentage
 
 

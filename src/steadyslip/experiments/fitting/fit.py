@@ -230,5 +230,7 @@ def fit_with_errors(
     known = prior_information(comparison.space)
     scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
+    if not search.converged:  # curvature beside the minimum says nothing of errors
+        covariance = np.diag(np.full(free, np.inf))
     ssq = float(residuals @ residuals)
     return Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)

@@ -15,21 +15,17 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
 from steadyslip.core.results import ReadOnly, read_only
-from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.comparison import Comparison, scaled_by_loss
 from steadyslip.experiments.fitting.derived import Minimum, derived_estimates
 from steadyslip.experiments.fitting.estimate import Estimate
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.refit import (
-    MemoryFit,
-    RampFit,
-    driven_as_measured,
-    with_memories,
-    with_ramps,
-)
+from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
+from steadyslip.experiments.fitting.remedies import STRUCTURE, Remedy, remedies
 from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.numerics.noise import SIGNIFICANT, Noise
+from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.experiments.numerics.whiteness import Whiteness, whiteness
 from steadyslip.machine.slider import Slider
 
 
@@ -157,18 +153,15 @@ class FitNumbers(ReadOnly):
         return with_ramps(self.plan, self.values, self._ends)
 
     @cached_property
-    def with_memories(self) -> tuple[MemoryFit, ...]:
-        """Fits with each memory of the normal stress, the best first, where it changes and the law has no memory.
+    def whiteness(self) -> Whiteness:
+        """Test of the residuals for structure: more than white noise and noise that decays exponentially."""
+        parts = range(len(self.plan.records))
+        return whiteness(self.part(self.scaled_residuals, i) for i in parts)
 
-        Empty if the residuals are white noise, as there is then nothing that a memory could explain.
-        """
-        return with_memories(self.plan) if self.has_structure else ()
-
-    @property
-    def has_structure(self) -> bool:
-        """True if residuals of a record are correlated from sample to sample."""
-        pairs = zip(self.noise, self.plan.records, strict=True)
-        return any(abs(noise.lag1) > SIGNIFICANT / np.sqrt(len(record)) for noise, record in pairs)
+    @cached_property
+    def remedies(self) -> tuple[Remedy, ...]:
+        """Short fits with other laws, a lag or a trend, the best first; empty if residuals have no structure."""
+        return remedies(self.plan, self.ssq) if self.whiteness.p < STRUCTURE else ()
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:
@@ -232,6 +225,12 @@ class FitNumbers(ReadOnly):
     def residuals(self) -> Array:
         """Residuals (n,): measured friction less that of the model."""
         return np.asarray(read_only(self.comparison.data - self.model))
+
+    @property
+    def scaled_residuals(self) -> Array:
+        """Residuals (n,) weighted and scaled by the loss: what the sum of squares is of."""
+        r = self.residuals * self.comparison.weights
+        return r if self.plan.loss == "linear" else scaled_by_loss(self.plan.loss, r, self.comparison.width)[0]
 
     def part(self, values: Array, record: int = 0) -> Array:
         """Part of `values` (n,) at all samples that belongs to one record."""

@@ -15,6 +15,7 @@ from steadyslip.core.records import Address, parameters
 from steadyslip.experiments.fitting.checks import check_changes, check_records
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import FitSettings, faults
+from steadyslip.experiments.measured.clipped import without_clipped
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import spread
 from steadyslip.machine.input_units import in_units_of
@@ -70,7 +71,7 @@ def make_plan(
     if problems:
         raise ParameterError(problems)
     if weights is None:
-        many, options["weights"] = _averaged(many)
+        many, options["weights"] = _averaged(tuple(without_clipped(record) for record in many))
     if options.get("calibrated") is not None:
         options["calibrated"] = FitSettings(calibrated=options["calibrated"]).calibrated
     if plan_protocol is not None:

@@ -1,4 +1,4 @@
-"""Variants of a fit: minima that are reached if its loading or its law is changed."""
+"""Variants of a fit: minima that are reached if its loading is changed."""
 
 from __future__ import annotations
 
@@ -9,18 +9,11 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.effort import Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.plan import Plan, with_loading
-from steadyslip.experiments.fitting.planning import can_be_free
-from steadyslip.experiments.fitting.search import find_minimum
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-TRIAL_EFFORT, TRIAL_STARTS = (
-    0.1,
-    12,
-)  # effort and starts of a trial with another law: a tenth and a quarter of the defaults
 RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
 
 
@@ -77,53 +70,6 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.comparison(Effort(budget=budget))
     return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, **options)
-
-
-@dataclass(frozen=True)
-class MemoryFit:
-    """Minimum with a law that has a memory of the normal stress.
-
-    Attributes
-    ----------
-    choice : str
-        Line of a rig file that selects the memory: field of the law and its value.
-    ssq : float
-        Sum of squares.
-    values : dict of str to float
-        Values of all unknowns, by name.
-    """
-
-    choice: str
-    ssq: float
-    values: dict[str, float]
-
-
-def with_memories(plan: Plan) -> tuple[MemoryFit, ...]:
-    """Minima with each memory of the normal stress, the best first; empty if it is constant or the law has one.
-
-    Each search is short: a longer one may find a better minimum.
-    """
-    law = plan.rig.friction
-    if not (law.forgets_stress() and plan.pressed and any(record.stress_changes for record in plan.records)):
-        return ()
-    found = []
-    for field, words in law.decided_by_stress.items():
-        for word in words:
-            own = law.alternatives()[word](law)
-            if own == law:
-                continue
-            rig = replace(plan.rig, friction=own)
-            free = (*plan.free, *(name for name in can_be_free(rig) if name not in plan.rig.parameters()))
-            richer = replace(plan, rig=rig, free=free)
-            budget = Budget.of_fit(sum(map(len, plan.records)), len(richer.space()), TRIAL_EFFORT)
-            try:
-                best = find_minimum(richer, TRIAL_STARTS, Effort(budget=budget), None)
-            except NotAvailable:
-                continue
-            names = (one.name for one in richer.space().unknowns)
-            values = dict(zip(names, map(float, richer.space().values(best.coordinates)), strict=True))
-            found.append(MemoryFit(f"{field} = {word!r}", best.ssq, values))
-    return tuple(sorted(found, key=lambda one: one.ssq))
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:

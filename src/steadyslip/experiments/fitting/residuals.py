@@ -8,7 +8,6 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.checks import Check, check
-from steadyslip.experiments.fitting.comparison import scaled_by_loss
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.numerics.noise import Noise
 
@@ -19,9 +18,7 @@ MAX_EXCESS = 1.0  # relative excess of the scatter over the expected one; chance
 
 def residual_checks(fit: FitNumbers) -> tuple[Check, ...]:
     """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
-    r = fit.residuals * fit.comparison.weights
-    if fit.plan.loss != "linear":
-        r, _ = scaled_by_loss(fit.plan.loss, r, fit.comparison.width)
+    r = fit.scaled_residuals
     missed = abs(float(r @ r) - fit.ssq) / fit.ssq if fit.ssq else float(np.any(r))
     ended = fit.search.converged and not fit.search.cut
     scatters = [one for i, noise in enumerate(fit.noise) for one in _excess_scatter(fit.part(r, i), noise)]

@@ -15,7 +15,8 @@ from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
-from steadyslip.experiments.fitting.refit import MemoryFit, RampFit
+from steadyslip.experiments.fitting.refit import RampFit
+from steadyslip.experiments.fitting.remedies import Remedy
 from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.loading.pressing import JoinedCurves
@@ -26,7 +27,7 @@ from steadyslip.experiments.numerics.smoothing import Smooth
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 7, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 8, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
     "loading": str, "refits": str, "steadyslip": str,
@@ -49,7 +50,7 @@ _FORMS = {
     "refits": {
         "measured": [{str: float}],
         "ramps": [(float, float, {str: float})],
-        "memories": [(str, float, {str: float})],
+        "remedies": [(str, float, float, float, {str: float})],
     },
 }
 """Types of the attributes in JSON; see `steadyslip.files.tables.fits_form`."""
@@ -100,7 +101,7 @@ def to_dataset(fit: FitNumbers) -> Any:
             {
                 "measured": [] if fit.as_measured is None else [fit.as_measured],
                 "ramps": [[one.share, one.ssq, one.values] for one in fit.as_ramps],
-                "memories": [[one.choice, one.ssq, one.values] for one in fit.with_memories],
+                "remedies": [[one.choice, one.ssq, one.gain, one.p, one.values] for one in fit.remedies],
             }
         ),
         "steadyslip": fit.version,
@@ -171,7 +172,7 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     stored_results = {  # results that the file holds, so that nothing is computed again
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(RampFit(*one) for one in refits["ramps"]),
-        "with_memories": tuple(MemoryFit(*one) for one in refits["memories"]),
+        "remedies": tuple(Remedy(*one) for one in refits["remedies"]),
         "model": read_only(np.concatenate([found[f"model_{i}"] for i in range(1, len(records) + 1)])),
     }
     fit.__dict__.update(stored_results)

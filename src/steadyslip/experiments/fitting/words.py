@@ -14,9 +14,11 @@ from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.estimate import Estimate
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, STRUCTURE
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
+from steadyslip.experiments.measured.clipped import CLIPPED
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -28,6 +30,7 @@ END_SAMPLES = 5  # number of first or last residuals in that mean; also one in t
 OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
 MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
+LEAST_CHANCE = 1e-99  # probabilities below it are not told apart
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
 CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
@@ -95,10 +98,31 @@ def _quality(fit: FitNumbers) -> list[str]:
         reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
     return [
         f"residuals       rms {fit.rms:.3g}, sum of squares {fit.ssq:.6g}, lag-1 autocorrelation {lag:.2g}",
+        f"whiteness       {_whiteness(fit)}",
         f"errors          one standard deviation, {independent}",
         f"minimum         {reached}",
         *textwrap.wrap(f"driven by       {drive_line(fit)}", WIDTH, subsequent_indent=" " * 16),
         in_words(residual_checks(fit)),
+    ]
+
+
+def _whiteness(fit: FitNumbers) -> str:
+    one = fit.whiteness
+    verdict = "structure is left" if one.p < STRUCTURE else "noise is left"
+    return f"{verdict}: Ljung-Box {one.statistic:.4g} where noise has {one.degrees}, probability {_chance(one.p)}"
+
+
+def _chance(p: float) -> str:
+    return f"{p:.2g}" if p > LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
+
+
+def _clipped(fit: FitNumbers) -> list[str]:
+    """Warnings on samples left out because their channel was full."""
+    return [
+        f"{record.source}: {note}; give weights to keep them"
+        for record in fit.plan.records
+        for note in record.notes
+        if CLIPPED in note
     ]
 
 
@@ -108,12 +132,12 @@ def warnings(fit: FitNumbers) -> list[str]:
     if fit.search.cut:
         found.append(_cut_off(fit))
     elif not fit.search.converged:
-        found.append("the search had not come to its end; treat the numbers as a rough fit")
+        found.append("the search had not come to its end: the numbers are rough, and have no errors")
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit) + _vague_jumps(fit)
-    found += _assumed_rate(fit) + _possible_ramps(fit) + _missing_memory(fit) + _drained_at_once(fit)
+    found += list(fit.at_bounds) + _clipped(fit) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit)
+    found += _vague_jumps(fit) + _assumed_rate(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
     found += _unusual_distances(fit) + _off_calibration(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
@@ -124,7 +148,7 @@ def warnings(fit: FitNumbers) -> list[str]:
 
 def _cut_off(fit: FitNumbers) -> str:
     """Warning that the search spent its budget, as it does where the model cannot follow the records well."""
-    rough = "" if fit.search.converged else ", not even at its minimum"
+    rough = "" if fit.search.converged else ", not even at its minimum, so that it has no errors"
     return (
         f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
         "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
@@ -254,27 +278,30 @@ def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
     return f"{verdict}: with {lengths[longest.share]} the sum of squares is {_relative_change(fit, longest)}; {changes}"
 
 
-def _missing_memory(fit: FitNumbers) -> list[str]:
-    """Warning that the normal stress changes while the law has no memory of it, with the effect of a memory."""
+def _structure(fit: FitNumbers) -> list[str]:
+    """Warning on structure in the residuals, or on a normal stress that this law does not remember; what mends it."""
     plan = fit.plan
-    if not (plan.pressed and plan.rig.friction.forgets_stress()):
-        return []
     changing = [record.source for record in plan.records if record.stress_changes]
-    if not changing:
-        return []
+    forgets = bool(changing) and plan.pressed and plan.rig.friction.forgets_stress()
     said = f"the normal stress changes in {_enumerated(changing)}, and this law has no memory of it"
-    if not fit.has_structure:
-        return [f"{said}; residuals are white, which speaks for none"]
-    worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
-    best = next(iter(fit.with_memories), None)
-    if best is None or worth * np.log(fit.ssq / best.ssq) < SIGNIFICANT_GAIN * (len(best.values) - len(fit.values)):
-        return [f"{said}; none that was tried makes the fit better"]
-    added = [f"{n.rpartition('.')[2]} {x:.3g}" for n, x in best.values.items() if n not in fit.values]
+    if fit.whiteness.p >= STRUCTURE:
+        return [f"{said}; residuals are noise, which speaks for none"] if forgets else []
+    if not forgets:
+        said = f"residuals have structure (whiteness {_chance(fit.whiteness.p)})"
+    best = next(iter(fit.remedies), None)
+    if best is None or best.gain < STRONG_EVIDENCE:
+        tried = "; ".join(one.choice for one in fit.remedies)
+        return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
+    added = [f"{n.partition('.')[2] or n} {x:.3g}" for n, x in best.values.items()
+             if n not in fit.values and not n.startswith(("step.", "jump."))]  # fmt: skip
     moved = [f"{_symbol(n)} {best.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
              if n in best.values and fit.values.get(n)]  # fmt: skip
+    asked = f"{best.choice} ({', '.join(added)})" if added else best.choice
+    rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {_chance(best.p)})"
     return [
-        f"{said}: with {best.choice} ({', '.join(added)}) the sum of squares is {best.ssq / fit.ssq:.2g} of this, and "
-        f"{', '.join(moved)}; do not use these numbers, and ask for that, in [friction], in lab_rig or with --set"
+        f"{said}: with {asked} the sum of squares is "
+        f"{best.ssq / fit.ssq:.2g} of this, BIC {best.gain:.0f} less, {', '.join([rest, *moved])}; "
+        "do not use these numbers, and ask for that with --set or in the file of the fit (lab_rig and fit in Python)"
     ]
 
 
@@ -448,6 +475,8 @@ def as_dict(fit: FitNumbers) -> dict[str, Any]:
         "ssq": fit.ssq,
         "rms": fit.rms,
         "lag1": [noise.lag1 for noise in fit.noise],
+        "whiteness": vars(fit.whiteness) | {"p": fit.whiteness.p},
+        "remedies": [vars(one) for one in fit.remedies],
         "correlated": fit.correlated,
         "aic": fit.aic,
         "bic": fit.bic,

@@ -1,0 +1,47 @@
+"""Samples of a channel that was full: runs of its largest or smallest value, where no other samples are equal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.experiments.measured.record import Record
+
+SHORTEST = 3  # samples of a run
+CHANCE = 1e-6  # of so long a run in a record whose samples are as often equal to their neighbour as the others of it
+GAP = 5  # samples between runs of one peak: noise brings the channel back below its limit for a moment
+CLIPPED = "at a limit of the channel"
+
+
+def without_clipped(record: Record) -> Record:
+    """Record without the samples at which friction or shear stress is at a limit of its channel, with a note."""
+    full = np.zeros(len(record), dtype=bool)
+    for values in (record.friction, record.shear):
+        if values is not None:
+            full |= clipped(values) | clipped(-values)
+    if not np.any(full):
+        return record
+    first, last = record.time[full][[0, -1]]
+    note = f"{np.sum(full)} samples from {first:.7g} to {last:.7g} s left out, friction is {CLIPPED}"
+    return replace(record.taken(~full, note), commanded=record.loading)
+
+
+def clipped(values: Array) -> Array:
+    """Mask (n,) of the samples of values (n,) around runs of the largest value that chance does not make."""
+    found = np.zeros(len(values), dtype=bool)
+    top = np.flatnonzero(values == np.max(values))
+    if len(top) < SHORTEST:
+        return found
+    equal = np.diff(values) == 0
+    others = equal[(values[1:] != values[top[0]]) & (values[:-1] != values[top[0]])]
+    if np.all(others):
+        return found
+    share = float(np.mean(others))
+    longest = 1 + np.log(CHANCE / len(values)) / np.log(share) if share else 0.0
+    for peak in np.split(top, np.flatnonzero(np.diff(top) > GAP) + 1):
+        runs = np.split(peak, np.flatnonzero(np.diff(peak) > 1) + 1)
+        if max(map(len, runs)) >= max(longest, SHORTEST):
+            found[peak[0] : peak[-1] + 1] = True
+    return found

@@ -1,0 +1,130 @@
+"""Structure in the residuals is noticed, and what would mend it is found and named."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import lab_records as lab
+import steadyslip as ss
+from steadyslip.experiments.fitting import fit as fitting
+from steadyslip.experiments.measured.clipped import clipped
+from steadyslip.experiments.numerics.whiteness import whiteness
+
+TWO_STEPS = ss.Protocol(
+    pieces=(ss.protocol.VelocityStep(at=60.13, to=5e-6), ss.protocol.VelocityStep(at=110.37, to=1e-6)), until=180.0
+)
+
+
+@cache
+def stepped(law="slip"):
+    return lab.columns(lab.rig(ss.laws.Aging() if law == "aging" else None), TWO_STEPS, count=1800)
+
+
+def noisy(found, seed=0):
+    chance, size = np.random.default_rng(seed), len(found["time"])
+    return found | {
+        "friction": found["friction"] + lab.NOISE * chance.standard_normal(size),
+        "displacement": found["displacement"] + 2e-8 * chance.standard_normal(size),
+    }
+
+
+def fitted(columns):
+    fit = ss.fit(ss.lab_rig(), ss.record_from_arrays(**columns))
+    return fit, " ".join(str(fit).split())
+
+
+def memorable(chance, size):
+    """White noise plus a first-order autoregression of another share and memory each time."""
+    decay = chance.choice([0.0, 0.5, 0.9, 0.98])
+    slow = lfilter([np.sqrt(1 - decay**2)], [1, -decay], chance.standard_normal(size))
+    return chance.choice([0.0, 0.5, 1.0]) * chance.standard_normal(size) + slow
+
+
+def test_noise_passes_the_test():
+    """Its probabilities are those of noise, whatever the memory: a tenth below a tenth, none far below a thousandth."""
+    chance = np.random.default_rng(3)
+    found = np.array([whiteness([memorable(chance, 1500)]).p for _ in range(120)])
+    assert 0.03 < np.mean(found < 0.1) < 0.2
+    assert np.min(found) > 1e-5
+    burst = np.where(np.arange(1500) % 750 < 30, 5.0, 1.0)
+    assert whiteness([burst * chance.standard_normal(1500)]).p < 1e-3
+    assert whiteness([np.zeros(100)]).p == 1.0
+
+
+def test_the_right_law_leaves_noise():
+    fit, said = fitted(noisy(stepped()))
+    assert fit.remedies == ()
+    assert "whiteness noise is left: Ljung-Box" in said
+    assert fit.to_dict()["whiteness"]["p"] == fit.whiteness.p > 0.01
+
+
+def test_another_evolution_law_is_found():
+    fit, said = fitted(noisy(stepped("aging")))
+    assert fit.whiteness.p < 1e-9
+    assert fit.remedies[0].choice == "friction.evolution = 'aging'"
+    assert fit.remedies[0].p > 1e-3
+    assert "residuals have structure" in said
+    assert "with friction.evolution = 'aging' the sum of squares is 0.01" in said
+
+
+@pytest.mark.parametrize("late", [0.3, -0.3])
+def test_a_late_channel_is_found(late):
+    """The window of a step takes up .1 s of it, and without the lag the stiffness comes out 5 % off, z 5."""
+    found = stepped()
+    friction = np.interp(found["time"] - late, found["time"], found["friction"])
+    fit, said = fitted(noisy(found | {"friction": friction}))
+    assert fit.remedies[0].choice == "fit.lag = true"
+    assert fit.remedies[0].values["lag"] == pytest.approx(late, abs=0.15)
+    assert "with fit.lag = true (lag " in said
+
+
+def test_law_and_memory_are_found_together():
+    """Neither is any good without the other."""
+    found = noisy(lab.columns(lab.rig(ss.laws.Aging(), alpha=0.3), lab.PRESSED, count=1800))
+    fit, said = fitted(found)
+    assert fit.remedies[0].choice == "friction.evolution = 'aging', friction.normal_memory = 'linker-dieterich'"
+    assert fit.remedies[0].values["friction.normal_memory.alpha"] == pytest.approx(0.3, abs=0.02)
+    assert "this law has no memory of it" in said
+
+
+@pytest.mark.slow
+def test_what_nothing_mends_is_told():
+    found = noisy(stepped())
+    hum = np.sin(2 * np.pi * found["time"] / 0.7) * (found["time"] > 130)
+    fit, said = fitted(found | {"friction": found["friction"] + 5 * lab.NOISE * hum})
+    assert max(one.gain for one in fit.remedies) < 6
+    assert "none that was tried makes the fit better" in said
+
+
+def test_a_clipped_peak_is_left_out():
+    """Kept, it made a 12 errors too small."""
+    found = noisy(stepped())
+    peak, level = np.max(found["friction"]), np.median(found["friction"])
+    fit, said = fitted(found | {"friction": np.minimum(found["friction"], peak - 0.25 * (peak - level))})
+    assert fit.samples < 1790
+    assert np.max(np.abs(lab.deviations(fit, lab.rig(), (60.13, 110.37)))) < 3.5
+    assert "friction is at a limit of the channel; give weights to keep them" in said
+
+
+def test_few_digits_are_no_limit():
+    found = stepped()["friction"]
+    for digit in (1e-6, 1e-5, 1e-4, 1e-3):
+        for noise in (0.0, 1e-5, 2e-4):
+            values = np.round((found + noise * np.random.default_rng(1).standard_normal(len(found))) / digit)
+            assert not np.any(clipped(values) | clipped(-values))
+    assert not np.any(clipped(np.ones(50)))
+
+
+def test_a_search_that_did_not_converge_has_no_errors(tmp_path):
+    fit = lab.stepped()
+    rough = replace(fit.search, converged=False)
+    other = fitting.fit_with_errors(fit.plan, fit.comparison, fit.coordinates, rough, "auto", fit.bounds)
+    assert not any(one.determined for one in other.estimates)
+    assert other.derived == ()
+    assert "95 %" not in str(other)
+    assert "the numbers are rough, and have no errors" in " ".join(str(other).split())
+    other.save(tmp_path / "fit.nc")
+    assert str(ss.load_fit(tmp_path / "fit.nc")) == str(other)

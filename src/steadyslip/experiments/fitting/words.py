@@ -12,6 +12,7 @@ from steadyslip.core.checks import as_data, in_words
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.estimate import Estimate
+from steadyslip.experiments.fitting.loading_words import enumerated, loading_warnings, own_rate
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, STRUCTURE
@@ -19,9 +20,7 @@ from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
 from steadyslip.experiments.measured.clipped import CLIPPED
-from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 WIDTH = 100  # characters of a line of text
@@ -32,8 +31,6 @@ MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them 
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 LEAST_CHANCE = 1e-99  # probabilities below it are not told apart
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
-USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
-CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
 )
@@ -136,11 +133,9 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _clipped(fit) + _outliers(fit) + _ends_off_model(fit) + _loading_outliers(fit)
-    found += _vague_jumps(fit) + _assumed_rate(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
-    found += _unusual_distances(fit) + _off_calibration(fit)
-    if fit.plan.drive == "measured":
-        found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
+    found += list(fit.at_bounds) + _clipped(fit) + _outliers(fit) + _ends_off_model(fit)
+    found += _vague_jumps(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
+    found += loading_warnings(fit)
     if other := of_another(fit.version):
         found.append(f"{other}; fit anew to compare it with fits of this one")
     return found
@@ -195,30 +190,6 @@ def _ends_off_model(fit: FitNumbers) -> list[str]:
     return found
 
 
-def _loading_outliers(fit: FitNumbers) -> list[str]:
-    """Warnings on records whose first or last samples are off the commanded loading."""
-    found = []
-    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
-        courses = {
-            "load point": loading.load,
-            "normal stress": loading.stress if fit.plan.pressed else None,
-            "pore pressure": loading.pore if fit.plan.pressed else None,
-        }
-        for channel, course in courses.items():
-            if course is None:
-                continue
-            sides = [f"the first {course.early} (until {record.time[course.early - 1]:.7g} s)"] if course.early else []
-            sides += [f"the last {course.late} (from {record.time[-course.late]:.7g} s)"] if course.late else []
-            if sides:
-                cure = ", and let its beginning be free (initial = 'free')" if course.early else ""
-                found.append(
-                    f"{record.source}: of the {channel}, {_enumerated(sides)} samples are off what is found in the "
-                    "others, too few to tell a change from a fault of the sensor; the model does not follow them; "
-                    f"where the loading did change there, cut that off (between){cure}"
-                )
-    return found
-
-
 def _vague_jumps(fit: FitNumbers) -> list[str]:
     """Warnings on jumps whose time is hardly determined, so that errors are not Gaussian."""
     found = []
@@ -249,7 +220,7 @@ def _possible_ramps(fit: FitNumbers) -> list[str]:
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         possible = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
         if possible:
-            times = _enumerated([f"{change.time:.7g}" for change in possible])
+            times = enumerated([f"{change.time:.7g}" for change in possible])
             longest = format_quantity(max(change.longest for change in possible), "s")
             what, taken, ramps = ("changes", "are taken as steps", "ramps") if len(possible) > 1 else (
                 "change", "is taken as a step", "a ramp")  # fmt: skip
@@ -283,7 +254,7 @@ def _structure(fit: FitNumbers) -> list[str]:
     plan = fit.plan
     changing = [record.source for record in plan.records if record.stress_changes]
     forgets = bool(changing) and plan.pressed and plan.rig.friction.forgets_stress()
-    said = f"the normal stress changes in {_enumerated(changing)}, and this law has no memory of it"
+    said = f"the normal stress changes in {enumerated(changing)}, and this law has no memory of it"
     if fit.whiteness.p >= STRUCTURE:
         return [f"{said}; residuals are noise, which speaks for none"] if forgets else []
     if not forgets:
@@ -311,30 +282,8 @@ def _drained_at_once(fit: FitNumbers) -> list[str]:
     if not changing or fit.plan.rig.contact.has_pores():
         return []
     return [
-        f"the pore pressure changes in {_enumerated(changing)}, and acts at once in this contact, which has no pores; "
+        f"the pore pressure changes in {enumerated(changing)}, and acts at once in this contact, which has no pores; "
         "where drainage takes time, fit its rate (lab_rig(pores=True), or no table [contact] in the file)"
-    ]
-
-
-def _unusual_distances(fit: FitNumbers) -> list[str]:
-    """Warning on slip distances that no rock has, as they come out where a displacement is in another unit."""
-    distances = fit.plan.rig.of_kind("slip distance")
-    found = {name: size for name, size in fit.values.items() if name.partition("@")[0] in distances}
-    low, high = USUAL_DISTANCES
-    odd = [f"{name} = {format_quantity(size, 'm')}" for name, size in found.items() if not low <= size <= high]
-    if not odd:
-        return []
-    usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
-    return [f"{_enumerated(odd)}: laboratories find {usual}; is the displacement in the unit that its column says?"]
-
-
-def _off_calibration(fit: FitNumbers) -> list[str]:
-    """Warning on a fitted stiffness that differs from the calibrated one by more than both are uncertain."""
-    return [
-        f"the fitted stiffness is {one.value:.3g} of the calibrated one ({one.range()}): a channel that comes late "
-        "(lag = true), a servo or a clipped peak makes that; where the calibration holds, name the stiffness in fixed"
-        for one in fit.derived
-        if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
     ]
 
 
@@ -342,7 +291,7 @@ def _lengths(fit: FitNumbers, ramped: RampFit) -> str:
     own = [
         format_quantity(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values
     ]
-    return _enumerated(own)
+    return enumerated(own)
 
 
 def _relative_change(fit: FitNumbers, ramped: RampFit) -> str:
@@ -354,15 +303,11 @@ def _symbol(name: str) -> str:
     return "k" if name == "slider.stiffness" else name.rpartition(".")[2]
 
 
-def _enumerated(words: list[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
 def drive_line(fit: FitNumbers) -> str:
     """Text on the loading of the model, and on its effect on a, b and k."""
     plan = fit.plan
     if plan.protocol is not None:
-        return f"the protocol that was given, from {_own_rate(fit)} on"
+        return f"the protocol that was given, from {own_rate(fit)} on"
     if plan.drive == "measured":
         return "load point and normal stress as measured, noise included"
     loads = [loading.load for loading in plan.loading if loading.load is not None]
@@ -399,21 +344,6 @@ def drive_line(fit: FitNumbers) -> str:
     return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
 
 
-def _own_rate(fit: FitNumbers) -> str:
-    """Rate at which the rig itself is driven, as printed."""
-    return format_quantity(float(operating_point(fit.plan.rig).drive), "m/s")
-
-
-def _assumed_rate(fit: FitNumbers) -> list[str]:
-    """Warning that no displacement confirms the rate before the first change of a protocol."""
-    if fit.plan.protocol is None or any(record.displacement is not None for record in fit.plan.records):
-        return []
-    return [
-        f"no record has a displacement of the load point: it is taken to move at {_own_rate(fit)} (drive.velocity) "
-        "until the protocol changes that; if it moved at another rate, every number above is off"
-    ]
-
-
 def _servo(course: Course) -> str:
     """Clause on the servo behind the changes of a course; empty without."""
     late = next((change for change in course.changes if change.lag), None)
@@ -429,26 +359,6 @@ def _steep_names(rig: Slider) -> tuple[str, ...]:
     """Names of the parameters that a noisy displacement changes most."""
     kinds = ("direct effect", "evolution effect", "stiffness")
     return tuple(name for kind in kinds for name in rig.of_kind(kind))
-
-
-def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
-    """Warning if the noise of the displacement moves the model by 0.3 of the residuals' rms or more; else None."""
-    record = part.record
-    if record.integrated or record.displacement is None:
-        return None
-    noise = displacement_noise(record.time, record.displacement)
-    rig = fit.rig(0)
-    stiffness = float(operating_point(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
-    if record.normal is None:
-        return None
-    moved = noise * stiffness / float(record.normal[0])
-    if moved < 0.3 * fit.rms:
-        return None
-    return (
-        f"{record.source}: the load point is measured to {format_quantity(noise, 'm')} only, which moves the model by "
-        f"{moved:.2g} "
-        "in friction; that makes the stiffness come out too low; leave drive at 'commanded'"
-    )
 
 
 def _estimate(one: Estimate) -> dict[str, Any]:

@@ -22,7 +22,9 @@ from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement
 RAMP_GAIN = 40.0  # decrease of chi squared by which a ramp must fit better than a step; chosen by trial
 OUTLIER = 9.0  # squared deviation (in units of the noise) from which a sample weighs less: three standard deviations
 BRIEF = 0.1  # share of a run's samples below which a sensor level may be the bottom of a glitch; chosen by trial
-AT_REST = 1e-3  # share of the highest rate up to which a rate is a hold
+AT_REST, STILL = 1e-3, 7e-4
+"""Shares of the highest rate and of all travel up to which a run is a hold, in which sensors drift; chosen by trial: at
+1 um/s beside 1 mm/s the load point travels."""
 SLOW = 0.02  # share of the highest rate up to which a rate may be a hold, if the error allows it; chosen by trial
 MOST_CHANGES = 40  # more changes than this, or
 MOST_BETWEEN = 0.35  # a larger share of the time between runs, and the loading is not piecewise linear; chosen by trial
@@ -52,7 +54,9 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     rates = np.array([run.rate for run in runs])
     top = float(np.max(np.abs(rates)))
     slow = np.array([SLOW if len(run.rows) >= ENOUGH_SAMPLES else REST_SHARE for run in runs]) * top
-    rest = np.abs(rates) <= np.maximum(AT_REST * top, np.minimum(4 * np.array(errors), slow))
+    travel = np.abs(rates) * [time[run.last - 1] - time[run.first] for run in runs]
+    still = (np.abs(rates) <= AT_REST * top) & (travel <= STILL * np.ptp(displacement))
+    rest = still | (np.abs(rates) <= np.minimum(4 * np.array(errors), slow))
     rest &= len(runs) > 1
     rates = np.where(rest, 0.0, rates)
     kinks = [

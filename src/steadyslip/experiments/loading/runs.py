@@ -20,7 +20,7 @@ RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
 LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
 LEAST_CHANGE = 0.05  # relative change of rate that counts as a change; chosen by trial
 BACK = 5.0  # standard errors within which a displacement has returned to a line
-LONGEST_GLITCH = 0.2  # share of the time of a record; chosen by trial
+LONGEST_GLITCH = 0.2  # share of the time of a record, and of its travel; chosen by trial
 CHANGE = 3.0  # cost of a change of rate, in units of a misfit of `RATE_SIGMAS` standard errors; chosen by trial
 FRAGMENT = 0.1  # cost of leaving out a piece, besides the cost of its length; chosen by trial:
 SHORTEST = 0.05  # share of the record (time or displacement) that costs as much as a change of rate; chosen by trial
@@ -296,7 +296,9 @@ def _without_glitches(groups: list[list[int]], pieces: _Pieces) -> list[list[int
 def _is_glitch(before: list[int], between: list[list[int]], after: list[int], pieces: _Pieces) -> bool:
     one, other = before[-1], after[0]
     zone = pieces.begin[other] - pieces.end[one]
-    if zone > LONGEST_GLITCH * pieces.span:
+    ends = [pieces.level[k] + pieces.slope[k] * (t[k] - pieces.middle[k])
+            for k, t in ((one, pieces.end), (other, pieces.begin))]  # fmt: skip
+    if zone > LONGEST_GLITCH * pieces.span or abs(ends[1] - ends[0]) > LONGEST_GLITCH * pieces.extent:
         return False
     rates = _mean_slope(before, pieces), _mean_slope(after, pieces)
     inner = np.arange(one + 1, other)

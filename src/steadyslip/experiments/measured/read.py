@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
@@ -19,6 +20,8 @@ from steadyslip.experiments.measured.clean import cleaned, without_placeholders
 from steadyslip.experiments.measured.columns import ROLES, Column, assign_columns, listed, missing_roles
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
+
+ACROSS = re.compile(r"slip|fault", re.IGNORECASE)  # names of displacements that are not the load point's
 
 
 @checked()
@@ -101,6 +104,8 @@ def read_record(
         own = without_placeholders(raw.values[column.place], column.name, notes)
         si[role] = own * (column.factor / (size if column.force else 1.0))
         notes.append(f"{role}: column {column.name!r}" + _format_unit(column, size, area is None))
+        if role == "displacement" and ACROSS.search(column.name):
+            notes.append("that is measured across the fault, by its name, and cannot show how a servo follows")
     taken = {column.place for column in found.values()}
     if unread := [repr(name) for i, name in enumerate(raw.names) if i not in taken]:
         notes.append(f"left out: {listed(unread)}; to use a column give its role, such as pore_pressure=NAME")

@@ -1,0 +1,149 @@
+"""Warnings on the loading of a fit: what a displacement cannot show, units, stiffness beside a calibration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.experiments.fitting.numbers import FitNumbers
+from steadyslip.experiments.loading.across import yielding
+from steadyslip.experiments.numerics.splitting import displacement_noise
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import steady_state
+
+USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
+CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
+SMALL_CHANGE, LISTED = 1.5, 4  # ratio of rates up to which a change may be waviness of a sensor; changes listed
+
+
+def loading_warnings(fit: FitNumbers) -> list[str]:
+    """Warnings on the loading, each a sentence."""
+    found = _assumed_rate(fit) + _loading_outliers(fit) + _across_fault(fit) + _small_changes(fit)
+    found += _unusual_distances(fit) + _off_calibration(fit)
+    if fit.plan.drive == "measured":
+        found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
+    return found
+
+
+def _loading_outliers(fit: FitNumbers) -> list[str]:
+    """Warnings on records whose first or last samples are off the commanded loading."""
+    found = []
+    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+        courses = {
+            "load point": loading.load,
+            "normal stress": loading.stress if fit.plan.pressed else None,
+            "pore pressure": loading.pore if fit.plan.pressed else None,
+        }
+        for channel, course in courses.items():
+            if course is None:
+                continue
+            sides = [f"the first {course.early} (until {record.time[course.early - 1]:.7g} s)"] if course.early else []
+            sides += [f"the last {course.late} (from {record.time[-course.late]:.7g} s)"] if course.late else []
+            if sides:
+                cure = ", and let its beginning be free (initial = 'free')" if course.early else ""
+                found.append(
+                    f"{record.source}: of the {channel}, {enumerated(sides)} samples are off what is found in the "
+                    "others, too few to tell a change from a fault of the sensor; the model does not follow them; "
+                    f"where the loading did change there, cut that off (between){cure}"
+                )
+    return found
+
+
+def _assumed_rate(fit: FitNumbers) -> list[str]:
+    """Warning that no displacement confirms the rate before the first change of a protocol."""
+    if fit.plan.protocol is None or any(record.displacement is not None for record in fit.plan.records):
+        return []
+    return [
+        f"no record has a displacement of the load point: it is taken to move at {own_rate(fit)} (drive.velocity) "
+        "until the protocol changes that; if it moved at another rate, every number above is off"
+    ]
+
+
+def _across_fault(fit: FitNumbers) -> list[str]:
+    """Warnings on displacements that move with friction, which are not those of the load point."""
+    found = []
+    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+        if record.displacement is None or record.integrated or loading.load is None:
+            continue
+        lost = yielding(record.time, record.displacement, record.friction, loading.load)
+        if lost is None:
+            continue
+        stress = steady_state(fit.rig(0)).normal_stress if record.normal is None else float(np.mean(record.normal))
+        spring = format_quantity(stress / lost, "Pa/m")
+        found.append(
+            f"{record.source}: the displacement falls where friction rises, as across the fault, or behind a spring of "
+            f"{spring}: it cannot show how a servo follows, and changes of rate found in it may be the fault's own; "
+            "add shear stress over that stiffness to it, or give the rates that were commanded as a protocol"
+        )
+    return found
+
+
+def _small_changes(fit: FitNumbers) -> list[str]:
+    """Warnings on changes of rate too small to be commanded, as a wavy sensor shows them."""
+    found = []
+    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+        changes = () if loading.load is None else loading.load.changes
+        small = [one for one in changes if one.before > 0 < one.after
+                 and max(one.before, one.after) < SMALL_CHANGE * min(one.before, one.after)]  # fmt: skip
+        if small:
+            sizes = [f"{format_percent(one.after / one.before - 1)} at {one.time:.5g} s" for one in small[:LISTED]]
+            more = [f"{len(small) - LISTED} more"] if len(small) > LISTED else []
+            found.append(
+                f"{record.source}: changes of rate by {enumerated(sizes + more)} are perhaps none but waviness of the "
+                "sensor; where they were not commanded, give the rates that were as a protocol"
+            )
+    return found
+
+
+def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
+    """Warning if the noise of the displacement moves the model by 0.3 of the residuals' rms or more; else None."""
+    record = part.record
+    if record.integrated or record.displacement is None:
+        return None
+    noise = displacement_noise(record.time, record.displacement)
+    rig = fit.rig(0)
+    stiffness = float(operating_point(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
+    if record.normal is None:
+        return None
+    moved = noise * stiffness / float(record.normal[0])
+    if moved < 0.3 * fit.rms:
+        return None
+    return (
+        f"{record.source}: the load point is measured to {format_quantity(noise, 'm')} only, which moves the model by "
+        f"{moved:.2g} "
+        "in friction; that makes the stiffness come out too low; leave drive at 'commanded'"
+    )
+
+
+def _off_calibration(fit: FitNumbers) -> list[str]:
+    """Warning on a fitted stiffness that differs from the calibrated one by more than both are uncertain."""
+    return [
+        f"the fitted stiffness is {one.value:.3g} of the calibrated one ({one.range()}): a channel that comes late "
+        "(lag = true), a servo or a clipped peak makes that; where the calibration holds, name the stiffness in fixed"
+        for one in fit.derived
+        if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
+    ]
+
+
+def _unusual_distances(fit: FitNumbers) -> list[str]:
+    """Warning on slip distances that no rock has, as they come out where a displacement is in another unit."""
+    distances = fit.plan.rig.of_kind("slip distance")
+    found = {name: size for name, size in fit.values.items() if name.partition("@")[0] in distances}
+    low, high = USUAL_DISTANCES
+    odd = [f"{name} = {format_quantity(size, 'm')}" for name, size in found.items() if not low <= size <= high]
+    if not odd:
+        return []
+    usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
+    return [f"{enumerated(odd)}: laboratories find {usual}; is the displacement in the unit that its column says?"]
+
+
+def own_rate(fit: FitNumbers) -> str:
+    """Rate at which the rig itself is driven, as printed."""
+    return format_quantity(float(operating_point(fit.plan.rig).drive), "m/s")
+
+
+def enumerated(words: list[str]) -> str:
+    """Words joined by commas and an and."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -1,0 +1,94 @@
+"""Loading that is not what it seems: displacement across the fault, wavy sensors, rates over many decades."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+from servo_records import record as servo_record
+from steadyslip.experiments.loading.across import yielding
+from steadyslip.experiments.loading.kinks import load_course
+
+STEPS = ss.Protocol(
+    pieces=(ss.protocol.VelocityStep(at=60.13, to=10e-6), ss.protocol.VelocityStep(at=100.13, to=1e-6)), until=200.0
+)
+
+
+def measured(stiffness, sensor, across):
+    """A record whose displacement is the load point's, or the fault's."""
+    found = lab.columns(lab.rig().with_values({"stiffness": stiffness}), STEPS, 2000)
+    chance = np.random.default_rng(1)
+    stretched = (found["friction"] - found["friction"][0]) * found["normal"] / stiffness
+    found["displacement"] = found["displacement"] - across * stretched + sensor * chance.standard_normal(2000)
+    found["friction"] = found["friction"] + lab.NOISE * chance.standard_normal(2000)
+    return ss.record_from_arrays(**found)
+
+
+def spring(record):
+    """Stiffness between sensor and load point (Pa/m); None if the sensor does not move with friction."""
+    lost = yielding(record.time, record.displacement, record.friction, record.loading.load)
+    return None if lost is None else float(np.mean(record.normal)) / lost
+
+
+@pytest.mark.parametrize("sensor", [2e-8, 2e-7])
+@pytest.mark.parametrize("stiffness", [2e10, 1e11])
+def test_a_displacement_across_the_fault_is_told_from_one_of_the_load_point(stiffness, sensor):
+    assert spring(measured(stiffness, sensor, True)) == pytest.approx(stiffness, rel=0.1)
+    assert spring(measured(stiffness, sensor, False)) is None
+
+
+def test_a_servo_does_not_look_like_the_fault():
+    for seed in range(3):
+        assert spring(servo_record(seed, 0.5)[0]) is None
+        assert spring(servo_record(seed, 0.75, 0.35)[0]) is None
+
+
+def test_a_fit_says_that_it_cannot_show_a_servo():
+    told = {across: str(ss.fit(ss.lab_rig(), measured(1e11, 2e-8, across))) for across in (True, False)}
+    assert "cannot show how a servo follows" in " ".join(told[True].split())
+    assert "behind a spring of 1" in " ".join(told[True].split())
+    assert "cannot show" not in told[False]
+
+
+def test_a_column_of_slip_is_noted(tmp_path):
+    record = lab.record(lab.rig(), lab.STEP)
+    record.to_csv(tmp_path / "r.csv")
+    text = (tmp_path / "r.csv").read_text()
+    (tmp_path / "r.csv").write_text(text.replace("Load displacement", "Fault slip"))
+    assert any("across the fault, by its name" in note for note in ss.read_record(tmp_path / "r.csv").notes)
+    assert not any("across the fault" in note for note in record.notes)
+
+
+def test_changes_that_are_waviness_of_the_sensor_are_named_as_perhaps_none():
+    found = measured(2e10, 2e-8, False)
+    wavy = replace(found, displacement=found.displacement + 3e-7 * np.sin(found.displacement * (2 * np.pi / 2e-5)))
+    few = {"starts": 2, "free": ["a", "b", "d_c"]}
+    told = [" ".join(str(ss.fit(lab.rig(), record, **few)).split()) for record in (found, wavy)]
+    assert ["waviness of the sensor" in text for text in told] == [False, True]
+
+
+@pytest.mark.parametrize("rates", [(0.1, 1, 10, 100, 1000), (1, 10, 100, 1000, 100, 10, 1), (1, 1000, 1)])
+@pytest.mark.parametrize("evenly", [True, False])
+@pytest.mark.parametrize("sensor", [2e-8, 2e-7])
+def test_rates_over_many_decades_with_equal_slip_are_all_found(rates, evenly, sensor):
+    """Slow runs beside fast ones counted as rest, and fast ones between slow ones as glitches."""
+    lengths = 300.0 / np.array(rates)
+    begin = np.concatenate([[0.0], np.cumsum(lengths)])
+    inner = (
+        np.linspace(0, 1, 300, endpoint=False) if evenly else np.concatenate([[0.0], np.geomspace(1e-4, 0.999, 400)])
+    )
+    time = np.concatenate([start + length * inner for start, length in zip(begin[:-1], lengths, strict=True)])
+    moved = np.interp(time, begin, 3e-4 * np.arange(len(rates) + 1))
+    course = load_course(time, moved + sensor * np.random.default_rng(1).standard_normal(len(time)))
+    assert course.levels == pytest.approx(1e-6 * np.array(rates), rel=5e-3)
+    assert [change.time for change in course.changes] == pytest.approx(begin[1:-1].tolist(), rel=1e-3)
+
+
+def test_a_hold_with_a_drifting_sensor_remains_a_hold():
+    time = np.arange(0.0, 1200.0, 0.1)
+    moved = np.interp(time, [0, 100, 1100, 1200], [0, 1e-3, 1.0005e-3, 2.0005e-3])
+    course = load_course(time, moved + 2e-8 * np.random.default_rng(2).standard_normal(len(time)))
+    assert course.levels[1] == 0.0
+    assert len(course.changes) == 2

@@ -52,6 +52,8 @@ def test_another_version_or_function_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(ss, "__version__", "9.9")
     with pytest.raises(ss.NotAvailable, match=r"computed by steadyslip [\d.]+\+s\w{8}, this is 9\.9; .*delete the map"):
         made(chart(), tmp_path, "other.zarr")
+    with pytest.raises(ss.NotAvailable, match="points of two programs are not mixed"):
+        ss.refine(ss.open_map(tmp_path / "other.zarr"), 2)
 
 
 def test_what_a_function_holds_belongs_to_it(tmp_path):

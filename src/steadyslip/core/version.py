@@ -46,7 +46,9 @@ def _files(folder: str, above: str) -> list[str]:
 
 
 def stamped(answer: Any) -> Any:
-    """Add the program version to a dict of results unless it has one; lists are returned unchanged."""
+    """Add the program version to a dict of results, or to each of a list, unless it has one."""
+    if isinstance(answer, list):
+        return [stamped(one) for one in answer]
     return {"version": version()} | answer if isinstance(answer, dict) else answer
 
 

@@ -146,8 +146,9 @@ def refine(
     ParameterError
         If an argument is wrong.
     NotAvailable
-        If the map is not complete, has samples, or no edge.
+        If the map is not complete, has samples, or no edge, or if another program computed it.
     """
+    found.store.refuse_another_program()
     of = of or ("status" if "status" in found.results else found.results[0])
     level = _level(found, of, level)
     lattice = _Lattice(found, rounds)

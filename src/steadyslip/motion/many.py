@@ -17,6 +17,7 @@ from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters
 from steadyslip.core.results import ReadOnly, read_only
+from steadyslip.core.version import version
 from steadyslip.kernels.layout import Final, Sampled
 from steadyslip.kernels.runner import STATUSES, TALLY
 from steadyslip.machine.machine import Machine
@@ -160,7 +161,7 @@ class Ensemble(ReadOnly):
         coords = dict(self._coords or {})
         if len(self.times):
             coords["time"] = ("time", self.times, {"units": "s"})
-        return xr.Dataset(variables, coords=coords)
+        return xr.Dataset(variables, coords=coords, attrs={"steadyslip": version()})
 
 
 @checked(until=finite(0), times=NUMBERS)

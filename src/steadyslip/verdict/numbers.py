@@ -57,6 +57,8 @@ def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
         leading = bool(good[:1].all() and good.size)
         numbers["eigenvalues"] = tuple(complex(s) for s in found.values[good]) if leading else ()
     eigenvalues = numbers["eigenvalues"]
+    if eigenvalues and eigenvalues[-1].imag > 0:  # a list of some of infinitely many ends between two of a pair
+        eigenvalues = numbers["eigenvalues"] = (*eigenvalues, eigenvalues[-1].conjugate())
     growth = math.inf if bad else float(eigenvalues[0].real) if eigenvalues else None
     numbers["growth_rate"] = growth
     if growth is not None and math.isfinite(growth) and growth != 0:

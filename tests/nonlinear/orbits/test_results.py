@@ -164,6 +164,8 @@ def test_command_line_writes_branch_and_thresholds(tmp_path):
     """Files by their ending, JSON that is JSON, and errors in words."""
     import json
 
+    import xarray as xr
+
     from command import run
 
     inclined, stick_slip = (EXAMPLES / f"{name}.toml" for name in ("inclined-spring", "stick-slip"))
@@ -178,6 +180,7 @@ def test_command_line_writes_branch_and_thresholds(tmp_path):
         run("threshold", inclined, "--set", "stiffness=40 GPa/m", "--kick", "displacement", "--json").stdout
     )
     assert kicks[0]["unit"] == "m"
+    assert kicks[0]["version"] == data["version"] == xr.open_dataset(files[0]).attrs["steadyslip"] == ss.__version__
     assert kicks[0]["bracket"][0] <= kicks[0]["size"] <= kicks[0]["bracket"][1]
     bad = run("threshold", inclined, "--kick", "shove")
     assert (bad.returncode, "unknown kick 'shove'" in bad.stderr) == (2, True)

@@ -311,6 +311,20 @@ class Store:
                     raise NotAvailable(message) from error
             yield  # also if this file system has no locks
 
+    def refuse_another_program(self) -> None:
+        """Raise an error if another program computed the map, as its points are not mixed with new ones.
+
+        Raises
+        ------
+        NotAvailable
+            With both programs.
+        """
+        if other := of_another(self.version):
+            raise NotAvailable(
+                f"{str(self.path)!r} was {other}; points of two programs are not mixed. Give another name, or delete "
+                "the map to have it computed anew; what it holds can be opened as it is"
+            )
+
     def refuse_other(self, plan: Map) -> None:
         """Raise an error unless the stored chunks are of the same map, rig and version.
 
@@ -319,11 +333,7 @@ class Store:
         NotAvailable
             With the differences.
         """
-        if other := of_another(self.version):
-            raise NotAvailable(
-                f"{str(self.path)!r} was {other}; chunks of two programs are not mixed. Give another name, or delete "
-                "the map to have it computed anew; what it holds can be opened as it is"
-            )
+        self.refuse_another_program()
         if found := differences(self.definition, json.loads(json.dumps(plan.definition()))):
             lines = "\n".join(f"  {line.replace('map.rig.', '')}" for line in found)
             raise NotAvailable(

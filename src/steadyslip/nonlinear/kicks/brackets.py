@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, checked, finite
 from steadyslip.core.progress import progress_bar
+from steadyslip.core.version import version
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -115,6 +116,7 @@ def threshold_map(
     import xarray as xr
 
     about = {"units": "1", "long_name": f"{kick} kick that is survived, {kicks_of(rig)[kick].size}"}
+    about["steadyslip"] = version()
     beside = {"limit": (dims, np.array(BEYOND)[found.beyond])}
     if isinstance(rig, Machine):
         beside["contact"] = (dims, found.contact)

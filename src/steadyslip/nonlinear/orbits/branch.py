@@ -17,6 +17,7 @@ from steadyslip.core.errors import unknown_name
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
+from steadyslip.core.version import version
 from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -187,7 +188,7 @@ class CycleBranch(Displayed):
         data["stable"] = ("point", self["stable"], {})
         attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind, "gaps": list(self.gaps)}
         attributes["stable_ranges"] = [end for one in self.stable_ranges for end in one]
-        attributes["checked"] = in_words(self.checks)
+        attributes |= {"checked": in_words(self.checks), "steadyslip": version()}
         return xr.Dataset(data, attrs=attributes)
 
     def to_csv(self, path: str | PathLike[str]) -> None:

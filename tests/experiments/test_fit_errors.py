@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
-from scipy.stats import binom
+from scipy.stats import binom, multivariate_normal
 
 import lab_records as lab
 import steadyslip as ss
@@ -15,6 +15,7 @@ from steadyslip.experiments.fitting.fit import fit_with_errors
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe
+from steadyslip.experiments.numerics.sampling import spread_of_chains
 
 # -- errors
 
@@ -131,6 +132,56 @@ def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian()
     assert abs(draws["friction.d_c"][best] / fit.values["friction.d_c"] - 1) < 3 * fit.errors["friction.d_c"] / 1e-5
     assert handed["sample_stats"]["lp"].values.max() == draws.log_probability[best]
     assert ss.experiments.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
+
+
+def test_draws_bring_data_likelihood_and_predictions_to_arviz():
+    arviz = pytest.importorskip("arviz")
+    fit = ss.fit(ss.lab_rig(), [lab.record(lab.rig(), lab.STEP, seed, count=200) for seed in (1, 2)])
+    draws = ss.experiments.normal_draws(fit, 400)
+    handed = draws.to_arviz()
+    record = fit.plan.records[1]
+    np.testing.assert_array_equal(handed["observed_data"]["friction_2"], record.friction)
+    np.testing.assert_array_equal(handed["posterior_predictive"]["friction_2.time"], record.time)
+    assert handed["observed_data"]["friction_2"].attrs["units"] == "1"
+    assert handed["posterior_predictive"]["friction_2.time"].attrs["units"] == "s"
+    likely = handed["log_likelihood"]
+    total = sum(likely[name].values.sum(axis=-1) for name in ("friction_1", "friction_2")).ravel()
+    z = fit.space.coordinates(np.column_stack([draws.values[name] for name in fit.names]))
+    drop = np.einsum("ij,ij->i", z - fit.coordinates, np.linalg.solve(fit.covariance, (z - fit.coordinates).T).T)
+    assert np.max(np.abs(total - total.max() + 0.5 * (drop - drop.min()))) < 1.0
+    assert float(arviz.loo(handed, var_name="friction_1").elpd_loo) > 0
+    off = handed["posterior_predictive"]["friction_1"].values - fit.plan.records[0].friction
+    assert np.std(off) == pytest.approx(np.sqrt(2) * fit.rms, rel=0.05)  # both have their noise
+    assert "observed_data" not in draws.to_arviz(samples=False).groups()
+
+
+def test_noise_has_the_density_of_its_covariance():
+    generator = np.random.default_rng(1)
+    pushes = generator.standard_normal(4000)
+    own = np.zeros(4000)
+    for i in range(1, 4000):
+        own[i] = 0.8 * own[i - 1] + pushes[i]
+    noise = describe(own)
+    drawn = noise.drawn(300, 60, generator)
+    assert np.var(drawn) == pytest.approx(noise.covariance[0], rel=0.1)
+    column = np.zeros(60)
+    column[: len(noise.covariance)] = noise.covariance[:60]
+    joint = multivariate_normal(np.zeros(60), toeplitz(column)).logpdf(drawn)
+    own = noise.log_density(drawn).sum(axis=1)
+    assert np.mean(own) == pytest.approx(np.mean(joint), abs=1.0)  # the first samples are taken as independent
+    assert np.std(own - joint) < 1.0
+
+
+def test_chains_that_have_not_mixed_are_named():
+    fit = lab.stepped()
+    told = str(ss.experiments.posterior(fit, 40, walkers=12))
+    assert "the chains have not mixed" in told
+    assert "have not mixed" not in str(ss.experiments.normal_draws(fit, 100))
+    chance = np.random.default_rng(0)
+    same = chance.standard_normal((20, 200))
+    assert spread_of_chains(same) == pytest.approx(1, abs=0.02)
+    assert spread_of_chains(same + 2 * np.arange(20)[:, None]) > 2
+    assert spread_of_chains(same + np.linspace(0, 4, 200)) > 1.3
 
 
 @pytest.mark.campaign

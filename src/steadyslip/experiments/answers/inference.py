@@ -4,10 +4,31 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
+
+
+@dataclass(frozen=True)
+class SampleDraws:
+    """What belongs to the samples of the records, by name of a column; draws are one chain after another.
+
+    Attributes
+    ----------
+    times : dict of str to ndarray (n,)
+        s.
+    observed : dict of str to ndarray (n,)
+    log_likelihood, predicted : dict of str to ndarray (m, n)
+        Logarithm of the probability density of each sample given those before it, and samples drawn anew.
+    """
+
+    times: dict[str, Array]
+    observed: dict[str, Array]
+    log_likelihood: dict[str, Array]
+    predicted: dict[str, Array]
+
 
 MEMBERS = "experiment"  # the dimension of what every experiment has
 
@@ -19,6 +40,7 @@ def inference_data(
     *,
     statistics: Mapping[str, Array] | None = None,
     members: Sequence[str] = (),
+    samples: SampleDraws | None = None,
 ) -> Any:
     """Convert draws to the data type of ArviZ.
 
@@ -26,14 +48,16 @@ def inference_data(
     ----------
     values : mapping of str to ndarray (m,) or (m, members)
         Draws in SI units, one chain after another, all of equal length.
-        units : mapping of str to str
-            Unit of each quantity.
-        chains : int
-            Number of chains.
+    units : mapping of str to str
+        Unit of each quantity.
+    chains : int
+        Number of chains.
     statistics : mapping of str to ndarray (m,), optional
         Quantities of the group ``sample_stats``.
     members : sequence of str, optional
         Labels of the experiments.
+    samples : SampleDraws, optional
+        What belongs to the samples of the records.
 
     Raises
     ------
@@ -55,10 +79,20 @@ def inference_data(
         groups["sample_stats"] = by_chain(statistics)
     shape: dict[str, Any] = {"dims": {name: [MEMBERS] for name, column in values.items() if column.ndim == 2},
              "coords": {MEMBERS: list(members)} if members else {}}  # fmt: skip
+    if samples is not None:
+        groups |= {"observed_data": samples.observed, "log_likelihood": by_chain(samples.log_likelihood),
+                   "posterior_predictive": by_chain(samples.predicted)}  # fmt: skip
+        for name, time in samples.times.items():
+            shape["dims"][name] = [f"{name}.time"]
+            shape["coords"][f"{name}.time"] = time
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "More chains", UserWarning)  # walkers are many, and meant to be
         known = hasattr(arviz, "InferenceData")
         found = arviz.from_dict(**groups, **shape) if known else arviz.from_dict(groups, **shape)
     for name, unit in units.items():
         found["posterior"][name].attrs["units"] = unit
+    for name in () if samples is None else samples.times:
+        for group in ("observed_data", "posterior_predictive"):
+            found[group][name].attrs["units"] = "1"
+            found[group][f"{name}.time"].attrs["units"] = "s"
     return found

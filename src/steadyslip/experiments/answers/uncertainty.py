@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from os import PathLike
 from typing import Any
 
@@ -15,12 +16,12 @@ from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly
-from steadyslip.experiments.answers.inference import inference_data
+from steadyslip.experiments.answers.inference import SampleDraws, inference_data
 from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
-from steadyslip.experiments.numerics.sampling import run_walkers
+from steadyslip.experiments.numerics.sampling import run_walkers, spread_of_chains
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
@@ -30,6 +31,10 @@ REFIT_TOLERANCE = (
     1e-6  # a refit stops when the predicted relative decrease of the sum of squares is below; its scatter is larger
 )
 MAX_BLOCK_SHARE = 0.1  # longest block, as a share of the record: longer ones would leave too few to resample
+MIXED, FEWEST_TIMES = 1.1, 20
+"""R-hat below which chains have mixed, and steps they need, in autocorrelation times; chosen by trial: walkers are
+many, so that each has few draws."""
+MOST_POINTS = 5e7  # numbers of a quantity that has one for each draw and sample: half a gigabyte
 DRAWS = FileKind("draws", 1, 2**30, "draw them again and save them anew")
 _ATTRIBUTES = {"kind": str, "about": str, "chains": int}
 _ABOUT = {"details": {str: float}, "interrupted": bool, "weighed": bool}
@@ -88,7 +93,21 @@ class Draws(ReadOnly):
             low, high = self.interval(one.name)
             drawn = replace(one, value=float(np.mean(self[one.name])), error=self.error(one.name), low=low, high=high)
             lines.append(f"  {one.name}  {drawn.shown()}   95 %: {drawn.range()}")
+        if (worst := max(self.chain_spread, key=self.chain_spread.__getitem__, default=None)) is not None:
+            spread, lasting = self.chain_spread[worst], self.details.get("autocorrelation", 0.0)
+            if not (spread < MIXED and self.details.get("steps", np.inf) >= FEWEST_TIMES * lasting):
+                lines.append(
+                    f"! the chains have not mixed (R-hat {spread:.3g} of {worst}, autocorrelation over {lasting:.3g} "
+                    "steps): these numbers depend on where they began; take more steps"
+                )
         return "\n".join(lines)
+
+    @cached_property
+    def chain_spread(self) -> dict[str, float]:
+        """Split R-hat of each parameter's chains, near 1 where they have mixed; empty for independent draws."""
+        if self.chains < 2:
+            return {}
+        return {name: spread_of_chains(own.reshape(self.chains, -1)) for name, own in self.values.items()}
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the draws, the fit and its records to a netCDF file; `load_draws` reads it back.
@@ -112,22 +131,52 @@ class Draws(ReadOnly):
         """Draw the parameters against each other."""
         return draw(self, ax=ax)
 
-    def to_arviz(self) -> Any:
+    @checked(seed=whole(0))
+    def to_arviz(self, samples: bool = True, seed: int = 0) -> Any:
         """Convert the draws, in SI units, to ArviZ, for its diagnostics and figures.
+
+        Parameters
+        ----------
+        samples : bool
+            Whether to compute what belongs to the samples of the records: the groups ``observed_data``,
+            ``log_likelihood`` (of each sample given those before it, with the fit's noise) and
+            ``posterior_predictive``. That takes a number for each draw and sample.
+        seed : int
+            Of the noise of ``posterior_predictive``.
 
         Returns
         -------
         arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
-            Group ``posterior`` and, where the log probability was computed, ``lp`` in ``sample_stats``.
+            Group ``posterior``, those of the samples and, where the log probability was computed, ``lp`` in
+            ``sample_stats``.
 
         Raises
         ------
         NotAvailable
-            If ArviZ is not installed.
+            If ArviZ is not installed, or draws and samples are too many for memory.
         """
         statistics = None if self.log_probability is None else {"lp": self.log_probability}
         units = {one.name: one.unit for one in self.fit.space.unknowns}
-        return inference_data(self.values, units, self.chains, statistics=statistics)
+        own = self._samples(seed) if samples else None
+        return inference_data(self.values, units, self.chains, statistics=statistics, samples=own)
+
+    def _samples(self, seed: int) -> SampleDraws:
+        """Likelihood and prediction of every sample of the records by every draw."""
+        fit, generator = self.fit, np.random.default_rng(seed)
+        if len(self) * fit.samples > MOST_POINTS:
+            message = f"{len(self)} draws of {fit.samples} samples are too many numbers for memory"
+            raise NotAvailable(f"{message}; fit a decimated record, draw less, or leave them out (samples=False)")
+        z = fit.space.coordinates(np.column_stack([self.values[name] for name in fit.names]))
+        comparison = fit.comparison
+        model = np.concatenate([comparison.model(part)[0] for part in np.array_split(z, -(-len(z) // REFITS_AT_ONCE))])
+        found = SampleDraws({}, {}, {}, {})
+        for i, (record, noise) in enumerate(zip(fit.plan.records, fit.noise, strict=True)):
+            name = "friction" if len(fit.noise) == 1 else f"friction_{i + 1}"
+            measured, own, weights = (fit.part(x.T, i).T for x in (comparison.data, model, comparison.weights))
+            found.times[name], found.observed[name] = record.time, measured
+            found.log_likelihood[name] = noise.log_density((measured - own) * weights) + np.log(weights)
+            found.predicted[name] = own + noise.drawn(len(own), own.shape[1], generator) / weights
+        return found
 
 
 @checked()
@@ -195,7 +244,7 @@ def bootstrap(
         ``block``: residuals in blocks, which keeps their correlation; ``residual``: one by one; ``auto``: blocks where
         the fit takes residuals as correlated.
     block : int, optional
-        Samples in a block; three times as many as are worth one independent sample unless given.
+        SampleDraws in a block; three times as many as are worth one independent sample unless given.
     seed : int
     threads : int, optional
     progress : bool, optional

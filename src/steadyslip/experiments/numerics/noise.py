@@ -58,6 +58,24 @@ class Noise(ReadOnly):
         column[:count] = self.covariance[:count]
         return np.asarray(rows @ matmul_toeplitz(column, rows.T))
 
+    def log_density(self, rows: Array) -> Array:
+        """Logarithm of the probability density of each value of rows (m, n), given those before it in its row."""
+        after = np.array(rows, dtype=float)
+        variance = np.full(rows.shape[1], self.innovation)
+        order = len(self.coefficients)
+        for k, share in enumerate(self.coefficients, start=1):
+            after[:, order:] -= share * rows[:, order - k : -k]
+        variance[:order] = self.covariance[0]
+        return np.asarray(-0.5 * (after**2 / variance + np.log(2 * np.pi * variance)))
+
+    def drawn(self, many: int, count: int, generator: np.random.Generator) -> Array:
+        """Random rows of this noise, (many, count)."""
+        from scipy.signal import lfilter
+
+        first = len(self.covariance) if len(self.coefficients) else 0  # by then the beginning is forgotten
+        pushes = np.sqrt(self.innovation) * generator.standard_normal((many, first + count))
+        return np.asarray(lfilter([1.0], np.concatenate([[1.0], -self.coefficients]), pushes)[:, first:])
+
 
 def white(residuals: Array, free: int = 0) -> Noise:
     """Noise model that takes the residuals (n,) as independent, after `free` parameters were fitted to them."""

@@ -46,3 +46,14 @@ def run_walkers(
     sampler._random = np.random.RandomState(seed % 2**32)
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
     return sampler, float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+
+
+def spread_of_chains(chains: Array) -> float:
+    """Split R-hat of chains (c, n) of one quantity: 1 where all halves of chains agree, more where they do not."""
+    half = chains.shape[1] // 2
+    if half < 2:
+        return np.inf
+    parts = np.concatenate([chains[:, :half], chains[:, -half:]])
+    within = float(np.mean(np.var(parts, axis=1, ddof=1)))
+    between = float(np.var(np.mean(parts, axis=1), ddof=1))
+    return float(np.sqrt((half - 1) / half + between / within)) if within > 0 else np.inf

@@ -1,6 +1,7 @@
 """Answers to inputs that swing: against transfer functions, closed forms of fast modulation, and SciPy."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -371,6 +372,7 @@ def test_the_command(tmp_path):
     found = run(*words, "--amplitude", "1 MPa", "-o", str(table), "-o", str(picture))
     assert found.stdout.startswith("friction under normal-stress: gain")
     assert "amplitude 1 MPa" in found.stdout
+    assert re.search(r" 100 s  \S+ per MPa  ", found.stdout)
     lines = [line.split(",") for line in table.read_text().splitlines()]
     assert lines[0][:3] == ["amplitude (Pa)", "period (s)", "gain (1/Pa)"]
     assert len(lines) == 11
@@ -378,6 +380,10 @@ def test_the_command(tmp_path):
     assert means[:5] == pytest.approx([0.6] * 5, rel=1e-12)
     assert means[5] == pytest.approx(settled(1e6, 1.0)[0], rel=1e-6)
     assert picture.read_text().startswith("<?xml")
+    assert "9 of 41 periods; files and JSON have all" in str(ss.response(press(), np.geomspace(1, 100, 41)))
+    answer = ss.response(press(), [1.0], output="v")
+    assert f"{answer.gain[0] * 1e12:.5g} um/s per MPa" in str(answer)
+    assert (answer.gain_unit, answer.drawn_gain_unit) == ((1.0, "m/s/Pa"), (1e6, "m/s/MPa"))
     wrong = run(*words, "--amplitude", "1 mm")
     assert (wrong.returncode, "--amplitude" in wrong.stderr) == (2, True)
 

@@ -69,7 +69,7 @@ def _styles(found: FrequencyResponse) -> Iterator[tuple[int, float, dict[str, An
 
 
 def _gain(found: FrequencyResponse, ax: Any) -> None:
-    factor, unit = found.gain_unit
+    factor, unit = found.drawn_gain_unit
     periods, answer = _small(found)
     ax.plot(periods, factor * np.abs(answer), color=BLACK, label="small amplitudes")
     for j, amplitude, style in _styles(found):

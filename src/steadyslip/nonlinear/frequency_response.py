@@ -28,6 +28,8 @@ EXPLAINED = {
     "the motion; try a larger rtol (in Python), or fewer short periods",
 }
 BEYOND = "beyond the steady value"
+MEGA = 1e6
+MOST_ROWS = 9  # periods listed in the text
 MOST_TOLD = 4  # resonances listed in the text
 
 
@@ -117,10 +119,16 @@ class FrequencyResponse(ReadOnly):
 
     @property
     def gain_unit(self) -> tuple[float, str]:
-        """Factor and display unit of the gain; the unit is empty where input and output have the same one."""
+        """Factor and unit of the gain in tables; the unit is empty where input and output have the same one."""
         (below, given), (above, answered) = self.shown_units
         divisor = f"({given})" if set(given) & set("/ ") else given
         return above / below, "" if given == answered else f"{answered}/{divisor}"
+
+    @property
+    def drawn_gain_unit(self) -> tuple[float, str]:
+        """Factor and unit of the gain in figures: those of tables, but per MPa of a stress."""
+        factor, unit = self.gain_unit
+        return (MEGA * factor, f"{unit.removesuffix('Pa')}MPa") if unit.endswith("/Pa") else (factor, unit)
 
     def __str__(self) -> str:
         lines = [f"{self.title}: gain and phase of small amplitudes"]
@@ -129,6 +137,8 @@ class FrequencyResponse(ReadOnly):
         for i in _some(len(self.periods)):
             period = format_quantity(self.periods[i], "s")
             lines.append(f"  {period:>12}  {self._gain(self.gain[i])}  {self.phase[i]:.4g} deg{self._limits_at(i)}")
+        if len(self.periods) > MOST_ROWS:
+            lines.append(f"{MOST_ROWS} of {len(self.periods)} periods; files and JSON have all")
         for period, gain, phase in self.resonances[:MOST_TOLD]:
             place = format_quantity(period, "s")
             lines.append(f"resonance  period {place}, gain {self._gain(gain)}, phase {phase:.4g} deg")
@@ -148,8 +158,13 @@ class FrequencyResponse(ReadOnly):
         return format_quantity(amplitude, self.units[0], area=self._area)
 
     def _gain(self, gain: float) -> str:
+        """Format a gain: per MPa of a stress or per unit of another input; a number if input and output are alike."""
         factor, unit = self.gain_unit
-        return f"{factor * gain:.5g} {unit}".rstrip()
+        if not unit:
+            return f"{factor * gain:.5g}"
+        below, given = self.shown_units[0]
+        step, given = (MEGA, "MPa") if given == "Pa" else (1 / below, given)
+        return f"{format_quantity(step * gain, self.units[1], 5, self._area)} per {given}"
 
     def _at(self, j: int, i: int) -> str:
         if self.status[j, i] != PERIODIC:
@@ -231,8 +246,8 @@ class FrequencyResponse(ReadOnly):
 
 
 def _some(count: int) -> list[int]:
-    """Indices of at most nine lines of a table."""
-    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, 9))})
+    """Indices of at most `MOST_ROWS` lines of a table."""
+    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, MOST_ROWS))})
 
 
 def _plain(values: Array) -> Any:

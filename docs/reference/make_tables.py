@@ -188,9 +188,10 @@ FIT_HEAD = """# File of a fit
 It is a [rig file](rig-file.md) with three more tables. In the tables of the rig, what is missing is fitted: `a`, `b`,
 `d_c`, `mu_ref`, what a `normal_memory` has (α; g and d_σ) and the stiffness; what is given is kept. If nothing is
 missing, all of the friction law and the stiffness are fitted. Where the normal stress changes in the records and
-neither `normal_memory` nor `compare` is there, the memories are compared. `[contact]`, `[drive]` and `v_ref` may be
-missing too: normal stress and rates are those of the records. A `[protocol]` says what moved the load point where the
-records do not; the rate before it is that of the record, or `[drive] velocity` where the record does not show it.
+neither `normal_memory` nor `compare` is there, the memories are compared, and unless `evolution` is there each with the
+slip and the aging law. `[contact]`, `[drive]` and `v_ref` may be missing too: normal stress and rates are those
+of the records. A `[protocol]` says what moved the load point where the records do not; the rate before it is
+that of the record, or `[drive] velocity` where the record does not show it.
 
 ```toml
 [friction]

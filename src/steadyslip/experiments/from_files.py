@@ -49,8 +49,8 @@ def fit_files(
     fit : Fit
         The best, where laws are compared.
     comparison : LawComparison or None
-        Comparison of the laws that the file lists; if it lists none and the normal stress changes, of laws with each
-        memory of it, unless the file chooses one. None for a single law.
+        Comparison of the laws that the file lists; if it lists none and the normal stress changes, of the slip and the
+        aging law with each memory of it, unless the file chooses a memory. None for a single law.
 
     Raises
     ------

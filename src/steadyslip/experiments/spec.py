@@ -56,7 +56,8 @@ class Spec(Displayed):
         laws : tuple of str
             Labels of laws to compare; empty unless the file lists some.
         undecided : tuple of str
-            Labels of laws to compare if the normal stress changes in a record and the file names no memory of it.
+            Labels of laws to compare if the normal stress changes in a record and the file names no memory of it: all
+            memories, and unless the file names an evolution law the slip and the aging law with each.
         windows : bool
             True if every step of a record is a record of its own.
         v_ref_given : bool
@@ -192,12 +193,23 @@ def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
         if known := [name for name in rig.of_kind("friction level") if name not in missing]:
             options["fixed"] = [*settings.fixed, *known]
     v_ref, contact, drive = (filled.given(kind, found.changed) for kind in _Placeholders.FROM_RECORDS)
-    choices = [words for name, words in rig.friction.decided_by_stress.items() if name not in filled.friction]
-    undecided = tuple(map(", ".join, product(*choices))) if choices else ()
+    undecided = _undecided(rig.friction, filled.friction)
     return Spec(
         rig, found.protocol, record if isinstance(record, RecordSettings) else RecordSettings(), options,
         settings.compare, undecided, settings.windows, v_ref, contact, drive, members,
     )  # fmt: skip
+
+
+def _undecided(law: FrictionLaw, said: set[str]) -> tuple[str, ...]:
+    """Labels to compare where the normal stress changes, of a file whose table `[friction]` has the fields `said`.
+
+    What remembers the normal stress cannot be told with the wrong evolution law, which is compared along with it.
+    """
+    memories, others = (
+        [words for name, words in choices.items() if name not in said]
+        for choices in (law.decided_by_stress, law.decided_besides)
+    )
+    return tuple(map(", ".join, product(*others, *memories))) if memories else ()
 
 
 @checked()

@@ -28,6 +28,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
 
     compared: ClassVar[tuple[str, ...]] = ()
     decided_by_stress: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    decided_besides: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def memory(self) -> tuple[str, ...]:
         """Names of the memory variables, in the order of all other methods; empty if there are none."""
@@ -83,7 +84,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
 
         Labels of laws are lists of such words: `aging, two states`. The class attribute `compared` lists the labels
         that are fitted by default; `decided_by_stress` has, by field, the words among which records with changing
-        normal stress decide.
+        normal stress decide, and `decided_besides` words of other fields that are compared along with these.
         """
         return {}
 

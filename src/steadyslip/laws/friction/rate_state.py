@@ -62,6 +62,7 @@ class RateState(FrictionLaw, name="rate-state"):
     decided_by_stress: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "normal_memory": ("none", "linker-dieterich", "prakash-clifton")
     }
+    decided_besides: ClassVar[Mapping[str, tuple[str, ...]]] = {"evolution": ("slip", "aging")}
 
     def inconsistencies(self) -> Iterator[Problem]:
         single = {"b": self.b, "d_c": self.d_c}

@@ -166,6 +166,23 @@ class Fragile:
         return ends, np.where(z[:, :1, None] < 2.0, np.nan, ends[:, None])
 
 
+def test_a_minimum_is_run_alone_although_it_was_just_computed_among_others(monkeypatch):
+    """A result kept from the search hid that the motion fails alone: criteria of the fit, and all weights, were NaN."""
+    comparison = make_plan(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300)).comparison()
+    whole = comparison._run
+
+    def fragile(z):
+        predicted, slopes = whole(z)
+        return (np.full_like(predicted, np.nan) if len(z) == 1 else predicted), slopes
+
+    monkeypatch.setattr(comparison, "_run", fragile)
+    known = comparison.parts[0].rig.parameters()
+    values = [known[u.name].value if u.name in known else (u.low + u.high) / 2 for u in comparison.space.unknowns]
+    z = comparison.space.coordinates(np.array([values] * 2))
+    assert np.all(np.isfinite(comparison.residuals(z)[0]))
+    assert np.all(np.isinf(first_computable(comparison, replace(Minima.at(z), ssq=np.array([0.1, 0.2]))).ssq))
+
+
 def test_a_minimum_stands_only_if_its_motion_comes_through_alone():
     """With its derivatives; the best that does is the first, and without any there is none."""
     found = replace(Minima.at(np.arange(4.0)[:, None]), ssq=np.array([0.1, 0.2, 0.3, 0.4]))

@@ -97,16 +97,16 @@ class Comparison:
     def model(self, coordinates: Array) -> tuple[Array, Array]:
         """Model friction (m, n) and derivatives (m, p, n) at coordinates (m, p), not weighted; read-only arrays.
 
-        The results of recent points are cached: errors at a minimum that was just found cost no run.
+        The results of points that were run alone are cached: errors at a minimum that was just checked cost no run.
+        Those of several are not, since a motion that is completed among others may fail alone.
         """
         if len(coordinates) == 1:
             for point, own, slopes in self._recent:
                 if point == coordinates.tobytes():
                     return own[None], slopes[None]
         predicted, jacobian = (read_only(array) for array in self._run(coordinates))
-        if len(coordinates) * self.size <= MAX_CACHED_SAMPLES:
-            rows = zip(coordinates, predicted, jacobian, strict=True)
-            self._recent.extend((z.tobytes(), own, slopes) for z, own, slopes in rows)
+        if len(coordinates) == 1 and self.size <= MAX_CACHED_SAMPLES:
+            self._recent.append((coordinates.tobytes(), predicted[0], jacobian[0]))
         return predicted, jacobian
 
     def _run(self, coordinates: Array) -> tuple[Array, Array]:

@@ -44,7 +44,8 @@ LEGEND_WIDTH = 36  # characters of a line of a legend in two columns
 def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     """Plot a bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
 
-    Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin.
+    Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin. A
+    cross marks a place from which no cycles were followed.
 
     Parameters
     ----------
@@ -89,6 +90,10 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         seen.add(point.kind)
         x = (point.cycle.value - origin) / factor
         ax.plot([x], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
+    left = [end.cycle for one in (branch, branch.doubled) if one for end, _ in one.not_followed if end.cycle]
+    for i, one in enumerate(left):
+        x, y = (one.value - origin) / factor, one.peak_velocity / speed
+        ax.plot([x], [y], "x", color=BLACK, zorder=3, label="" if i else "not followed from here")
     lowest, highest = (min((one.lowest_velocity for one in branch.cycles), default=0.0),
                        max((one.peak_velocity for one in branch.cycles), default=0.0))  # fmt: skip
     ax.set_yscale("log" if len(branch) and not highest < 2 * lowest else "linear")

@@ -1,5 +1,6 @@
 """Where cycles attract, what they double into, and how well they are known: by laws of nature and second routes."""
 
+import json
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,8 @@ from steadyslip.nonlinear.continuation import turned_round
 from steadyslip.nonlinear.orbits import at_value, tracer
 from steadyslip.nonlinear.orbits.at_value import tracer_of
 from steadyslip.nonlinear.orbits.cycle import End
-from steadyslip.nonlinear.orbits.doublings import doubled_pieces
+from steadyslip.nonlinear.orbits.doublings import _go_on, doubled_pieces
+from steadyslip.nonlinear.orbits.follow import _branch
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
 from steadyslip.nonlinear.orbits.search import seed_at
 from steadyslip.nonlinear.orbits.tracer import orbit_of
@@ -218,18 +220,63 @@ def test_a_branch_goes_on_where_the_beginning_of_its_cycles_disappears():
     assert [one.kind for one in sheet.special] == ["period doubling"]
 
 
-@pytest.mark.campaign
-def test_each_doubling_has_a_part_of_the_work(monkeypatch):
-    """Where the sheet from the first one takes all it may, that from the other is still followed from its end."""
+@pytest.fixture(scope="module")
+def two_doublings():
+    """Branch of a machine with two doublings between which it is unstable, not followed, and the cycles there."""
     machine = drawn(np.random.default_rng(33))
     edge = ss.hopf(machine, ALONG).value
     branch = ss.cycles(machine, ALONG, between=(0.4 * edge, 1.05 * edge), doublings=0)
-    flips = [point.cycle for point in branch.special if point.kind == "period doubling"]
+    return branch, [point.cycle for point in branch.special if point.kind == "period doubling"]
+
+
+@pytest.mark.campaign
+def test_each_doubling_has_a_part_of_the_work(two_doublings, monkeypatch):
+    """Where the sheet from the first one takes all it may, that from the other is still followed from its end."""
+    branch, flips = two_doublings
     monkeypatch.setattr(tracer, "MOST_STEPS", 120_000)
     sheets = doubled_pieces(tracer_of(branch.onset, 0, None), flips)
     assert [sheet.bounds[0].value for sheet in sheets] == [flip.value for flip in flips]
     assert min(len(sheet.points) for sheet in sheets) > 3
     assert all("million steps of integration taken" in sheet.end for sheet in sheets)
+
+
+@pytest.mark.campaign
+def test_a_sheet_goes_on_where_its_work_was_used_up(two_doublings, monkeypatch):
+    """With the cycles that follow without a limit."""
+    branch, flips = two_doublings
+    (whole,) = doubled_pieces(tracer_of(branch.onset, 0, None), flips[:1])
+    monkeypatch.setattr(tracer, "MOST_STEPS", 60_000)
+    follower = tracer_of(branch.onset, 0, None)
+    sheets = doubled_pieces(follower, flips[:1])
+    assert 3 < len(sheets[0].points) < len(whole.points)
+    monkeypatch.undo()
+    follower.begin_branch()
+    _go_on(follower, sheets, flips[:1], {0})
+    assert [known.cycle.value for known in sheets[0].points] == [known.cycle.value for known in whole.points]
+    assert sheets[0].end == whole.end
+
+
+@pytest.mark.campaign
+def test_doublings_for_which_no_work_was_left_are_listed_apart(two_doublings, monkeypatch):
+    branch, flips = two_doublings
+    follower = tracer_of(branch.onset, 0, None)
+    monkeypatch.setattr(tracer, "MOST_STEPS", 1)
+    further = doubled_pieces(follower, [*flips, *flips[:1]])
+    doubled = _branch(follower, further, None, 0)
+    assert [len(piece.points) > 0 for piece in further] == [True, False, False]
+    assert doubled.gaps == doubled.broken == ()
+    assert doubled.not_followed == tuple((piece.bounds[0], "the work was used up") for piece in further[1:])
+    told = replace(branch, doubled=doubled)
+    places = [f"{end.value / 1e3:.6g} kN/m" for end, _ in doubled.not_followed]
+    assert f"not followed from the period doublings at {', '.join(places)}: the work was used up" in str(told)
+    data = json.loads(json.dumps(told.to_dict()))["doubled"]["not_followed"]
+    assert data == [
+        {"kind": "period doubling", "value": end.value, "why": "the work was used up"}
+        for end, _ in doubled.not_followed
+    ]
+    drawn_places = [line for line in told.plot().lines if line.get_marker() == "x"]
+    assert [line.get_label() for line in drawn_places if line.get_label()[0] != "_"] == ["not followed from here"]
+    assert len(drawn_places) == 2
 
 
 @pytest.mark.campaign

@@ -64,6 +64,8 @@ class CycleBranch(Displayed):
         Where each part between two gaps begins and stops.
     repeated : int
         Number of cycles that were computed again with smaller errors per step, because a check failed.
+    not_followed : tuple of (End, str)
+        Places from which no cycles were followed, and why: the work was used up, or none was found there.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -81,6 +83,7 @@ class CycleBranch(Displayed):
     contact: str = ""
     bounds: tuple[tuple[End, End], ...] = field(default=(), repr=False)
     repeated: int = 0
+    not_followed: tuple[tuple[End, str], ...] = field(default=(), repr=False)
 
     def __len__(self) -> int:
         return len(self.cycles)
@@ -229,6 +232,7 @@ class CycleBranch(Displayed):
             "end": self.end,
             **({"contact": self.contact} if self.contact else {}),
             "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
+            "not_followed": [{"kind": one.kind, "value": one.value, "why": why} for one, why in self.not_followed],
             "stable_ranges": [list(one) for one in self.stable_ranges],
             "stretches": [
                 {"stable": one.stable, "range": list(one.range), "ends": [end.kind for end in one.ends]}
@@ -285,6 +289,10 @@ class CycleBranch(Displayed):
             how = "from the period doubling at" if begin.kind == "period doubling" else "found by simulation, from"
             lines += [f"  gap: at {before} {why};", f"    another sheet, {how} {after} on"]
         lines.append(f"  ends: {self.end}")
+        for why in dict.fromkeys(why for _, why in self.not_followed):
+            at = [one for one, reason in self.not_followed if reason == why]
+            places = ", ".join(format_quantity(one.value, self.unit, 6, area) for one in at)
+            lines.append(f"  not followed from the {at[0].kind}{'s' if len(at) > 1 else ''} at {places}: {why}")
         lines += [f"  {in_words(self.checks)}"]
         if self.doubled is not None:
             lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]

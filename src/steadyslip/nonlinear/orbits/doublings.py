@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,52 +12,83 @@ from steadyslip.nonlinear.orbits.cycle import Cycle, End
 from steadyslip.nonlinear.orbits.end_reasons import ENDS
 from steadyslip.nonlinear.orbits.search import cut_back, met
 from steadyslip.nonlinear.orbits.special import MET, log_features
-from steadyslip.nonlinear.orbits.tracer import BranchPiece, Tracer
+from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, BranchPiece, Tracer
 
-SIZES = (1e-3, 1e-2, 1e-4, 1e-1)  # distances of the first cycle from the doubling, in unknowns, tried in this order
+SIZES = (1e-3, 1e-4, 1e-5, 1e-2)  # distances of the first cycle from the doubling, in unknowns, tried in this order
 
 
 def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:
-    """Follow the cycles of twice the period from each doubling at which no earlier piece has ended."""
+    """Follow the cycles of twice the period from each doubling at which no earlier piece has ended.
+
+    Each doubling may take an equal part of the work that is left, and what others leave goes to those that need more:
+    first to the doublings of cycles that attract on one side, where those of twice the period may attract too.
+    """
     pieces: list[BranchPiece] = []
     reached: set[int] = set()
-    since = tracer.flow.steps
-    for i, flip in enumerate(flips):
-        if i in reached or tracer.interrupted:
-            continue
-        tracer.allot(since, 1.0 if i == len(flips) - 1 else 1.0 - 0.5 ** (i + 1))  # half of what is left
-        piece = _entered(tracer, pieces, flip)
-        reached.add(i)
-        if piece.end == ENDS["doubling"]:
-            other = _nearest(flips, piece)
-            if other is not None:
-                reached.add(other)
-                _close(tracer, piece, flips[other])
-        if piece.end == "" and piece.whole:
-            _join(pieces, piece)
-        else:
-            pieces.append(piece)
-    return pieces
+    tracer.begin_branch()
+    may_attract = [_may_attract(flip) for flip in flips]
+    for kind in (True, False):
+        group = [i for i in range(len(flips)) if may_attract[i] == kind]
+        for i in group:
+            if i not in reached:
+                tracer.allot(sum(j not in reached for j in group))
+                reached.add(i)
+                pieces.append(_entered(tracer, pieces, flips[i]))
+                _settle(tracer, pieces, len(pieces) - 1, flips, reached)
+        _go_on(tracer, pieces, flips, reached)
+    return sorted(pieces, key=lambda piece: next(i for i, flip in enumerate(flips) if flip is piece.bounds[0].cycle))
+
+
+def _may_attract(flip: Cycle) -> bool:
+    """True if no multiplier but that of the doubling is outside the unit circle."""
+    others = sorted(flip.multipliers, key=lambda one: abs(one + 1))[1:]
+    return all(abs(one) < 1 for one in others)
+
+
+def _go_on(tracer: Tracer, pieces: list[BranchPiece], flips: Sequence[Cycle], reached: set[int]) -> None:
+    """Go on with the pieces whose part of the work was used up, with equal parts of what the others have left."""
+    while waiting := [piece for piece in pieces if piece.rest is not None]:
+        for k, piece in enumerate(waiting):
+            if tracer.interrupted or tracer.is_spent:
+                return
+            if piece in pieces:  # else another one has met it
+                tracer.allot(len(waiting) - k)
+                others = [one for one in pieces if one is not piece]
+                tracer.gone_on(piece, met=partial(met, others))
+                _settle(tracer, pieces, pieces.index(piece), flips, reached)
+
+
+def _settle(tracer: Tracer, pieces: list[BranchPiece], i: int, flips: Sequence[Cycle], reached: set[int]) -> None:
+    """End a piece at the doubling that it has reached, or join it to the one that it has met."""
+    piece = pieces[i]
+    if piece.end == ENDS["doubling"]:
+        other = _nearest(flips, piece)
+        if other is not None:
+            reached.add(other)
+            _close(tracer, piece, flips[other])
+    if piece.end == "" and piece.whole:
+        del pieces[i]
+        _join(pieces, piece)
 
 
 def _entered(tracer: Tracer, pieces: list[BranchPiece], flip: Cycle) -> BranchPiece:
     """Follow the piece from one doubling, as far as possible or to a known piece."""
     begins, why = End("period doubling", flip.value, flip), ""
     for size in SIZES:
+        if tracer.interrupted or tracer.is_spent:
+            return BranchPiece(end=INTERRUPTED if tracer.interrupted else USED_UP, begins=begins, followed=False)
         try:
             first = tracer.doubled(flip, size)
         except (Failure, np.linalg.LinAlgError) as failure:
             why = str(failure)
-            continue
         except KeyboardInterrupt:
             tracer.interrupted = True
-            break
-        piece = tracer.followed(first.shooting, first, size, twice=True, met=lambda known: met(pieces, known))
-        piece.begins = begins
-        return piece
-    return BranchPiece(
-        end=f"broke off: no cycle of twice the period was found beside the doubling ({why})", begins=begins
-    )
+        else:
+            piece = tracer.followed(first.shooting, first, size, twice=True, met=partial(met, pieces))
+            piece.begins = begins
+            return piece
+    why = f"no cycle of twice the period was found beside it ({why})"
+    return BranchPiece(end=INTERRUPTED if tracer.interrupted else why, begins=begins, followed=False)
 
 
 def _nearest(flips: Sequence[Cycle], piece: BranchPiece) -> int | None:
@@ -93,3 +125,4 @@ def _join(pieces: list[BranchPiece], piece: BranchPiece) -> None:
     i = next(i for i, one in enumerate(pieces) if met([one], meeting))
     cut_back(pieces[i], meeting.cycle)
     pieces[i] = pieces[i].joined(piece.reversed())
+    pieces[i].end = ENDS["doubling"]

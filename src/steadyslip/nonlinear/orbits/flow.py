@@ -40,6 +40,7 @@ NEVER = np.empty(0)
 STIFF = "rodas5p"  # Rosenbrock method of order 5, as tolerances are tight
 MOST_STEPS = 100_000  # of one run: some tenths of a second
 FAR_MORE, FEW_STEPS = 20, 5_000  # limit of a run: factor on the steps of the last one, and the least
+MORE = 8  # such a factor for runs next to a known one
 UNHEARD = 1e12  # factor of the tolerances of sensitivities where they are not to affect the steps
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are reused
 KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
@@ -162,6 +163,7 @@ class FlowRunner:
         )
         self.sensitive = _with_sensitivities(self.reduction, method)
         self.steps, self._usual, self.led = 0, MOST_STEPS, False
+        self.far_more = FAR_MORE
         self.rounding = 0.0
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
         own = jobs.point.part(slice(which, which + 1))
@@ -259,7 +261,7 @@ class FlowRunner:
         step over, and what is left is the derivative of the steps that are taken.
         """
         settings, n, behind = self._finer(setting.varied[1], amplitude), self.size, self.tolerances.stop
-        settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, FAR_MORE * self._usual))
+        settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, self.far_more * self._usual))
         if self.led:
             settings[:, behind : behind + n * n + n] *= UNHEARD
         return settings

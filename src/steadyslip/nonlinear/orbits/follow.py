@@ -70,8 +70,8 @@ def cycles(
         Number of successive period doublings to follow onto the branch of twice the period.
     most_points : int, optional
         Limit of cycles on a branch. Four million steps of integration are the limit of work on it, and as many on its
-        cycles of twice the period, of which each doubling may take half of what is left: cycles found until then
-        are kept, and ``end`` gives this reason.
+        cycles of twice the period, shared by the doublings: cycles found until then are kept, and ``end`` gives this
+        reason; ``not_followed`` lists doublings for which nothing was left.
     rtol : float, optional
         Error allowed per step of integration; 1e-10, with mass 1e-9, unless given.
     branch : int, optional
@@ -111,6 +111,8 @@ def cycles(
 
 def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doublings: int) -> CycleBranch:
     """Join the pieces of a branch, follow the cycles of twice the period, and build the result."""
+    left = [(piece.bounds[0], piece.end) for piece in pieces if not piece.followed]
+    pieces = [piece for piece in pieces if piece.followed] or pieces[:1]
     whole, gaps, ends = pieces[0], [], [pieces[0].end]
     for piece in pieces[1:]:
         gaps.append(len(whole.points))
@@ -120,7 +122,8 @@ def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doubl
     flips = [point.cycle for point in whole.special if point.kind == "period doubling"]
     if flips and doublings > 0 and not tracer.interrupted:
         further = doubled_pieces(tracer, flips)
-        doubled = _branch(tracer, further, rtol, doublings - 1) if further[0].points or not tracer.interrupted else None
+        if any(piece.points for piece in further) or not tracer.interrupted:
+            doubled = _branch(tracer, further, rtol, doublings - 1)
     if tracer.interrupted and doubled is None:
         ends[-1] = INTERRUPTED
     onset, flow = tracer.onset, tracer.flow
@@ -128,7 +131,7 @@ def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doubl
     return CycleBranch(
         onset.rig, onset.along, onset.unit, onset, tuple(found), tuple(whole.special), ends[-1], doubled,
         tuple(gaps), tuple(ends[:-1]), flow.branch, rtol, whole.contact, tuple(piece.bounds for piece in pieces),
-        repeated,
+        repeated, tuple(left),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.special import BranchPoint, lies_between
-from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, BranchPiece, Tracer, orbit_of
+from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, USED_UP, BranchPiece, Tracer, orbit_of
 
 Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a piece broke off to the end of the range
@@ -30,6 +30,9 @@ def search_on(tracer: Tracer, pieces: list[BranchPiece]) -> None:
     for share in SEEDS:
         last = pieces[-1]
         if tracer.interrupted or _crossed(last, tracer):
+            return
+        if tracer.is_spent:
+            pieces.append(BranchPiece(end=USED_UP, begins=last.bounds[1], followed=False))
             return
         here = last.points[-1].cycle if last.points else None
         start = onset.value

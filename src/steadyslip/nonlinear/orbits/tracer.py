@@ -15,7 +15,7 @@ from steadyslip.nonlinear.orbits.cut_segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.cycle_properties import cycle_data
 from steadyslip.nonlinear.orbits.end_reasons import ENDS, RETRACED, SHRUNK, STANDING, EndRules, retraces, stands, winds
-from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
+from steadyslip.nonlinear.orbits.flow import FAR_MORE, MORE, Flow, FlowFailure
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
@@ -31,6 +31,7 @@ MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: some sec
 LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
 HIDDEN = 0.1  # largest share of rounding in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
+USED_UP = "the work was used up"
 
 
 @dataclass(eq=False)
@@ -40,6 +41,8 @@ class BranchPiece:
     `whole` is False where the cycles could not be followed any further, and True for an end with a physical reason.
     `contact` names the contact of a machine that lifts off at the end, or is the fastest. `begins` and `stops` are the
     ends where these are not the first and last cycle; `beyond` is the next cycle past the end, not part of the piece.
+    `rest` yields the cycles that follow where its part of the work was used up, after `steps` steps of integration.
+    `followed` is False for a place from which nothing was followed; `end` is the reason.
     """
 
     points: list[BranchPoint] = field(default_factory=list)
@@ -50,6 +53,10 @@ class BranchPiece:
     begins: End | None = None
     stops: End | None = None
     beyond: BranchPoint | None = None
+    rest: Iterator[tuple[BranchPoint, BranchPoint]] | None = None
+    twice: bool = False
+    steps: int = 0
+    followed: bool = True
 
     @property
     def bounds(self) -> tuple[End, End]:
@@ -106,11 +113,20 @@ class Tracer:
         self.logarithmic = flow.domain.low == 0 and onset.value > 0
         self.unit_of_value = abs(onset.value) or 1.0
         self.count, self.interrupted = 0, False
-        self.begun, self.most_steps = 0, MOST_STEPS
+        self.most_steps = self.last_step = MOST_STEPS
 
-    def allot(self, since: int, share: float) -> None:
-        """Limit the integration steps of the next pieces to a share of those of a branch, counted from step `since`."""
-        self.begun, self.most_steps = self.flow.steps, since + round(share * MOST_STEPS)
+    def begin_branch(self) -> None:
+        """Allow the work of another branch, counted from here."""
+        self.last_step = self.flow.steps + MOST_STEPS
+
+    def allot(self, parts: int) -> None:
+        """Limit the integration steps of the next piece to one of several equal parts of what is left for a branch."""
+        self.most_steps = self.flow.steps + max(0, self.last_step - self.flow.steps) // parts
+
+    @property
+    def is_spent(self) -> bool:
+        """True if the work of a branch is used up."""
+        return self.flow.steps >= self.last_step
 
     def shooting(self, fractions: Array = ONE, amplitude: float = 1.0, scales: Array | None = None) -> Shooting:
         """Shooting equations for given segments (shares of the period) and a typical amplitude (natural sizes)."""
@@ -175,7 +191,11 @@ class Tracer:
         tangent[: flow.size] = aside[0] / np.hypot(shooting.scales, orbit.states[0])
         curve = shooting.curve()
         guess = shooting.packed(replace(orbit, states=states, period=2 * cycle.period))
-        return self.branch_point(shooting, curve.start(guess, tangent / curve.size(tangent)))
+        flow.far_more = MORE
+        try:
+            return self.branch_point(shooting, curve.start(guess, tangent / curve.size(tangent)))
+        finally:
+            flow.far_more = FAR_MORE
 
     def deviation(self, cycle: Cycle, multiplier: complex) -> tuple[Array, Array]:
         """Eigenvector (n,) of one multiplier at a cycle's start, and the sensitivities of the segments (K, n, n).
@@ -234,15 +254,27 @@ class Tracer:
         met : callable, optional
             True for a cycle that is known already; the piece ends before it.
         """
-        piece = BranchPiece()
-        try:
+
+        def points() -> Iterator[tuple[BranchPoint, BranchPoint]]:
             start = self.branch_point(shooting, first) if isinstance(first, Point) else first
-            self._add(piece, start)
-            for before, here in self._points(start, step):
+            yield start, start
+            yield from self._points(start, step)
+
+        return self.gone_on(BranchPiece(rest=points(), twice=twice), met)
+
+    def gone_on(self, piece: BranchPiece, met: Callable[[BranchPoint], bool] | None = None) -> BranchPiece:
+        """Go on with a piece that has a `rest`, until it ends or its part of the work is used up."""
+        points, begun = piece.rest or iter(()), self.flow.steps
+        piece.rest, piece.end = None, ""
+        try:
+            for before, here in points:
+                if not piece.points:
+                    self._add(piece, here)
+                    continue
                 if met is not None and met(here):
                     piece.end, piece.whole, piece.beyond = "", True, here
                     return piece
-                piece.end, keep = self.ends.finished(self.limits, before, here, piece.points[0], twice)
+                piece.end, keep = self.ends.finished(self.limits, before, here, piece.points[0], piece.twice)
                 if piece.end == ENDS["steady"]:
                     piece.stops = self.ends.other_edge([known.cycle for known in piece.points[-2:]])
                 if piece.end.startswith("end of the range"):
@@ -267,8 +299,10 @@ class Tracer:
                     piece.end = f"most_points = {self.most} reached"
                     break
                 if self.flow.steps > self.most_steps:
-                    piece.end = f"{(self.flow.steps - self.begun) / 1e6:.2g} million steps of integration taken, all "
-                    piece.end += "that are spent on this part; ask for the rest with between=(low, high)"
+                    taken = piece.steps + self.flow.steps - begun
+                    piece.end = f"{taken / 1e6:.2g} million steps of integration taken, all that are spent on this part"
+                    piece.end += "; ask for the rest with between=(low, high)"
+                    piece.rest, piece.steps = points, taken
                     break
             lost = {ENDS["retraces"], ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
             lost |= set() if piece.points[-1].cycle.stable else {ENDS["precision"]}

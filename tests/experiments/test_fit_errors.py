@@ -84,6 +84,22 @@ def test_correlated_residuals_are_noticed_and_errors_honest():
     assert not lab.stepped().correlated
 
 
+@pytest.mark.parametrize("memory", [0.7, 0.97])
+def test_slow_noise_that_parameters_took_up_is_known(memory):
+    """Of the residuals alone, memory .97 gives errors that are too small: parameters have taken up what is slow."""
+    fit = lab.stepped()
+    rows = fit.comparison.residuals(fit.coordinates[None])[1][0]
+    basis = np.linalg.qr(rows.T)[0].T
+    off = []
+    for seed in range(40):
+        white = np.random.default_rng(seed + 99).standard_normal(rows.shape[1])
+        noise = correlated_noise(rows.shape[1], memory, seed) + 0.5 * white
+        taken = basis @ noise
+        found = describe(noise - basis.T @ taken, len(rows), rows=rows)
+        off.append(taken / np.sqrt(np.diag(found.spread(basis))))
+    assert 0.9 < np.sqrt(np.mean(np.square(off))) < 1.1
+
+
 def test_an_autoregression_is_recovered():
     noise = describe(correlated_noise(20000, 0.7, 1))
     assert noise.coefficients[0] == pytest.approx(0.7, abs=0.05)

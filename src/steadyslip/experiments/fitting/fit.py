@@ -223,7 +223,10 @@ def fit_with_errors(
     for where in comparison.slices:
         own = residuals[where]
         share = free * len(own) // comparison.size
-        noise = white(own, share) if errors == "independent" else describe(own, share, errors == "correlated")
+        if errors == "independent":
+            noise = white(own, share)
+        else:
+            noise = describe(own, share, errors == "correlated", rows[:, where])
         noises.append(noise)
         spread += noise.spread(rows[:, where])
     spread += _level_uncertainty(plan, comparison, z, rows)

@@ -117,7 +117,7 @@ def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, fl
     size = float(np.sum(u * u))
     if not (scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300) and size > 0):
         return scale, 0.0, 1.0
-    noise = describe(np.clip(r, -4 * scale, 4 * scale))
+    noise = describe(np.clip(r, -4 * scale, 4 * scale), rows=np.stack([np.ones_like(u), u]))
     variance = float(noise.spread((u / size)[None])[0, 0])
     return scale, float(np.sqrt(max(variance, 0.0))), max(noise.inflation, 1.0)
 

@@ -16,6 +16,11 @@ from steadyslip.core.results import ReadOnly
 
 SIGNIFICANT = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise
 MAX_ORDER = 40  # largest order of the autoregression; above about a tenth of the samples it is not determined
+LAGS = 20  # of tests for correlation, in samples; a tenth of the samples, if that is less
+MIN_CHANCE = 1e-3  # probability of such a test below which noise is more than white noise plus an autoregression
+FIRST_GUESSES = ((0.5, 0.0), (0.9, 0.7), (0.98, 0.7), (0.0, 0.3))  # decay and average from which they are sought
+LONGEST = 0.05  # correlation over a record that is sought at most: noise cannot be told from a level beyond
+FITTED_RANK = 1e-6  # singular values of derivatives, scaled, below which they are combinations of each other
 TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
 
 
@@ -110,8 +115,74 @@ def _products(residuals: Array, most: int) -> Array:
     return np.array([float(np.sum(r[h:] * r[: len(r) - h])) for h in range(most + 1)])
 
 
-def describe(residuals: Array, free: int = 0, always: bool = False) -> Noise:
-    """Fit an autoregression to residuals, its order by Akaike's criterion; white noise if they are not correlated.
+def portmanteau(values: Array, lags: int) -> float:
+    """Ljung and Box's statistic of values (n,): n (n + 2) Σ r²/(n - lag), with the autocorrelation r."""
+    n, lag = len(values), np.arange(1, lags + 1)
+    return float(n * (n + 2) * np.sum(autocorrelation(values, lags)[1:] ** 2 / (n - lag)))
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """White noise plus a first-order autoregression, as ARMA(1, 1): r(t) - decay r(t-1) = e(t) - average e(t-1).
+
+    Attributes
+    ----------
+    decay, average : float
+    variance : float
+        Of the innovations e.
+    innovations : ndarray (n,)
+    """
+
+    decay: float
+    average: float
+    variance: float
+    innovations: Array
+
+    def covariance(self, n: int) -> Array:
+        """Autocovariance at lags 0, 1, ..., until it is below `TAIL`."""
+        phi, theta = self.decay, self.average
+        first = np.array([1 + theta**2 - 2 * phi * theta, (1 - phi * theta) * (phi - theta)]) / (1 - phi**2)
+        size = abs(first[1] / first[0])
+        least = np.log(TAIL / size) / np.log(abs(phi)) if size > TAIL and phi else 0.0
+        lags = np.arange(min(n, int(least) + 2) - 1)
+        return np.asarray(self.variance * np.concatenate([first[:1], first[1] * phi**lags]))
+
+
+def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
+    """Fit white noise plus a first-order autoregression to residuals (n,) by restricted maximum likelihood.
+
+    `rows`, (p, n), are the derivatives in parameters that were fitted to the record: these took slow noise out of the
+    residuals, which the restricted likelihood (Patterson & Thompson 1971) allows for. What the autoregression was
+    before the first sample is one parameter more.
+    """
+    from scipy.optimize import minimize
+    from scipy.signal import lfilter
+
+    n = len(residuals)
+    space = np.ones((1, n)) if rows is None else rows[np.any(rows != 0, axis=1)]
+    _, sizes, space = np.linalg.svd(space / np.linalg.norm(space, axis=1, keepdims=True), full_matrices=False)
+    stack = np.concatenate([residuals[None], space[sizes > FITTED_RANK * sizes[0]]])
+
+    def left(x: Array) -> tuple[float, float, float, Array, float]:
+        decay, average = LONGEST ** (1 / n) * np.tanh(x)
+        through = lfilter([1.0, -decay], [1.0, -average], stack, axis=1)
+        r, own = through[0], np.concatenate([through[1:], average ** np.arange(n)[None]])
+        square, cross = own @ own.T, own @ r
+        size = float(r @ r) - float(cross @ np.linalg.solve(square, cross))
+        freedom = n - len(own)
+        variance = max(size, 1e-300) / freedom
+        return decay, average, variance, r, freedom * float(np.log(variance)) + float(np.linalg.slogdet(square)[1])
+
+    begin = min((np.arctanh(start) for start in FIRST_GUESSES), key=lambda x: left(x)[4])
+    best = minimize(lambda x: left(x)[4], begin, method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-3}).x
+    decay, average, variance, innovations, _ = left(best)
+    return FirstOrder(decay, average, variance, innovations)
+
+
+def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array | None = None) -> Noise:
+    """Describe the noise in residuals: white, white plus a first-order autoregression, or an autoregression.
+
+    The last, whose order is Akaike's, is for residuals in which the second leaves correlation.
 
     Parameters
     ----------
@@ -119,12 +190,22 @@ def describe(residuals: Array, free: int = 0, always: bool = False) -> Noise:
     free : int
         Number of parameters that were fitted to the record.
     always : bool
-        Take the residuals as correlated even if their lag-1 autocorrelation is not significant.
+        Take the residuals as correlated even if neither lag 1 nor all lags together are significant.
+    rows : ndarray (p, n), optional
+        Derivatives in these parameters.
     """
+    from scipy.stats import chi2
+
     n = len(residuals)
     lag1 = lag_one(residuals)
-    if not always and abs(lag1) < SIGNIFICANT / np.sqrt(n):
+    lags = min(LAGS, n // 10) if np.ptp(residuals) > 0 else 0
+    slow = lags > 2 and chi2.sf(portmanteau(residuals, lags), lags) < MIN_CHANCE
+    if not (always or slow or abs(lag1) > SIGNIFICANT / np.sqrt(n)):
         return white(residuals, free)
+    if lags > 2:
+        simple = first_order(residuals, rows)
+        if chi2.sf(portmanteau(simple.innovations, lags), lags - 2) > MIN_CHANCE:
+            return Noise(lag1, True, np.array([simple.decay]), simple.variance, simple.covariance(n))
     most = min(MAX_ORDER, n // 10)
     gamma = _products(residuals, most) / max(n - free, 1)
     if not gamma[0] > 0:

@@ -121,10 +121,22 @@ def test_few_digits_are_no_limit():
 def test_a_search_that_did_not_converge_has_no_errors(tmp_path):
     fit = lab.stepped()
     rough = replace(fit.search, converged=False)
-    other = fitting.fit_with_errors(fit.plan, fit.comparison, fit.coordinates, rough, "auto", fit.bounds)
+    away = fit.coordinates + np.sqrt(np.diag(fit.covariance))
+    other = fitting.fit_with_errors(fit.plan, fit.comparison, away, rough, "auto", fit.bounds)
     assert not any(one.determined for one in other.estimates)
     assert other.derived == ()
     assert "95 %" not in str(other)
     assert "the numbers are rough, and have no errors" in " ".join(str(other).split())
     other.save(tmp_path / "fit.nc")
     assert str(ss.load_fit(tmp_path / "fit.nc")) == str(other)
+
+
+def test_a_search_that_rounding_kept_from_its_end_has_errors():
+    """A hundredth of a standard deviation from the minimum, where the sum of squares falls no more."""
+    fit = lab.stepped()
+    rough = replace(fit.search, converged=False)
+    away = fit.coordinates + 0.01 * np.sqrt(np.diag(fit.covariance))
+    other = fitting.fit_with_errors(fit.plan, fit.comparison, away, rough, "auto", fit.bounds)
+    assert other.search.converged
+    for one, same in zip(other.estimates, fit.estimates, strict=True):
+        assert one.error == pytest.approx(same.error, rel=0.05)

@@ -33,6 +33,7 @@ from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe, white
 from steadyslip.machine.slider import Slider
 
+ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
 MAX_WIDTHS = 6  # widths of a robust loss that are tried at most
 LEAST_NARROWING = 0.8  # a new width is used if it is below this share of the last; chosen by trial, to save searches
 MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a minimum; a search is within 1e-7 of it
@@ -233,7 +234,12 @@ def fit_with_errors(
     known = prior_information(comparison.space)
     scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
-    if not search.converged:  # curvature beside the minimum says nothing of errors
-        covariance = np.diag(np.full(free, np.inf))
+    if not search.converged:
+        inside = (bounds[0] < z) & (z < bounds[1])
+        step = np.linalg.lstsq(information[np.ix_(inside, inside)], rows[inside] @ residuals)[0]
+        if np.all(np.abs(step) <= ARRIVED * np.sqrt(np.diag(covariance)[inside])):
+            search = replace(search, converged=True)
+        else:  # curvature beside the minimum says nothing of errors
+            covariance = np.diag(np.full(free, np.inf))
     ssq = float(residuals @ residuals)
     return Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)

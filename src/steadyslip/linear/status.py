@@ -45,7 +45,8 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     -------
     str, ndarray of str or xarray.DataArray
         ``stable``, ``unstable`` (ill-posed included), ``no steady sliding`` (lock-up or lift-off), or ``out of range``
-        where numbers leave the range of floating point, so that nothing can be said.
+        where numbers leave the range of floating point, so that nothing can be said. Within rounding of an edge the
+        word is that of one side; `analyze` says so.
 
     Raises
     ------

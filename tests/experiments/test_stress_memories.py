@@ -149,14 +149,14 @@ def test_what_is_known_stays_known_in_a_comparison():
 def test_a_law_that_cannot_follow_is_named_and_the_others_are_compared(monkeypatch):
     from steadyslip.experiments.answers import laws
 
-    whole = laws.fit
+    whole = laws.search_fit
 
     def failing(rig, *args, **options):
         if rig.friction.normal_memory.name == "none":
             raise ss.NotAvailable("cannot follow")
         return whole(rig, *args, **options)
 
-    monkeypatch.setattr(laws, "fit", failing)
+    monkeypatch.setattr(laws, "search_fit", failing)
     found = ss.compare_laws(ss.lab_rig(), pressed(), MEMORIES[:2], starts=9)
     assert found.refused == ("none",)
     assert found.best == "linker-dieterich"

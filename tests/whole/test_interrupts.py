@@ -67,12 +67,12 @@ def test_bootstrap_keeps_the_refits_that_are_done(fitted, monkeypatch):
 
 
 def test_laws_that_are_fitted_are_compared(fitted, monkeypatch):
-    monkeypatch.setattr(laws, "fit", once_more(lambda *_, **__: fitted, 2))
+    monkeypatch.setattr(laws, "search_fit", once_more(lambda *_, **__: fitted, 2))
     found = ss.compare_laws(ss.lab_rig(), fitted.plan.records, ("slip", "aging", "prz"))
     assert set(found.fits) == {"slip", "aging"}
     assert (found.interrupted, found.left_out) == (True, ("prz",))
     assert "stopped before these were fitted: prz" in str(found)
-    monkeypatch.setattr(laws, "fit", once_more(lambda *_, **__: fitted, 1))
+    monkeypatch.setattr(laws, "search_fit", once_more(lambda *_, **__: fitted, 1))
     with pytest.raises(KeyboardInterrupt):
         ss.compare_laws(ss.lab_rig(), fitted.plan.records, ("slip", "aging", "prz"))
 

@@ -63,7 +63,7 @@ def fit_files(
         report = _progress_reporter(said)
         if plan.compared(records):
             found = plan.compare(records, progress=report)
-            return found.fits[found.best], found
+            return found.fits[found.best].with_variants(), found
         return plan.fit(records, progress=report), None
 
 

@@ -16,7 +16,7 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
-from steadyslip.experiments.fitting.fit import fit, refit_from
+from steadyslip.experiments.fitting.fit import refit_from, search_fit
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.result import Fit
@@ -191,7 +191,7 @@ def compare_laws(
 
     def fitted(label: str, share: float) -> None:
         try:
-            fits[label] = fit(rigs[label], many, **_options_of(rig, rigs[label], options), effort=share)
+            fits[label] = search_fit(rigs[label], many, **_options_of(rig, rigs[label], options), effort=share)
         except NotAvailable:
             refused.append(label)
 

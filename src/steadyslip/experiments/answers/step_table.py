@@ -17,7 +17,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.experiments.fitting.estimate import Estimate
-from steadyslip.experiments.fitting.fit import fit as fit_records
+from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.words import short_names
@@ -232,7 +232,7 @@ def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
         for step, part in _parts(record):
             weights = None if plan.weights is None else plan.weights[i][np.isin(record.time, part.time)]
             try:
-                alone = fit_records(plan.rig, part, plan.free, weights=weights, progress=progress, **options)
+                alone = search_fit(plan.rig, part, plan.free, weights=weights, progress=progress, **options)
             except SteadyslipError as error:
                 left_out.append(f"{record.source}: {step} could not be fitted alone: {error}")
                 continue

@@ -140,11 +140,20 @@ def fit(
     NotAvailable
         If the model cannot follow the records from any start.
     """
-    plan = make_plan(
+    return search_fit(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
         trend_axis=trend_axis, offset=offset, lag=lag, initial=initial, loss=loss, width=width, weights=weights,
-        calibrated=calibrated, errors=errors, starts=starts, effort=effort,
-    )  # fmt: skip
+        calibrated=calibrated, errors=errors, starts=starts, effort=effort, threads=threads, progress=progress,
+    ).with_variants()  # fmt: skip
+
+
+def search_fit(
+    rig: Slider, records: Record | Sequence[Record], free: Sequence[str] | None = None, *, errors: str = "auto",
+    starts: int = STARTS, effort: float = 1.0, threads: int | None = None, progress: Progress | None = None,
+    **options: Any,
+) -> Fit:  # fmt: skip
+    """Fit a rig to records as `fit` does, without the short refits that are told beside it."""
+    plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))

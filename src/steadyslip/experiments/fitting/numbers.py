@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -161,7 +161,12 @@ class FitNumbers(ReadOnly):
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
         """Short fits with other laws, a lag or a trend, the best first; empty if residuals have no structure."""
-        return remedies(self.plan, self.ssq) if self.whiteness.p < STRUCTURE else ()
+        return remedies(self.plan, self.ssq, self.values) if self.whiteness.p < STRUCTURE else ()
+
+    def with_variants(self) -> Self:
+        """The same fit, with the short refits computed that its text tells, so that printing searches nothing."""
+        _ = self.as_measured, self.as_ramps, self.remedies
+        return self
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import can_be_free
-from steadyslip.experiments.fitting.search import find_minimum
+from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
+from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.whiteness import whiteness
 from steadyslip.laws.friction import FrictionLaw
@@ -23,6 +25,20 @@ STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass 
 ROUNDS = 2  # changes that are tried on top of each other
 TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3  # of each trial; on made records they end where the default ones do
 MAX_TREND = 2  # orders of a trend that are tried
+
+
+NESTED = {"lag", "trend"}
+"""Unknowns without effect at 0, so that a fit with them begins at the minimum without."""
+LAGS = (0.0, -0.3, 0.3, -1.0, 1.0, -3.0, 3.0)  # from which a lag is searched, in its natural sizes; chosen by trial
+
+
+@dataclass(frozen=True)
+class FoundMinimum:
+    """Coordinates (p,) of the least sum of squares of a comparison."""
+
+    comparison: Comparison
+    coordinates: Array
+    ssq: float
 
 
 @dataclass(frozen=True)
@@ -50,7 +66,7 @@ class Remedy:
     values: dict[str, float]
 
 
-def remedies(plan: Plan, ssq: float) -> tuple[Remedy, ...]:
+def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remedy, ...]:
     """Minima with changes of the plan, the best first; up to two changes on top of each other.
 
     The search for them ends once one leaves no structure. Each trial is short: a longer one may find a better minimum.
@@ -60,16 +76,18 @@ def remedies(plan: Plan, ssq: float) -> tuple[Remedy, ...]:
     plan : Plan
     ssq : float
         Sum of squares of the fit of the plan itself.
+    values : mapping of str to float
+        Values of that fit, by name of the unknown; a lag and a trend are searched from there.
     """
     found: list[Remedy] = []
-    base, known, size = plan, {_key(plan)}, len(plan.space())
+    base, known, size = plan, {""}, len(plan.space())
     for _ in range(ROUNDS):
         tried: list[tuple[Remedy, Plan]] = []
         for own in _changed(base):
-            if _key(own) in known:
+            if _choice(plan, own) in known:
                 continue
-            known.add(_key(own))
-            if (one := _fitted(own, plan, ssq, size)) is not None:
+            known.add(_choice(plan, own))
+            if (one := _fitted(own, plan, ssq, size, values)) is not None:
                 tried.append((one, own))
             if one is not None and one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE:
                 return _ranked([*found, one, *(other for other, _ in tried if other is not one)])
@@ -77,16 +95,12 @@ def remedies(plan: Plan, ssq: float) -> tuple[Remedy, ...]:
         best = max(tried, key=lambda pair: pair[0].gain, default=None)
         if best is None or best[0].gain <= max([STRONG_EVIDENCE, *(one.gain for one in found if one is not best[0])]):
             break
-        base = best[1]
+        base, values = best[1], best[0].values
     return _ranked(found)
 
 
 def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
     return tuple(sorted(found, key=lambda one: -one.gain))
-
-
-def _key(plan: Plan) -> tuple[Any, ...]:
-    return plan.rig.friction, plan.lag, plan.trend
 
 
 def _changed(plan: Plan) -> Iterator[Plan]:
@@ -116,19 +130,37 @@ def _with(plan: Plan, words: Sequence[str]) -> Plan:
     return replace(plan, rig=rig, free=free, separate=tuple(name for name in plan.separate if name in free))
 
 
-def _fitted(own: Plan, plan: Plan, ssq: float, size: int) -> Remedy | None:
+def _fitted(own: Plan, plan: Plan, ssq: float, size: int, values: Mapping[str, float]) -> Remedy | None:
     space = own.space()
-    budget = Budget.of_fit(sum(map(len, own.records)), len(space), TRIAL_EFFORT)
+    effort = Effort(budget=Budget.of_fit(sum(map(len, own.records)), len(space), TRIAL_EFFORT))
     try:
-        best = find_minimum(own, TRIAL_STARTS, Effort(budget=budget), None)
+        if {one.parameter.partition(".")[0] for one in space.unknowns if one.name not in values} <= NESTED:
+            best: FoundMinimum | SearchResult = _from_minimum(own, effort, values)
+        else:
+            best = find_minimum(own, TRIAL_STARTS, effort, None)
     except NotAvailable:
         return None
     r = best.comparison.residuals(best.coordinates[None])[0][0]
     parts = [r[where] for where in best.comparison.slices]
     worth = sum(len(part) / max(describe(part).inflation, 1.0) for part in parts)
     gain = worth * float(np.log(ssq / best.ssq)) - (len(space) - size) * float(np.log(max(worth, 2.0)))
-    values = dict(zip((one.name for one in space.unknowns), map(float, space.values(best.coordinates)), strict=True))
-    return Remedy(_choice(plan, own), best.ssq, gain, whiteness(parts).p, values)
+    ends = dict(zip((one.name for one in space.unknowns), map(float, space.values(best.coordinates)), strict=True))
+    return Remedy(_choice(plan, own), best.ssq, gain, whiteness(parts).p, ends)
+
+
+def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float]) -> FoundMinimum:
+    """Minimum of a plan with a lag or a trend more, from several values of those and the minimum without."""
+    space, comparison = own.space(), own.comparison(effort)
+    begin = space.coordinates(np.array([values.get(one.name, 0.0) for one in space.unknowns]))
+    added = np.array([one.parameter == "lag" and one.name not in values for one in space.unknowns])
+    z = begin + np.outer(LAGS if np.any(added) else [0.0], added)
+    low, high = np.transpose([one.bounds for one in space.unknowns])
+    stop = effort.budget.part(np.inf)
+    ends = minimise(lambda x, _: comparison.residuals(x), z, low, high, most=MAX_ITERATIONS, stop=stop)
+    ends = first_computable(comparison, ends.sorted())
+    if not np.isfinite(ends.ssq[0]):
+        raise NotAvailable("the model cannot follow these records")
+    return FoundMinimum(comparison, ends.coordinates[0], float(ends.ssq[0]))
 
 
 def _choice(plan: Plan, other: Plan) -> str:

@@ -79,9 +79,9 @@ def short_names(names: tuple[str, ...]) -> list[str]:
     """Dotted names without their middle parts, where these remain unique."""
     found = []
     for name in names:
-        first, *_, last = name.split(".")
+        first, last = name.split(".")[0], name.split(".")[-1]
         whole = first in ("protocol", "step", "start", "initial") or ".states." in name
-        brief = name if whole else f"{first}.{last}"
+        brief = name if whole or first == last else f"{first}.{last}"
         found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
     return found
 

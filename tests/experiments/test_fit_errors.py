@@ -100,6 +100,16 @@ def test_slow_noise_that_parameters_took_up_is_known(memory):
     assert 0.9 < np.sqrt(np.mean(np.square(off))) < 1.1
 
 
+def test_white_noise_beside_an_autoregression_is_one_too():
+    """Its coefficients and its covariance are of the same noise: the equations of Yule and Walker."""
+    chance = np.random.default_rng(5)
+    noise = describe(correlated_noise(4000, 0.9, 4) + 0.7 * chance.standard_normal(4000))
+    order, own = len(noise.coefficients), noise.covariance
+    assert order > 5
+    np.testing.assert_allclose(toeplitz(own[:order]) @ noise.coefficients, own[1 : order + 1], atol=2e-3 * own[0])
+    assert own[0] - noise.coefficients @ own[1 : order + 1] == pytest.approx(noise.innovation, rel=2e-3)
+
+
 def test_an_autoregression_is_recovered():
     noise = describe(correlated_noise(20000, 0.7, 1))
     assert noise.coefficients[0] == pytest.approx(0.7, abs=0.05)

@@ -138,6 +138,13 @@ class FirstOrder:
     variance: float
     innovations: Array
 
+    @property
+    def coefficients(self) -> Array:
+        """Coefficients of the autoregression that is the same noise, until they are below `TAIL`."""
+        first, theta = self.decay - self.average, self.average
+        count = np.log(TAIL / abs(first)) / np.log(abs(theta)) if abs(first) > TAIL and theta else 0.0
+        return np.asarray(first * theta ** np.arange(min(int(count) + 1, len(self.innovations) - 1)))
+
     def covariance(self, n: int) -> Array:
         """Autocovariance at lags 0, 1, ..., until it is below `TAIL`."""
         phi, theta = self.decay, self.average
@@ -205,7 +212,7 @@ def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array 
     if lags > 2:
         simple = first_order(residuals, rows)
         if chi2.sf(portmanteau(simple.innovations, lags), lags - 2) > MIN_CHANCE:
-            return Noise(lag1, True, np.array([simple.decay]), simple.variance, simple.covariance(n))
+            return Noise(lag1, True, simple.coefficients, simple.variance, simple.covariance(n))
     most = min(MAX_ORDER, n // 10)
     gamma = _products(residuals, most) / max(n - free, 1)
     if not gamma[0] > 0:

@@ -337,3 +337,31 @@ def test_the_larger_of_two_is_a_piecewise_function(written):
     }
     assert np.allclose(v["max"], v["by hand"], rtol=1e-9, atol=0)
     assert np.ptp(v["max"]) > 1e-3 * V0
+
+
+def test_numbers_in_a_law_need_not_be_symbols(monkeypatch):
+    """Rates divided by a float, which are as those with a parameter."""
+    monkeypatch.setattr(ss.laws.FrictionLaw, "registry", dict(BEFORE[0]))
+
+    class Law(ss.laws.FrictionLaw, name="with-floats"):
+        distance: float = ss.laws.parameter("m", positive, "slip distance")
+
+        def memory(self):
+            return ("age",)
+
+        def strength(self, v, sigma, memory, tau):
+            return sigma * (0.6 + 0.01 * sp.log(v / V0) + 0.02 * memory[0])
+
+        def rates(self, v, sigma, memory, tau):
+            return (-v / self.distance * (memory[0] + sp.log(v / V0)),)
+
+        def steady_memory(self, v, sigma):
+            return (-sp.log(v / V0),)
+
+    class Other(Law, name="with-floats-alone"):
+        def rates(self, v, sigma, memory, tau):
+            return (-(v / 1e-5) * (memory[0] + sp.log(v / V0)),)
+
+    one, other = (rig(friction=law(distance=1e-5)) for law in (Law, Other))
+    assert ss.growth_rate(other) == pytest.approx(ss.growth_rate(one), rel=1e-12)
+    assert ss.analyze(other).stable == ss.analyze(one).stable

@@ -114,7 +114,7 @@ def test_edges_of_delays_are_those_of_the_discretised_equation():
         c, _ = some(seed)
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 2.0  # so that it is often stable
         c[1] *= 4.0
-        edges = delay_set(c[0], c[1])
+        edges = delay_set(c[0], c[1], 1)
         ends = edges.edges[edges.edges < 5.0]
         if not len(ends):
             continue
@@ -137,7 +137,7 @@ def test_windows_of_what_enters_linearly_are_those_of_counting():
         q = q[:, : c.shape[1]] if q.shape[1] >= c.shape[1] else np.pad(q, ((0, 0), (0, c.shape[1] - q.shape[1])))
         q[:, -1] = 0.0
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 3.0
-        found = linear_windows(c, q, h, 1e-3, 1e3)
+        found = linear_windows(c, q, h, 1e-3, 1e3, 1)
         theta = np.geomspace(2e-3, 5e2, 60)
         stable = quasi.count_right(c + theta[:, None, None] * q, h) == 0
         if found is None:
@@ -158,13 +158,13 @@ def test_stable_values_of_a_delay_among_others_are_those_of_counting():
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 2.0
         late = np.arange(terms) >= terms - 1 - int(random.integers(0, terms - 2))
         h = np.where(late, random.choice([0.0, 0.5], terms), h)
-        found = delay_set_among(c, h, late)
+        found = delay_set_among(c, h, late, 1)
         grid = np.geomspace(1e-2, 20.0, 40)
         stable = np.array([quasi.count_right(c, h + late * one) == 0 for one in grid])
         inside = np.any((found.intervals[:, :1] < grid) & (grid < found.intervals[:, 1:]), axis=0)
         assert np.array_equal(inside, stable), seed
         changes += 0 < stable.sum() < len(stable)
-        alone, same = delay_set_among(c[:2], h[:2] * 0, np.array([False, True])), delay_set(c[0], c[1])
+        alone, same = delay_set_among(c[:2], h[:2] * 0, np.array([False, True]), 1), delay_set(c[0], c[1], 1)
         np.testing.assert_allclose(alone.intervals, same.intervals, rtol=1e-9)
     assert changes > 3
 

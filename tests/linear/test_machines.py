@@ -1,6 +1,7 @@
 """Linear stability of machines: theory 11's values, and routes that share nothing with the package's."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -161,6 +162,53 @@ def test_bristles_without_damping_need_a_mass_in_machines_too():
     assert ss.growth_rate(machine, masses)[0] == pytest.approx(
         ss.growth_rate(machine.with_values(dict.fromkeys(masses, 0.0))), rel=1e-9
     )
+
+
+LEVEL = ss.laws.ConstantNormalStress(preload=1.0)
+BARE = ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.45, v_stribeck=1.0, bristle_stiffness=20.0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_arrays_in_which_inertias_and_dampings_vanish_are_as_single_machines(seed):
+    """Of a body without contact that has neither, two powers of s go; whatever the others have."""
+    chance = np.random.default_rng(seed)
+    names = "abc"[: chance.integers(2, 4)]
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.35, v_stribeck=1.0, viscous=0.5)
+    machine = ss.Machine(
+        bodies={name: ss.machine.SlidingBody(mass=1.0) for name in names},
+        links={
+            one + other: ss.machine.Spring(between=(one, other), stiffness=chance.uniform(1, 3), damping=0.3)
+            for one, other in pairwise(names)
+        },
+        contacts={
+            name: surface(name, chance.choice([law, BARE])) for name in names if chance.random() < 0.5 or name == "a"
+        },
+        drive=ss.machine.PositionPD(velocity=1.0, body=names[-1], kp=1.0),
+    )
+    vanishing = [f"bodies.{name}.mass" for name in names] + [f"links.{name}.damping" for name in machine.links]
+    cases = chance.random((len(vanishing), 16)) < 0.4
+    values = {name: np.where(own, 0.0, 1.0) for name, own in zip(vanishing, cases, strict=True)}
+    growth, words = ss.growth_rate(machine, values), ss.stability(machine, values)
+    for i in range(16):
+        single = machine.with_values({name: float(own[i]) for name, own in values.items()})
+        assert ss.stability(single) == words[i]
+        assert ss.growth_rate(single) == pytest.approx(growth[i], rel=1e-7, abs=1e-12)
+
+
+def test_a_body_on_a_spring_does_not_make_friction_rise():
+    """The power of s that a body without anything misses is not that which undamped bristles miss; delays alike."""
+    body, drive = ss.machine.SlidingBody(), ss.machine.PositionPD(velocity=1.0, body="a", kp=20.0)
+    alone = ss.Machine(bodies={"a": body}, links={}, contacts={"a": surface("a", BARE)}, drive=drive)
+    hung = {"on": ss.machine.Spring(between=("a", "b"), stiffness=2.0)}
+    for one in (alone, replace(alone, bodies={"a": body, "b": body}, links=hung)):
+        assert ss.growth_rate(one) == np.inf
+        assert not ss.analyze(one).stable
+        assert np.all(np.isnan(ss.stable_values(one, "drive.kp")))
+    late = ss.Slider(
+        friction=BARE, contact=LEVEL, stiffness=20.0, drive=ss.machine.PD(velocity=1.0, kp=1.0, delay=0.05)
+    )
+    assert ss.growth_rate(late) == np.inf
+    assert np.all(np.isnan(ss.stable_stiffness(late)))
 
 
 def test_what_cancels_in_the_structure_cancels_exactly():

@@ -140,7 +140,7 @@ def linear_set(
     p, q, h, value = found
     if late:
         low, high = (1 / APART, APART) if reach is None else (reach[0] / value, reach[1] / value)
-        windows = linear_windows(p, q, h, min(low, 1 / APART), max(high, APART))
+        windows = linear_windows(p, q, h, min(low, 1 / APART), max(high, APART), int(spare_powers(point)))
     else:
         windows = _with_far_edges_removed(stable_set(p[0], q[0], spare_powers(point)))
     return (
@@ -189,12 +189,13 @@ def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
     if not np.all(np.isfinite(c)):
         return None
     if list(delays) == [0, symbol]:
-        return delay_set(c[0], c[1])
+        return delay_set(c[0], c[1], int(spare_powers(point)))
     late = np.array([sp.sympify(delay).has(symbol) for delay in delays])
     if any(sp.diff(delay, symbol) != 1 for delay, own in zip(delays, late, strict=True) if own):
         return None
     others = h - late * float(point.named()[name_of(point, symbol)])
-    return delay_set_among(c, np.where(np.abs(others) < 1e-12 * np.max(h), 0.0, others), late)
+    others = np.where(np.abs(others) < 1e-12 * np.max(h), 0.0, others)
+    return delay_set_among(c, others, late, int(spare_powers(point)))
 
 
 def name_of(point: OperatingPoint, symbol: sp.Symbol) -> str:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.linear.argument import bound_on_axis
-from steadyslip.linear.polynomials import StableSet
+from steadyslip.linear.crossing import is_ill_posed
+from steadyslip.linear.polynomials import StableSet, columns
 from steadyslip.linear.quasipolynomial import (
     count_right,
     crossing_delays,
@@ -42,10 +43,10 @@ def empty_set() -> StableSet:
 
 
 @quietly
-def delay_set(p: Array, q: Array) -> StableSet:
-    """Stable set of the delay h > 0 (s) of p(s) + q(s) exp(−sh), for one rig."""
+def delay_set(p: Array, q: Array, spare: int) -> StableSet:
+    """Stable set of the delay h > 0 (s) of p(s) + q(s) exp(−sh), for one rig; `spare` highest powers may be missing."""
     top = int(np.flatnonzero((p != 0) | (q != 0))[-1])
-    if abs(q[top]) >= abs(p[top]) or p[0] + q[0] == 0 or p[top] <= 0 or top < len(p) - 2:
+    if abs(q[top]) >= abs(p[top]) or p[0] + q[0] == 0 or p[top] <= 0 or top < len(p) - 1 - spare:
         return empty_set()
     delays, frequencies, directions = crossing_delays(p, q)
     right = np.sum(roots((p + q)[None])[0].real > 0) + np.concatenate([[0], np.cumsum(2 * directions)])
@@ -53,15 +54,20 @@ def delay_set(p: Array, q: Array) -> StableSet:
 
 
 @quietly
-def delay_set_among(c: Array, h: Array, late: NDArray[np.bool_]) -> StableSet | None:
+def delay_set_among(c: Array, h: Array, late: NDArray[np.bool_], spare: int) -> StableSet | None:
     """Stable set of one delay θ > 0 (s) of a rig with several; None where its edges are too many to separate.
 
     `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `late` (m,) is True for
-    the terms that θ delays too.
+    the terms that θ delays too. The `spare` highest powers may be missing.
     """
     (scaled,), (others,), (rate,) = nondimensional(c[None], h[None])
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
-    if delayed_terms_dominate(scaled[None])[0] or np.sum(c[:, 0]) == 0 or c[0, top] <= 0 or top < c.shape[1] - 2:
+    if (
+        delayed_terms_dominate(scaled[None])[0]
+        or np.sum(c[:, 0]) == 0
+        or c[0, top] <= 0
+        or top < c.shape[1] - 1 - spare
+    ):
         return empty_set()
     start = int(count_right(scaled, others))
     parts = [(scaled[which], others[which]) for which in (~late, late)]
@@ -87,12 +93,13 @@ def _set_of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -
 
 
 @quietly
-def linear_windows(p: Array, q: Array, h: Array, low: float, high: float) -> StableSet | None:
+def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, spare: int) -> StableSet | None:
     """Stable set of θ in P + θ Q between `low` and `high`; the rig's own value is θ = 1.
 
-    P and Q are (m, n+1), with delays h (m,). The range is cut where there may be windows without end, at the same
-    places whatever the range. An interval that begins at an uncut `low` is given as from zero, one that ends at an
-    uncut `high` as to infinity. None where the delay is so long for the rig itself that its windows are too many.
+    P and Q are (m, n+1), with delays h (m,); the `spare` highest powers may be missing. The range is cut where
+    there may be windows without end, at the same places whatever the range. An interval that begins at an uncut
+    `low` is given as from zero, one that ends at an uncut `high` as to infinity. None where the delay is so long
+    for the rig itself that its windows are too many.
     """
     scale = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(scale[0]), float(scale[-1])
@@ -105,7 +112,7 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float) -> Sta
     above, below = np.flatnonzero((bound > most) & (scale > 1)), np.flatnonzero((bound > most) & (scale < 1))
     end = high if not above.size else float(scale[above[0] - 1])
     start = low if not below.size else float(scale[below[-1] + 1])
-    found = _windows(p, q, h, start, end, min(most, float(np.max(bound))))
+    found = _windows(p, q, h, start, end, min(most, float(np.max(bound))), spare)
     if found is None:
         return None
     cut = [0.0 if start == low else start, np.inf if end == high else end]
@@ -113,7 +120,7 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float) -> Sta
     return StableSet(intervals, found.edges, found.frequencies, found.changes)
 
 
-def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float) -> StableSet | None:
+def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float, spare: int) -> StableSet | None:
     candidates = _candidates(p, q, h, low, high, fast)
     if candidates is None:
         return None
@@ -121,7 +128,8 @@ def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float)
     ends = np.concatenate([[low], theta, [high]])
     probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours nothing crosses the axis
     count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay a count takes no time
-    return _set_of_cells(theta, beta, (count(p, q, h, theta, beta, probes) == 0) & _is_well_posed(p, q, probes))
+    well_posed = ~is_ill_posed(columns(p[0] + probes[:, None] * q[0]), spare)
+    return _set_of_cells(theta, beta, (count(p, q, h, theta, beta, probes) == 0) & well_posed)
 
 
 def _count_each(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
@@ -151,12 +159,6 @@ def _count_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array,
         else:
             counted[a : b + 1] = _count_each(p, q, h, theta, beta, probes[a : b + 1])
     return counted
-
-
-def _is_well_posed(p: Array, q: Array, theta: Array) -> NDArray[np.bool_]:
-    """True where the undelayed polynomial has a positive highest coefficient, or a zero one and a positive second."""
-    c = p[0] + theta[:, None] * q[0]
-    return np.asarray(np.where(c[:, -1] == 0, c[:, -2] > 0, c[:, -1] > 0))
 
 
 def _frequency_bound(p: Array, q: Array, theta: Array) -> Array:

@@ -39,8 +39,8 @@ class Placeholders:
         self._known: dict[sp.Expr, sp.Symbol] = {}
 
     def symbol_for(self, expression: sp.Expr) -> sp.Expr:
-        """New placeholder of an expression; numbers are returned unchanged."""
-        if expression.is_Number:
+        """New placeholder of an expression; whole numbers are returned unchanged."""
+        if expression.is_Integer:
             return expression
         symbol = inner_symbol(f"e{len(self.names)}")
         self.names[symbol] = expression

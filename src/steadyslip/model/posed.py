@@ -9,9 +9,11 @@ from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.kinematics import kinematics
+from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import arrays_of, slip_rates, weights
 
+_UNDETERMINED = 1e-9  # share of the other dampings below which one determines no velocity
 MOST_NOISE = 1e-2  # change of ln v by rounding of forces, above which it affects the motion; chosen by trial
 
 
@@ -63,21 +65,81 @@ def balance_jacobian(model: Model) -> list[list[sp.Expr]]:
 
 def missing_inertias(model: Model) -> tuple[int, list[sp.Expr]]:
     """Number of coordinates that have neither inertia nor contact, and the inertias (which may be 0) of others."""
-    moving = kinematics(model)
-    free = sum(not one.inertial and moving.contact_at(one) is None for one in model.coordinates)
-    return free, [one.inertia for one in model.coordinates if one.inertial]
+    free = ~_of_contacts(model) & ~_inertial(model)
+    return int(np.sum(free)), [one.inertia for one in model.coordinates if one.inertial]
 
 
 @question
 def spare_powers(point: OperatingPoint) -> np.ndarray:
-    """Number of highest powers of s that the characteristic equation may lose, (...): one for each missing inertia.
+    """Number of highest powers of s that the characteristic equation may lose, (...): by inertias and dampings of 0.
 
-    Without inertia, friction or dampings must still determine the velocity at a contact; of a body without contact,
-    springs may determine the place.
+    A coordinate with inertia counts two powers. Those without count as many as contacts, whose friction is supposed to
+    rise with velocity, and dampings determine of their velocities; springs determine the rest. If more are lost,
+    friction does not rise at once, and the equations are ill-posed.
     """
-    free, inertias = missing_inertias(point.model)
-    values = point.evaluate(point.model.function(inertias))
-    return np.asarray(sum((np.asarray(one) == 0 for one in values), start=np.full(point.shape, free)))
+    model, inertial = point.model, _inertial(point.model)
+    light = np.broadcast_to(~inertial, (*point.shape, len(inertial))).copy()
+    masses = point.evaluate(model.function([one.inertia for one in model.coordinates if one.inertial]))
+    for i, mass in zip(np.flatnonzero(inertial), masses, strict=True):
+        light[..., i] = np.asarray(mass) == 0
+    powers = np.sum(np.where(light, 1, 2), axis=-1)
+    if np.any(alone := np.any(light & ~_of_contacts(model), axis=-1)):
+        values = [np.broadcast_to(one, point.shape)[alone] for one in point.evaluate(_dissipation(model))]
+        powers = np.array(powers)
+        powers[alone] = np.sum(~light[alone], axis=-1) * 2 + _determined(np.array(values), light[alone])
+    return np.asarray(2 * np.sum(inertial) + _determined_in_general(model) - powers)
+
+
+def _inertial(model: Model) -> np.ndarray:
+    return np.array([one.inertial for one in model.coordinates])
+
+
+@question
+def _of_contacts(model: Model) -> np.ndarray:
+    return np.array([kinematics(model).contact_at(one) is not None for one in model.coordinates])
+
+
+@question
+def _dissipation_entries(model: Model) -> list[sp.Expr]:
+    """Matrix of dampings (n, n) between the coordinates of a machine, then the slip rate of each contact by velocity.
+
+    By rows. Dampings are without friction, which is an unknown of its own.
+    """
+    linear, moving = linearise(model), [one.velocity for one in model.coordinates]
+    slips = [sp.sympify(model.definitions.get(one.velocity, one.velocity)) for one in model.contacts]
+    dampings = [-linear.rows[v][other] for v in moving for other in moving]
+    return dampings + [model.at_steady(derivative(slip, v)) for slip in slips for v in moving]
+
+
+@question
+def _dissipation(model: Model) -> ArrayFunction:
+    return model.function(_dissipation_entries(model))
+
+
+@question
+def _determined_in_general(model: Model) -> int:
+    """Number of velocities of coordinates without inertia that friction and dampings determine, for most values."""
+    light = ~_inertial(model)
+    if not np.any(light & ~_of_contacts(model)):
+        return int(np.sum(light))
+    chance = np.random.default_rng(0)
+    entries = _dissipation_entries(model)
+    some = {symbol: sp.Float(chance.uniform(1, 2)) for symbol in sorted(sp.Tuple(*entries).free_symbols, key=str)}
+    values = np.array([float(e.xreplace(some)) for e in entries])
+    return int(_determined(values[:, None], light[None])[0])
+
+
+def _determined(values: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Rank (rigs,) of dampings and contacts on the coordinates `light` (rigs, n); values (entries, rigs)."""
+    n = light.shape[-1]
+    table = np.moveaxis(values.reshape(-1, n, len(light)), -1, 0) * light[:, None, :]
+    dampings, slips = table[:, :n] * light[..., None], table[:, n:]
+    size = np.sqrt(np.abs(np.diagonal(dampings, axis1=1, axis2=2)))
+    size = np.where(size > 0, size, 1.0)
+    lengths = np.linalg.norm(slips, axis=-1, keepdims=True)
+    slips = slips / np.where(lengths > 0, lengths, 1.0)
+    whole = dampings / (size[:, :, None] * size[:, None, :]) + np.swapaxes(slips, 1, 2) @ slips
+    return np.asarray(np.linalg.matrix_rank(whole, tol=_UNDETERMINED))
 
 
 @question

@@ -104,8 +104,8 @@ def _why_none_in_general(analysis: Findings) -> str:
 
 
 ILL_POSED = (
-    "the equations are ill-posed: friction, directly or by way of the normal stress, falls at once by more than "
-    "mass, direct effect and dampings provide, so any small lag grows at once"
+    "the equations are ill-posed: mass, direct effect and dampings do not outweigh what friction, directly or by way "
+    "of the normal stress, may fall by at once, so any small lag grows at once"
 )
 """Reason given for a slider that is ill-posed without a delay, whatever the term that causes it."""
 

@@ -149,8 +149,8 @@ def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
 
 
 PHRASES = {
-    "are ill-posed": "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls "
-    "at once by more than mass, direct effect and dampings provide, so any small lag grows at once",
+    "are ill-posed": "the equations are ill-posed: somewhere mass, direct effect and dampings do not outweigh what "
+    "friction, directly or by way of the normal force, may fall by at once, so any small lag grows at once",
     "on edge": ON_EDGE,
     "dies out": "every small disturbance dies out",
     "nearest": "the nearest edge is that of {name}: {side} {value} {beyond}",

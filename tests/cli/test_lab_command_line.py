@@ -63,7 +63,7 @@ def test_from_estimates_to_a_verdict(fitted):
     ("arguments", "messages"),
     [
         (["nothing.csv"], ["'nothing.csv': no such file"]),
-        ([BASALT, "-o", "fit.doc"], ["allowed endings are .nc, .html, .json, .png, .svg, .pdf"]),
+        ([BASALT, "-o", "fit.doc"], ["allowed endings are .nc, .html, .json, .csv, .tex, .png, .svg, .pdf"]),
         ([BASALT, "-o", "no/such/folder/fit.nc"], ["there is no folder 'no/such/folder'"]),
         (["examples/fits/basalt.toml"], ["no record given"]),
         ([BASALT, "examples/fits/basalt.toml", "examples/fits/sepiolite.toml"], ["allowed: one"]),

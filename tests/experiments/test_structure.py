@@ -118,6 +118,14 @@ def test_few_digits_are_no_limit():
     assert not np.any(clipped(np.ones(50)))
 
 
+def test_steady_sliding_without_noise_is_no_limit():
+    """Its samples are equal: before the first step, and where it is the fastest or the slowest, between steps."""
+    friction = stepped()["friction"]
+    held = np.concatenate([np.full(50, friction[0]), friction, friction[-1] + np.zeros(50), friction[::-1]])
+    for values in (friction, held):
+        assert not np.any(clipped(values) | clipped(-values))
+
+
 def test_a_search_that_did_not_converge_has_no_errors(tmp_path):
     fit = lab.stepped()
     rough = replace(fit.search, converged=False)
@@ -140,3 +148,12 @@ def test_a_search_that_rounding_kept_from_its_end_has_errors():
     assert other.search.converged
     for one, same in zip(other.estimates, fit.estimates, strict=True):
         assert one.error == pytest.approx(same.error, rel=0.05)
+
+
+def test_the_test_of_structure_does_not_make_any():
+    """White residuals are rarely told as structure, and a hum of the same size mostly."""
+    chance = np.random.default_rng(3)
+    noises = [chance.standard_normal(300) for _ in range(200)]
+    assert np.mean([whiteness([one]).p < 1e-3 for one in noises]) <= 0.02
+    hum = 0.8 * np.sin(np.arange(300) / 3.0)
+    assert np.median([whiteness([one + hum]).p for one in noises[:20]]) < 1e-3

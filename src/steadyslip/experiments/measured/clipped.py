@@ -12,6 +12,7 @@ from steadyslip.experiments.measured.record import Record
 SHORTEST = 3  # samples of a run
 CHANCE = 1e-6  # of so long a run in a record whose samples are as often equal to their neighbour as the others of it
 GAP = 5  # samples between runs of one peak: noise brings the channel back below its limit for a moment
+STILL = 1e-3  # share of the median change from sample to sample below which a channel stands still
 CLIPPED = "at a limit of the channel"
 
 
@@ -42,6 +43,15 @@ def clipped(values: Array) -> Array:
     longest = 1 + np.log(CHANCE / len(values)) / np.log(share) if share else 0.0
     for peak in np.split(top, np.flatnonzero(np.diff(top) > GAP) + 1):
         runs = np.split(peak, np.flatnonzero(np.diff(peak) > 1) + 1)
-        if max(map(len, runs)) >= max(longest, SHORTEST):
+        if max(map(len, runs)) >= max(longest, SHORTEST) and _is_cut_off(values, peak):
             found[peak[0] : peak[-1] + 1] = True
     return found
+
+
+def _is_cut_off(values: Array, peak: Array) -> bool:
+    """True if the channel came to a peak and left it as fast as it moves elsewhere; steady sliding it approaches."""
+    if peak[0] == 0 or peak[-1] == len(values) - 1:
+        return False
+    moved = np.abs(np.diff(values))
+    least = STILL * np.median(moved[moved > 0])
+    return bool(min(moved[peak[0] - 1], moved[peak[-1]]) > least)

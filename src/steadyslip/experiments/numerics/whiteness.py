@@ -41,7 +41,7 @@ def whiteness(residuals: Iterable[Array]) -> Whiteness:
     for own in residuals:
         lags = min(LAGS, len(own) // 10)
         if lags > 1 and np.ptp(own) > 0:
-            left = first_order(own).innovations
+            left = min((own, first_order(own).innovations), key=lambda one: portmanteau(one, lags))
             statistic += portmanteau(left, lags) + portmanteau(left**2, lags)
             degrees += 2 * lags - 2  # two coefficients were fitted
     return Whiteness(statistic, degrees)

@@ -16,7 +16,7 @@ import numpy as np
 from quick import QUICK, parsed
 
 import steadyslip as ss
-from delays import some, spectral, winding
+from delays import apart, some, spectral, winding
 from machine_onsets import compared
 from machines import at_random, same_block, three_bodies
 from moving_machines import slopes_of_motion
@@ -129,8 +129,10 @@ def delays(count, first):
         if np.min(np.abs(found.real[:12])) < 1e-6:
             unclear += 1
             continue
-        good = int(quasi.count_right(c, h)) == np.sum(found.real > 0)
-        good &= all(np.min(np.abs(found - s)) < 1e-6 * max(1.0, abs(s)) for s in quasi.rightmost(c, h, 3))
+        good = int(quasi.count_right(c, h, apart(len(c)))) == np.sum(found.real > 0)
+        good &= all(
+            np.min(np.abs(found - s)) < 1e-6 * max(1.0, abs(s)) for s in quasi.rightmost(c, h, apart(len(c)), 3)
+        )
         right, wrong = right + good, wrong + (not good)
         if not good:
             print(f"equation {seed}")

@@ -42,3 +42,8 @@ def winding(matrix, fast):
     far = np.geomspace(fast, 1e3 * fast, 400)  # where derivatives are delayed, size and turn go up and down for good
     degree = round(np.polyfit(np.log(far), [np.log(abs(np.linalg.det(matrix(1j * w)))) for w in far], 1)[0])
     return round((degree * np.pi / 2 - (turns[-1] - turns[0])) / np.pi)
+
+
+def apart(terms):
+    """Which delays act in each of so many terms of a sum: none in the first, one of its own in every other."""
+    return np.eye(terms, dtype=bool)[:, 1:]

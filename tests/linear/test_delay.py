@@ -9,9 +9,9 @@ from scipy.special import lambertw
 
 import steadyslip as ss
 from command import run
-from delays import some, spectral, winding
+from delays import apart, some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
-from steadyslip.linear import quasipolynomial as quasi, windows
+from steadyslip.linear import neutral, quasipolynomial as quasi, windows
 from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.waves import Waves
@@ -57,7 +57,7 @@ def test_a_first_order_loop_bears_a_quarter_of_its_turn(gain):
     tau = 0.8 / gain
     found = ss.eigenvalues(servo(gain, tau, mass=0.0))
     assert found[0] == pytest.approx(lambertw(-gain * tau, 0) / tau, rel=1e-12)
-    several = quasi.rightmost(np.array([[0.0, 1.0], [gain, 0.0]]), np.array([0.0, tau]), 7)
+    several = quasi.rightmost(np.array([[0.0, 1.0], [gain, 0.0]]), np.array([0.0, tau]), apart(2), 7)
     expected = [lambertw(-gain * tau, k) / tau for k in range(-4, 4)]
     for one in several:
         assert np.min(np.abs(one - expected)) < 1e-10 * abs(one)
@@ -101,9 +101,9 @@ def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms
         found = spectral(c, h)
         if np.min(np.abs(found.real[:12])) < 1e-6:
             continue
-        assert int(quasi.count_right(c, h)) == np.sum(found.real > 0), seed
+        assert int(quasi.count_right(c, h, apart(len(c)))) == np.sum(found.real > 0), seed
         assert int(count_by_argument(c[None], h[None])[0]) == np.sum(found.real > 0), seed
-        for one in quasi.rightmost(c, h, 3):
+        for one in quasi.rightmost(c, h, apart(len(c)), 3):
             assert np.min(np.abs(found - one)) < 1e-6 * max(1.0, abs(one)), seed
 
 
@@ -137,9 +137,9 @@ def test_windows_of_what_enters_linearly_are_those_of_counting():
         q = q[:, : c.shape[1]] if q.shape[1] >= c.shape[1] else np.pad(q, ((0, 0), (0, c.shape[1] - q.shape[1])))
         q[:, -1] = 0.0
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 3.0
-        found = linear_windows(c, q, h, 1e-3, 1e3, 1)
+        found = linear_windows(c, q, h, 1e-3, 1e3, apart(len(c)), 1)
         theta = np.geomspace(2e-3, 5e2, 60)
-        stable = quasi.count_right(c + theta[:, None, None] * q, h) == 0
+        stable = quasi.count_right(c + theta[:, None, None] * q, h, apart(len(c))) == 0
         if found is None:
             continue
         inside = np.any((found.intervals[:, :1] < theta) & (theta < found.intervals[:, 1:]), axis=0)
@@ -158,13 +158,16 @@ def test_stable_values_of_a_delay_among_others_are_those_of_counting():
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 2.0
         late = np.arange(terms) >= terms - 1 - int(random.integers(0, terms - 2))
         h = np.where(late, random.choice([0.0, 0.5], terms), h)
-        found = delay_set_among(c, h, late, 1)
+        found = delay_set_among(c, h, apart(terms), late, 1)
         grid = np.geomspace(1e-2, 20.0, 40)
-        stable = np.array([quasi.count_right(c, h + late * one) == 0 for one in grid])
+        stable = np.array([quasi.count_right(c, h + late * one, apart(terms)) == 0 for one in grid])
         inside = np.any((found.intervals[:, :1] < grid) & (grid < found.intervals[:, 1:]), axis=0)
         assert np.array_equal(inside, stable), seed
         changes += 0 < stable.sum() < len(stable)
-        alone, same = delay_set_among(c[:2], h[:2] * 0, np.array([False, True]), 1), delay_set(c[0], c[1], 1)
+        alone, same = (
+            delay_set_among(c[:2], h[:2] * 0, apart(2), np.array([False, True]), 1),
+            delay_set(c[0], c[1], 1),
+        )
         np.testing.assert_allclose(alone.intervals, same.intervals, rtol=1e-9)
     assert changes > 3
 
@@ -335,12 +338,12 @@ def test_roots_that_are_too_many_to_be_counted_are_refused_in_words():
     """With several delays, where no term outweighs the others for long; where one does, any delay is counted."""
     c = np.array([[4.0, 1.2, 1.0], [1.0, 0.1, 0.0], [0.5, 0.2, 0.0]])
     for delay in (1e4, 1e7, 1e12):
-        assert quasi.count_right(c, np.array([0.0, delay, 0.77 * delay])) == 0
+        assert quasi.count_right(c, np.array([0.0, delay, 0.77 * delay]), apart(3)) == 0
     c[1:] *= 3
     h = np.array([0.0, 40.0, 31.0])
-    assert quasi.count_right(c, h) == winding(lambda s: np.array([[quasi.value(c, h, s)]]), 200.0)
+    assert quasi.count_right(c, h, apart(3)) == winding(lambda s: np.array([[quasi.value(c, h, s)]]), 200.0)
     with pytest.raises(ss.NotAvailable, match="so long beside the oscillations"):
-        quasi.count_right(c, np.array([0.0, 1e7, 0.77e7]))
+        quasi.count_right(c, np.array([0.0, 1e7, 0.77e7]), apart(3))
 
 
 def test_all_that_a_controller_does_is_late():
@@ -387,14 +390,14 @@ def test_roots_followed_through_their_crossings_are_those_that_are_counted(monke
         p[0, -1] = abs(p[0, -1])
         p[1:, -1] = q[:, -1] = 0.0
         h = np.append(0.0, 10.0 ** chance.uniform(-1, 1, size=2))
-        fast = float(np.max(windows._frequency_bound(p, q, np.geomspace(0.2, 5.0, 9))))
-        found = windows._candidates(p, q, h, 0.2, 5.0, fast) if fast < 50 else None
+        fast = float(np.max(windows._frequency_bound(p, q, apart(3), np.geomspace(0.2, 5.0, 9))))
+        found = windows._candidates(p, q, h, 0.2, 5.0, fast, apart(3)) if fast < 50 else None
         if found is None or len(found[0]) < 3:
             continue
         ends = np.concatenate([[0.2], found[0], [5.0]])
-        each = p, q, h, *found, np.sqrt(ends[:-1] * ends[1:])
+        each = p, q, h, apart(3), *found, np.sqrt(ends[:-1] * ends[1:])
         own = windows._count_each(*each)
-        monkeypatch.setattr(windows, "count_right", lambda c, h: (asked.append(len(c)), counts(c, h))[1])
+        monkeypatch.setattr(windows, "count_right", lambda c, *h: (asked.append(len(c)), counts(c, *h))[1])
         assert np.array_equal(windows._count_by_crossings(*each), own)
         monkeypatch.undo()
         cells += len(own)
@@ -434,3 +437,102 @@ def test_a_search_that_cannot_count_somewhere_answers_elsewhere():
     assert ss.boundary(machine, "bodies.m.mass", between=(1e-3, 1e3)) == ()
     rates = ss.growth_rate(machine, {"bodies.m.mass": np.array([0.1, 1.0, 10.0])})
     assert np.all(rates < 0)
+
+
+# --- highest derivatives under several delays -------------------------------------------------------
+
+
+def several_blocks(count, slope=0.9):
+    """Blocks without mass side by side, each in oil beside friction whose slope, `slope` of the oil's, acts late."""
+    numbers = range(count)
+    return ss.Machine(
+        bodies={f"block{i}": ss.machine.SlidingBody() for i in numbers},
+        links={
+            f"rod{i}": ss.machine.Spring(between=("drive", f"block{i}"), stiffness=1 + 0.1 * i, damping=1.0)
+            for i in numbers
+        },
+        contacts={f"guide{i}": surface(f"block{i}", falling(slope, 0.3 * (1 + 0.37 * i)), load=1.0) for i in numbers},
+        drive=ss.machine.Pull(velocity=1.0),
+    )
+
+
+def falling(slope, lag):
+    return ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3 + slope * np.e / 2, v_stribeck=1.0, lag=lag)
+
+
+def test_a_highest_power_under_two_delays_vanishes_where_its_signs_say():
+    """a + b x + c y + d x y has a zero with |x|, |y| <= 1 unless all four values at ±1 have the sign of a; its least
+    size is that on a fine grid of phases."""
+    chance, sets = np.random.default_rng(0), np.array([[0, 0], [1, 0], [0, 1], [1, 1]], dtype=bool)
+    phases = np.exp(1j * np.linspace(0, np.pi, 181))
+    x, y = np.meshgrid(phases, np.concatenate([phases, np.conj(phases)]))
+    vanishing = 0
+    for _ in range(200):
+        c = np.append(1.0, chance.uniform(-1, 1, 3) * [0.9, 0.9, 0.5])
+        signs = [c @ [1, x, y, x * y] for x in (1, -1) for y in (1, -1)]
+        (found,) = neutral.least_size(c[None], sets)
+        assert (found <= 0) == (min(signs) <= 0)
+        vanishing += found <= 0
+        if found > 0:
+            least, plain = np.min(np.abs(c[0] + c[1] * x + c[2] * y + c[3] * x * y)), 1 - np.sum(np.abs(c[1:]))
+            assert found == pytest.approx(plain if plain > 0 else 0.5 * least, rel=1e-2)  # half, as others may be less
+    assert 40 < vanishing < 160
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_roots_of_a_product_are_those_of_its_factors(count):
+    """Π [s (1 + b_i exp(−s τ_i)) + a_i], whose highest power has late terms that together outweigh the other."""
+    chance, sets = np.random.default_rng(count), np.array(list(np.ndindex(*(2,) * count)), dtype=bool)
+    growing = 0
+    for _ in range(12 if count < 4 else 2):
+        b, tau = chance.uniform(0.5, 0.8, count) * chance.choice([-1, 1], count), 10 ** chance.uniform(-1, 0.3, count)
+        a = chance.uniform(-1.0, 3.0, count)
+        late = [np.array([[a[i], 1.0], [0.0, b[i]]]) for i in range(count)]
+        alone = sum(int(quasi.count_right(one, np.array([0.0, tau[i]]), apart(2))) for i, one in enumerate(late))
+        c = np.array([poly(*(one[int(of)] for one, of in zip(late, row, strict=True))) for row in sets])
+        assert int(quasi.count_right(c, sets @ tau, sets)) == alone
+        growing += alone
+    assert growing or count > 3
+    late[0][1, 1] = 1.01
+    c = np.array([poly(*(one[int(of)] for one, of in zip(late, row, strict=True))) for row in sets])
+    assert int(quasi.count_right(c, sets @ tau, sets)) == quasi.INFINITE
+
+
+def poly(first, *others):
+    for one in others:
+        first = np.convolve(first, one)
+    return first
+
+
+def test_two_late_blocks_side_by_side_are_as_stable_as_each():
+    """Together their late terms outweigh what acts at once: they were told ill-posed."""
+    one, two = several_blocks(1), several_blocks(2)
+    assert ss.stability(one) == ss.stability(two) == "stable"
+    assert ss.stability(several_blocks(2, 1.1)) == "unstable"
+    assert ss.growth_rate(one) == pytest.approx(np.log(0.9) / 0.3, rel=1e-9)
+    for machine in (one, two):
+        (edge,) = ss.boundary(machine, "links.rod0.damping")
+        assert (edge.kind, edge.stable, edge.value) == ("ill-posed", "above", pytest.approx(0.9, rel=1e-9))
+
+
+def late_twice(kd):
+    """theory 11: friction late by 1 s and a controller late by 0.3 s, both of the velocity of a slider without mass."""
+    return ss.Slider(
+        friction=ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.6, v_stribeck=1.0, viscous=1.0, lag=1.0),
+        contact=ss.laws.ConstantNormalStress(preload=1.0), stiffness=1.0,
+        drive=ss.machine.PD(1.0, kp=1.0, kd=kd, delay=0.3),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kd", [0.2, 0.5, 0.7])
+def test_the_edge_where_late_terms_outweigh_is_found_from_every_gain(kd):
+    """At kd = 1 − 0.6 exp(−1); from 0.2 another was told, and no rate of decay."""
+    edge = 1 - 0.6 * np.exp(-1.0)
+    (found,) = ss.boundary(late_twice(kd), "drive.kd")
+    assert (found.kind, found.stable, found.value) == ("ill-posed", "below", pytest.approx(edge, rel=1e-12))
+    rate = ss.growth_rate(late_twice(kd))
+    assert 0.6 * np.exp(-1.0 - rate) + kd * np.exp(-0.3 * rate) == pytest.approx(1.0, abs=1e-3)
+    verdict = ss.analyze(late_twice(kd))
+    assert verdict.stable
+    assert verdict.growth_rate == pytest.approx(rate)
+    assert ("infinitely many oscillations nearly alike" in str(verdict)) == (not verdict.eigenvalues)

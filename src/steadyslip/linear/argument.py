@@ -12,23 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.linear.neutral import Sets, argument_at, bound_on_axis, highest, leads
 from steadyslip.linear.roots import Array, ComplexArray, evaluate
 
 UNKNOWN = -2  # count of roots where counting takes too long
 _MOST = 400_000  # unresolved pieces of the axis, of all rigs together, before counting is given up; by trial: memory
 _NEAR = 1e-13  # relative length at which a piece is not cut further (rounding): a root lies on it
-
-
-def bound_on_axis(c: Array) -> float:
-    """Upper bound (Fujiwara) of |s| of roots right of the imaginary axis, for coefficients c (m, n+1) of one rig."""
-    size = np.abs(c)
-    top = int(np.flatnonzero(np.any(size > 0, axis=0))[-1])
-    if top == 0:
-        return 1.0
-    left = size[0, top] - np.sum(size[1:, top])
-    total = np.sum(size[:, :top], axis=0)
-    powers = 1.0 / (top - np.arange(top))
-    return 2.0 * float(np.max((total / left) ** powers)) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +42,8 @@ class _Pieces:
 class SumsOnAxis:
     """Sums (rows, m, n+1) with delays (rows, m) on the positive imaginary axis, from zero to where no root can be.
 
+    `sets` (m, d) tells which delays act in each term; the highest power must not be able to vanish (`neutral`).
+
     The axis is cut until on each piece either one term is larger than all others together, so that the sum turns as
     that one does but for less than a quarter at either end, whatever the delays; or the sum cannot wind around zero
     unseen: its length between two places is at most their distance times the largest slope, and where that is less
@@ -61,6 +52,7 @@ class SumsOnAxis:
 
     c: Array
     h: Array
+    sets: Sets
 
     def at(self, row: NDArray[np.int64], omega: Array) -> tuple[ComplexArray, ComplexArray]:
         """Terms at iω without their factors exp(−sh), (m, frequencies), and the sum with these factors."""
@@ -70,7 +62,7 @@ class SumsOnAxis:
 
     def whole(self) -> _Pieces:
         shares = np.append(0.0, np.geomspace(1e-9, 1.0, 120))
-        omega = np.array([bound_on_axis(one) for one in self.c])[:, None] * shares
+        omega = bound_on_axis(self.c, self.sets)[:, None] * shares
         row = np.broadcast_to(np.arange(len(self.c))[:, None], omega.shape)
         found = self.at(row.ravel(), omega.ravel())
         both = [
@@ -86,25 +78,40 @@ class SumsOnAxis:
         both = (np.concatenate([np.stack([own[0], new]), np.stack([new, own[1]])], axis=-1) for own, new in parts)
         return _Pieces(np.tile(old.row, 2), *both)
 
+    def units(self, pieces: _Pieces) -> Iterator[tuple[Array, Array, Array]]:
+        """Two units, (2, pieces), in which terms are compared: 1, and the highest power of ω, where lower ones are few.
+
+        With each unit come bounds, (pieces,), of the slopes of all terms together, without their delays and by these.
+        """
+        size, (_, top) = np.abs(self.c), highest(self.c)
+        power, (low, high) = np.arange(size.shape[-1]), pieces.omega
+        late, every = np.sum(size * self.h[..., None], axis=1), np.sum(size, axis=1)
+        yield np.ones((2, len(low))), evaluate((every * power)[pieces.row, 1:], high), evaluate(late[pieces.row], high)
+        at = top[:, None] - power  # coefficients in powers of 1/ω
+        late, every = (
+            np.where(at >= 0, np.take_along_axis(one, np.maximum(at, 0), axis=1), 0.0) for one in (late, every)
+        )
+        inverse, every = 1.0 / low, every * power
+        steep = evaluate(every[pieces.row], inverse) * inverse
+        yield pieces.omega ** top[pieces.row], steep, evaluate(late[pieces.row], inverse)
+
     def resolved_pieces(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
         """Pieces on which the change of argument is known, with the index of the dominant term, −1 where none is.
 
         For a rig that needs too many pieces, the last ones come with `UNKNOWN` instead.
         """
-        sizes = np.abs(self.c)
-        steep = np.sum(sizes[..., 1:] * np.arange(1, self.c.shape[-1]), axis=1)
-        turning = np.sum(sizes * self.h[..., None], axis=1)
         pieces = self.whole()
         while pieces.row.size:
-            row, high = pieces.row, pieces.omega[1]
-            change = evaluate(steep[row], high) * pieces.length
             size = np.sum(np.abs(pieces.terms), axis=0)
             leader = np.argmax(size, axis=0)
-            ahead = 2 * np.take_along_axis(size, leader[None], axis=0)[0] - np.sum(size, axis=0)
-            led = ahead > change
-            turn = change + evaluate(turning[row], high) * pieces.length
-            short = turn < 0.99 * np.sum(np.abs(pieces.total), axis=0)
-            done = led | short | (pieces.length <= _NEAR * high)
+            led, done = np.zeros((2, len(pieces.row)), dtype=bool)
+            for unit, steep, turning in self.units(pieces):
+                size = np.sum(np.abs(pieces.terms) / unit[:, None], axis=0)
+                change = steep * pieces.length
+                led |= 2 * np.take_along_axis(size, leader[None], axis=0)[0] - np.sum(size, axis=0) > change
+                done |= change + turning * pieces.length < 0.99 * np.sum(np.abs(pieces.total) / unit, axis=0)
+            row = pieces.row
+            done |= led | (pieces.length <= _NEAR * pieces.omega[1])
             yield pieces.where(done), np.where(led, leader, -1)[done]
             few = np.bincount(row[~done], minlength=len(self.c)) <= _MOST // len(self.c)
             yield pieces.where(~done & ~few[row]), np.full(np.count_nonzero(~done & ~few[row]), UNKNOWN)
@@ -125,18 +132,23 @@ class SumsOnAxis:
         return total
 
 
-def count_by_argument(c: Array, h: Array) -> NDArray[np.int64]:
-    """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m).
+def count_by_argument(c: Array, h: Array, sets: Sets) -> NDArray[np.int64]:
+    """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m), whose terms `sets` tells.
 
     `UNKNOWN` where counting takes too long. By the argument principle the number is n/2 minus the change of argument
-    along the positive imaginary axis over π.
+    along the positive imaginary axis over π. Beyond the bound of frequencies the argument is that of the highest power
+    to less than π/2, which on the way to infinite Re s becomes that of its term without delay.
     """
-    axis = SumsOnAxis(c, h)
-    present = np.any(c != 0, axis=1)
-    top = c.shape[-1] - 1 - np.argmax(present[:, ::-1], axis=-1)
-    end = np.array([[bound_on_axis(one)] for one in c])
-    rows = np.arange(len(c))
-    last = axis.at(rows, end[:, 0])[1]
-    beyond = np.angle(1j ** (top % 4) * c[rows, 0, top] / last)  # there the highest power leads by less than π/2
-    found = top / 2 - (axis.change_of_argument() + beyond) / np.pi
+    coefficients, top = highest(c)
+    end = bound_on_axis(c, sets)
+    counted = np.flatnonzero(
+        leads(c) | (end * np.max(h, axis=-1) < _MOST // len(c))
+    )  # else pieces of a turn are too many
+    found = np.full(len(c), np.nan)
+    c, h, end, top = c[counted], h[counted], end[counted], top[counted]
+    axis = SumsOnAxis(c, h, sets)
+    last = axis.at(np.arange(len(c)), end)[1]
+    leading, turned = argument_at(coefficients[counted], h, sets, end)
+    beyond = np.angle(1j ** (top % 4) * leading / last) - turned
+    found[counted] = top / 2 - (axis.change_of_argument() + beyond) / np.pi
     return np.asarray(np.where(np.isnan(found), UNKNOWN, np.rint(found)), dtype=np.int64)

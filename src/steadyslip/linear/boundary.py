@@ -106,6 +106,9 @@ def _kept(rig: Rig, name: str) -> tuple[str, ...]:
 def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first.
 
+    Without those that do not enter linearly if bodies without mass are acted on under several delays so strongly that
+    counting roots at many values would take minutes; `boundary` does so for one parameter.
+
     Raises
     ------
     NotAvailable
@@ -120,6 +123,8 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
         if address.value == 0 and address.role.structural and name not in present:
             continue
         search = Search(rig, name, present, branch)
+        if search.takes_long:
+            continue
         edges = search.boundaries(None)
         found.append(_margin(name, address.role.unit, float(address.value), edges, search.searched))
     return tuple(sorted(found, key=_urgency))

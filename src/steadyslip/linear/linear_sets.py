@@ -10,10 +10,9 @@ from steadyslip.linear.crossing import APART, linear_split
 from steadyslip.linear.polynomials import StableSet, columns, most_intervals, stable_set
 from steadyslip.linear.roots import Array, quietly
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
-from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.posed import spare_powers
-from steadyslip.model.range import characteristic, quasipolynomial
+from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
 _FAR = 1e12  # edges beyond this factor from the size of a parameter, up or down, are rounding of infinity or zero
 _FACTORS = np.array([1 / APART, 1.0, APART])  # multiples of that size at which the polynomial is evaluated
@@ -140,7 +139,9 @@ def linear_set(
     p, q, h, value = found
     if late:
         low, high = (1 / APART, APART) if reach is None else (reach[0] / value, reach[1] / value)
-        windows = linear_windows(p, q, h, min(low, 1 / APART), max(high, APART), int(spare_powers(point)))
+        windows = linear_windows(
+            p, q, h, min(low, 1 / APART), max(high, APART), delays_in_terms(point.model), int(spare_powers(point))
+        )
     else:
         windows = _with_far_edges_removed(stable_set(p[0], q[0], spare_powers(point)))
     return (
@@ -183,19 +184,19 @@ def _balancing_factor(p: Array, q: Array) -> Array:
 
 
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
-    """Stable set of a delay; None if a term contains it more than once or coefficients are not finite."""
-    delays = delays_of_terms(point.model)
+    """Stable set of a delay; None if delays share it or coefficients are not finite."""
+    sets, delays = delays_in_terms(point.model), point.model.delays
     c, h = quasipolynomial(point)
     if not np.all(np.isfinite(c)):
         return None
-    if list(delays) == [0, symbol]:
+    if delays == (symbol,):
         return delay_set(c[0], c[1], int(spare_powers(point)))
-    late = np.array([sp.sympify(delay).has(symbol) for delay in delays])
-    if any(sp.diff(delay, symbol) != 1 for delay, own in zip(delays, late, strict=True) if own):
+    if symbol not in delays or sum(sp.sympify(delay).has(symbol) for delay in delays) > 1:
         return None
+    late = sets[:, delays.index(symbol)]
     others = h - late * float(point.named()[name_of(point, symbol)])
     others = np.where(np.abs(others) < 1e-12 * np.max(h), 0.0, others)
-    return delay_set_among(c, others, late, int(spare_powers(point)))
+    return delay_set_among(c, others, sets, late, int(spare_powers(point)))
 
 
 def name_of(point: OperatingPoint, symbol: sp.Symbol) -> str:

@@ -19,13 +19,14 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.digits import matrix_entries, precise_eigenvalues, precise_root
-from steadyslip.linear.quasipolynomial import delayed_terms_dominate, nondimensional
+from steadyslip.linear.neutral import can_vanish
+from steadyslip.linear.quasipolynomial import nondimensional
 from steadyslip.linear.roots import Array, ComplexArray
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows, is_written_out
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic, delays_of, quasipolynomial
+from steadyslip.model.range import characteristic, delays_in_terms, delays_of, quasipolynomial
 
 GOOD = 1e-6
 """Share of an eigenvalue that its error may be; beyond it the eigenvalue is computed anew with many digits."""
@@ -90,7 +91,7 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
     found = np.ravel(spectrum(point))
     found = found[np.isfinite(found)]
     matrix = _Matrix.of(point)
-    if not found.size or not matrix.finite:
+    if not matrix.finite or not (found.size or point.model.delays):
         return CheckedSpectrum(found, np.full(found.shape, np.inf), -1, False, False)
     first = _checked(point, matrix, found, matrix.errors(found), False)
     if first.decided:
@@ -144,12 +145,12 @@ def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
 
 def _count(point: OperatingPoint) -> int:
     """Number of growing roots by the argument principle; −1 where counting takes too long."""
-    c, h = quasipolynomial(point)
+    (c, h), sets = quasipolynomial(point), delays_in_terms(point.model)
     with np.errstate(all="ignore"):
         scaled, own, _ = nondimensional(c[None], h[None])
-        if delayed_terms_dominate(scaled)[0] or not np.all(np.isfinite(scaled)):
+        if can_vanish(scaled, sets)[0] or not np.all(np.isfinite(scaled)):
             return -1
-        return max(int(count_by_argument(scaled, own)[0]), -1)
+        return max(int(count_by_argument(scaled, own, sets)[0]), -1)
 
 
 def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:

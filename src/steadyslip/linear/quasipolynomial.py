@@ -1,13 +1,14 @@
 """Count of roots right of a line, and the rightmost roots, of quasi-polynomials Σ p_j(s) exp(−s h_j) (theory 11).
 
-Coefficients are (..., m, n+1), lowest power first, delays (..., m) with h_0 = 0; the leading axes are rigs. Nothing is
+Coefficients are (..., m, n+1), lowest power first, delays (..., m) with h_0 = 0; the leading axes are rigs. `sets` (m,
+d) tells which delays of the rig make up each h_j. Nothing is
 approximated by rational functions. With one delay roots are counted from where they are without it: they cross the
 imaginary axis only at the few ω with |p(iω)| = |q(iω)|, at delays (φ + 2πk)/ω, to the right at the highest of these ω
 and then by turns (Cooke & van den Driessche 1986; Walton & Marshall 1987). With several delays the argument principle
 is applied along the axis (`argument`).
 
-`INFINITE` is the count where the delayed terms have as many derivatives as the undelayed and outweigh them: there are
-infinitely many roots to the right, the faster growing the shorter the delay; `UNKNOWN` where counting takes too long.
+`INFINITE` is the count where the highest power of s can vanish (`neutral`): infinitely many roots lie to the right, the
+faster growing the shorter the delay; `UNKNOWN` where counting takes too long.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.linear.argument import UNKNOWN, SumsOnAxis, bound_on_axis, count_by_argument
+from steadyslip.linear.argument import UNKNOWN, SumsOnAxis, count_by_argument
+from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish, highest, leads, least_size
 from steadyslip.linear.polynomials import even_odd, product
 from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly, roots
 
@@ -29,6 +31,11 @@ _HALVINGS = 60  # largest number of bisections of a real part: more than the 53 
 _BATCH = 40  # rigs with several delays counted at a time; chosen by trial: memory against speed
 _MOST_PERIODS = 5000  # crossing delays are listed up to so many periods of the fastest; by trial: length of the list
 _LOST = 1e10  # periods within one delay beyond which rounding leaves fewer than six digits of the phase
+_CLOSE = (1e-4, 1e-3, 1e-2, 0.1)  # distances from `_line_of_many`, relative to it, up to which roots are sought
+_QUICK = (
+    1e5  # radians in all terms, up to the bound of frequencies, that are followed in less than a second if none leads
+)
+_TOLD = 1e-3  # relative error up to which that line is told as the rate of the slowest decay
 _SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
 _ON_THE_LINE = 1e-3  # relative distance of the real part of a root that is one of several on a line
 _BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
@@ -77,7 +84,7 @@ def nondimensional(c: Array, h: Array) -> tuple[Array, Array, Array]:
     return np.where(c == 0, 0.0, np.sign(c) * np.exp(logs)), h * rate[..., None], rate
 
 
-def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
+def count_right(c: Array, h: Array, sets: Sets, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
     """Number of roots with real part above `shift`, (...); −1 where coefficients are not finite.
 
     Raises
@@ -85,17 +92,19 @@ def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]
     NotAvailable
         If there are several delays, so long that roots cannot be counted.
     """
-    found = count_right_if_feasible(c, h, shift, alone=True)
+    found = count_right_if_feasible(c, h, sets, shift, alone=True)
     if np.any(found == UNKNOWN):
         with np.errstate(all="ignore"):
             scaled, own, _ = nondimensional(c, h)
-        fast = [bound_on_axis(one) for one in scaled.reshape(-1, *scaled.shape[-2:])]
+        fast = bound_on_axis(scaled.reshape(-1, *scaled.shape[-2:]), sets)
         raise _too_long(float(np.nanmax(fast) * np.max(own)) / (2 * np.pi))
     return found
 
 
 @quietly
-def count_right_if_feasible(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = False) -> NDArray[np.int64]:
+def count_right_if_feasible(
+    c: Array, h: Array, sets: Sets, shift: ArrayLike = 0.0, *, alone: bool = False
+) -> NDArray[np.int64]:
     """Number of roots with real part above `shift`, (...); −1 where coefficients are not finite, or `UNKNOWN`.
 
     `UNKNOWN` marks rigs whose count takes too long; with `alone` these are tried again one by one.
@@ -108,7 +117,7 @@ def count_right_if_feasible(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone
     h = np.broadcast_to(h, (*lead, h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full(len(c), -1, dtype=np.int64)
     good = np.all(np.isfinite(c), axis=(-2, -1)) & np.all(np.isfinite(h), axis=-1)
-    ahead = good & delayed_terms_dominate(c) & np.any(h[:, 1:] > 0, axis=-1)
+    ahead = good & can_vanish(c, sets) & np.any(h[:, 1:] > 0, axis=-1)
     found[ahead] = INFINITE
     rows = np.flatnonzero(good & ~ahead)
     if c.shape[-2] <= 2 and rows.size:
@@ -116,20 +125,12 @@ def count_right_if_feasible(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone
         found[rows] = _count_by_crossings(c[rows, 0], q, h[rows, -1])
     elif rows.size:
         for some in np.array_split(rows, -(-len(rows) // _BATCH)):
-            found[some] = count_by_argument(c[some], h[some])
+            found[some] = count_by_argument(c[some], h[some], sets)
         for one in rows[found[rows] == UNKNOWN] if alone else ():
-            found[one] = count_by_argument(c[[one]], h[[one]])[0]
+            found[one] = count_by_argument(c[[one]], h[[one]], sets)[0]
             if found[one] == UNKNOWN:
                 break
     return found.reshape(lead)
-
-
-def delayed_terms_dominate(c: Array) -> NDArray[np.bool_]:
-    """True where the delayed terms of the highest power of s are together at least as large as the undelayed one."""
-    present = np.any(c != 0, axis=-2)
-    top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
-    highest = np.abs(np.take_along_axis(c, top[..., None, None], axis=-1)[..., 0])
-    return np.asarray(np.sum(highest[..., 1:], axis=-1) >= highest[..., 0])
 
 
 def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
@@ -174,22 +175,25 @@ def _too_long(turns: float) -> NotAvailable:
 
 
 @quietly
-def rightmost(c: Array, h: Array, count: int) -> ComplexArray:
-    """Rightmost roots, (..., count), by falling real part; NaN where infinitely many lie right of the axis.
+def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
+    """Rightmost roots, (..., count), by falling real part.
 
-    Real parts are bisected on the number of roots right of a line; Newton's method then refines each root.
+    NaN where infinitely many lie right of the axis or, of several rigs, where they cannot be counted; and beyond those
+    that lie right of `_line_of_many`, or so close to it that they are not told from the infinitely many there. Real
+    parts are bisected on the number of roots right of a line; Newton's method then refines each root.
     """
     flat = c.reshape(-1, *c.shape[-2:])
     delays = np.broadcast_to(h, (*c.shape[:-2], h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full((len(flat), count), np.nan + 0j, dtype=complex)
     scaled, own, rate = nondimensional(flat, delays)
-    good = (count_right(scaled, own) < INFINITE) & np.all(np.isfinite(scaled), axis=(-2, -1))
-    for row in np.flatnonzero(good):
-        found[row] = rate[row] * _rightmost_of_one(scaled[row], own[row], count)
+    count_of_all = count_right if len(flat) == 1 else count_right_if_feasible
+    right = count_of_all(scaled, own, sets)
+    for row in np.flatnonzero((right < INFINITE) & (right != UNKNOWN) & np.all(np.isfinite(scaled), axis=(-2, -1))):
+        found[row] = rate[row] * _rightmost_of_one(scaled[row], own[row], sets, count)
     return found.reshape(*c.shape[:-2], count)
 
 
-def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
+def _rightmost_of_one(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     if not np.any(c[1:]):  # all delayed coefficients are zero
         exact = roots(np.sum(c, axis=0))
         return np.append(exact, np.full(count, np.nan + 0j))[:count]
@@ -197,44 +201,101 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
         turns = float(np.nanmax(crossings(c[:1], c[1:])[0], initial=0.0)) * float(np.max(h)) / (2 * np.pi)
         if turns > _LOST:
             raise _too_long(turns)
-    numbers = np.arange(1, count + 1)
-    high = np.full(count, 1.01 * bound_on_axis(c))
-    low = -np.ones(count) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave the range of floating point
+    _, left, many = _left_end(c, h, sets)
+    numbers = np.arange(1, min(count, many) + 1)
+    high = np.full(len(numbers), 1.01 * bound_on_axis(c[None], sets)[0])
+    low = -np.ones(len(numbers)) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave floating point
+    low = np.maximum(low, left)
     for _ in range(60):
-        short = count_right(c, h, low) < numbers
+        short = count_right(c, h, sets, low) < numbers
         if not np.any(short):
             break
         high = np.where(short, low, high)
-        low = np.where(short, 2 * low, low)
+        low = np.where(short, np.maximum(2 * low, left), low)
     for _ in range(_HALVINGS):
         if np.all(high - low < 1e-9 * (np.abs(low) + np.abs(high)) + 1e-12):
             break
         middle = 0.5 * (low + high)
-        many = count_right(c, h, middle) >= numbers
-        low, high = np.where(many, middle, low), np.where(many, high, middle)
+        enough = count_right(c, h, sets, middle) >= numbers
+        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
     found: list[complex] = []
     for real in 0.5 * (low + high):
         if found and abs(found[-1].real - real) < 1e-6 * (abs(real) + 1e-3) and found[-1].imag > 0:
             found.append(found[-1].conjugate())
         else:
-            found.append(_root_on(c, h, float(real), found))
-    return np.array(found)
+            found.append(_root_on(c, h, sets, float(real), found))
+    return np.append(np.array(found, dtype=complex), np.full(count - len(found), np.nan + 0j))
+
+
+def _left_end(c: Array, h: Array, sets: Sets) -> tuple[float, float, int]:
+    """`_line_of_many` of one rig, the real part beside it right of which roots are looked for, and how many there are.
+
+    −inf twice and `INFINITE` if no highest derivative is delayed.
+    """
+    line = _line_of_many(c, h, sets)
+    if not np.isfinite(line):
+        return line, line, INFINITE
+    slowest = float(np.max(h))
+    for share in _CLOSE:
+        left = line + share * abs(line)
+        moved = shifted(c, h, np.asarray(left))[None]
+        if leads(moved)[0] or bound_on_axis(moved, sets)[0] * slowest * len(c) < _QUICK:
+            many = int(count_right_if_feasible(c, h, sets, left))
+            if many != UNKNOWN:
+                return line, left, many
+    return line, 0.0, int(count_right_if_feasible(c, h, sets))
+
+
+def _line_of_many(c: Array, h: Array, sets: Sets) -> float:
+    """Real part right of which a rig has finitely many roots, for coefficients c (m, n+1) and delays h (m,).
+
+    Left of it the highest power of s can vanish: infinitely many roots come as close to it as one likes, for the given
+    delays or others as near as one likes to them. −inf if no highest derivative is delayed.
+    """
+    top = highest(c[None])[0]
+    if not np.any(top[:, 1:] * h[1:]):
+        return -np.inf
+
+    def vanishes(real: float) -> bool:
+        return bool(least_size(top * np.exp(-h * real), sets)[0] <= 0)
+
+    step = 1.0 / float(np.max(h))
+    low, high = (-step, 0.0) if not vanishes(0.0) else (0.0, step)
+    while not vanishes(low):
+        low, high = 2 * low, low
+    while vanishes(high):
+        low, high = high, 2 * high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if vanishes(middle) else (low, middle)
+    return high
 
 
 @quietly
-def nearest_to_axis(c: Array, h: Array) -> complex:
+def rate_of_many(c: Array, h: Array, sets: Sets) -> float:
+    """Real part (1/s) to which the rightmost roots of one rig, infinitely many, tend.
+
+    NaN where others lie further right, or where that is not known to a thousandth.
+    """
+    (scaled,), (own,), (rate,) = nondimensional(c[None], h[None])
+    line, left, many = _left_end(scaled, own, sets)
+    return float(rate * line) if many == 0 and left - line <= _TOLD * abs(line) else math.nan
+
+
+@quietly
+def nearest_to_axis(c: Array, h: Array, sets: Sets) -> complex:
     """Root of one rig nearest to the imaginary axis (1/s), with imaginary part zero or positive."""
     (scaled,), (own,), (rate,) = nondimensional(c[None], h[None])
-    return complex(rate * _root_on(scaled, own, 0.0))
+    return complex(rate * _root_on(scaled, own, sets, 0.0))
 
 
-def _root_on(c: Array, h: Array, real: float, known: Sequence[complex] = ()) -> complex:
+def _root_on(c: Array, h: Array, sets: Sets, real: float, known: Sequence[complex] = ()) -> complex:
     """Root nearest to the line Re s = `real`, with imaginary part zero or positive, by Newton's method.
 
     Not one of the `known` roots, if another is found: many may lie on one line.
     """
     moved = shifted(c, h, np.asarray(real))
-    starts = real + 1j * np.array([0.0, *_near_axis(moved, h)])
+    starts = real + 1j * np.array([0.0, *_near_axis(moved, h, sets)])
     s = starts.astype(complex)
     for _ in range(30):
         step = value(c, h, s) / slope(c, h, s)
@@ -255,14 +316,14 @@ def _size(c: Array, h: Array, s: Any) -> Any:
     return sum(evaluate(np.abs(p), np.abs(s)) * np.exp(-s.real * d) for p, d in zip(c, h, strict=True)) + 1e-300
 
 
-def _near_axis(c: Array, h: Array) -> Iterator[float]:
+def _near_axis(c: Array, h: Array, sets: Sets) -> Iterator[float]:
     """Frequencies near which a root may lie on the imaginary axis, starting values for Newton's method."""
     if len(c) == 2:  # sizes of both terms agree there; the next root is within half a turn
         found = np.array([one for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one)])
         turn = 2 * np.pi / float(np.max(h)) if np.max(h) > 0 else 0.0
         yield from np.abs(found[:, None] + turn * _BESIDE_CROSSING).ravel().tolist()
         return
-    own = [pieces.omega[0][leader < 0] for pieces, leader in SumsOnAxis(c[None], h[None]).resolved_pieces()]
+    own = [pieces.omega[0][leader < 0] for pieces, leader in SumsOnAxis(c[None], h[None], sets).resolved_pieces()]
     omega = np.sort(np.concatenate(own))
     size = np.abs(value(c, h, 1j * omega)) / _size(c, h, 1j * omega)
     around = np.concatenate([[np.inf], size, [np.inf]])

@@ -33,6 +33,7 @@ from steadyslip.linear.spectrum import (
     is_ill_posed,
     nearness,
     static_sum,
+    takes_long_to_count,
     unstable_roots,
 )
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral, on_edge, status
@@ -180,6 +181,11 @@ class Search:
         sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
         size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
         return float(size) if np.isfinite(size) and size > 0 else abs(self.value) or 1.0
+
+    @cached_property
+    def takes_long(self) -> bool:
+        """Whether edges are not exact, and counting roots at every sample takes long (`takes_long_to_count`)."""
+        return takes_long_to_count(self.own) and self._exact(None) is None
 
     # -- status of sliding along the parameter
 

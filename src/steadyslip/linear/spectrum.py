@@ -10,13 +10,14 @@ from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasipolynomial as with_delays
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.digits import precise_eigenvalues
+from steadyslip.linear.neutral import leads
 from steadyslip.linear.polynomials import columns, damping_measures, is_hurwitz
-from steadyslip.linear.roots import Array, ComplexArray, roots
+from steadyslip.linear.roots import Array, ComplexArray, quietly, roots
 from steadyslip.model.eigenvalues import digits_lost, eigenvalues_of
-from steadyslip.model.linearisation import delays_of_terms, is_written_out
+from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.posed import spare_powers
-from steadyslip.model.range import characteristic, quasipolynomial
+from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
 _ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the axis: a conjugate pair
 
@@ -30,7 +31,24 @@ def spectrum(point: OperatingPoint) -> ComplexArray:
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else _of_state_matrix(point)
     c, h = quasipolynomial(point)
-    return with_delays.rightmost(c, h, c.shape[-1] - 1)
+    return with_delays.rightmost(c, h, delays_in_terms(point.model), c.shape[-1] - 1)
+
+
+@quietly
+def growth(point: OperatingPoint) -> Array:
+    """Largest real part (1/s) of the eigenvalues, (...); NaN where none is known.
+
+    With a delayed highest derivative there may be no rightmost eigenvalue: infinitely many come as near as one likes to
+    a line, whose real part is given then.
+    """
+    found = spectrum(point).real
+    rate = np.max(np.where(np.isnan(found), -np.inf, found), axis=-1)
+    if point.model.delays and np.any(none := np.isneginf(rate)):
+        c, h = quasipolynomial(point)
+        rate = np.array(rate)
+        for at in np.argwhere(none & np.all(np.isfinite(c), axis=(-2, -1))):
+            rate[*at] = with_delays.rate_of_many(c[*at], h[*at], delays_in_terms(point.model))
+    return np.asarray(np.where(np.isneginf(rate), np.nan, rate))
 
 
 @question
@@ -56,30 +74,45 @@ def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
 
 def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where roots right of the axis can be counted: always, except with several very long delays."""
-    return np.asarray(_counts(point) != UNKNOWN) if point.model.delays else np.ones(point.shape, dtype=bool)
+    return np.asarray(counts(point) != UNKNOWN) if point.model.delays else np.ones(point.shape, dtype=bool)
 
 
 @question
-def _counts(point: OperatingPoint) -> NDArray[np.int64]:
-    return with_delays.count_right_if_feasible(*quasipolynomial(point))
+def takes_long_to_count(point: OperatingPoint) -> bool:
+    """True where of a highest derivative the terms under several delays are together as large as what acts at once.
+
+    Then no term leads at high frequency, and a count follows every turn of each up to the bound of frequencies.
+    """
+    if len(point.model.delays) < 2:
+        return False
+    c, _ = quasipolynomial(point)
+    return not np.all(leads(c.reshape(-1, *c.shape[-2:])))
+
+
+@question
+def counts(point: OperatingPoint) -> NDArray[np.int64]:
+    """As `unstable_roots`, with `UNKNOWN` where roots cannot be counted."""
+    return with_delays.count_right_if_feasible(*quasipolynomial(point), delays_in_terms(point.model))
 
 
 @question
 def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
     """Number of roots right of the axis, for points with delays; `quasipolynomial.INFINITE`, or −1 if not finite."""
-    return _counts(point) if np.all(can_be_counted(point)) else with_delays.count_right(*quasipolynomial(point))
+    if np.all(can_be_counted(point)):
+        return counts(point)
+    return with_delays.count_right(*quasipolynomial(point), delays_in_terms(point.model))
 
 
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3); see `spare_powers`.
 
-    With delays also where in the highest derivative the delayed terms outweigh the undelayed one: then ever faster
-    oscillations grow.
+    With delays also where the delayed terms of the highest derivative outweigh the undelayed one (`neutral`): then ever
+    faster oscillations grow.
     """
     if not point.model.delays:
         return _ill_posed(point, characteristic(point))
     c, _ = quasipolynomial(point)
-    return np.asarray(_ill_posed(point, c[..., 0, :]) | (_counts(point) == with_delays.INFINITE))
+    return np.asarray(_ill_posed(point, c[..., 0, :]) | (counts(point) == with_delays.INFINITE))
 
 
 def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
@@ -88,10 +121,11 @@ def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
     A delay does so where, on a body without mass, the delayed terms outweigh those that act at once.
     """
     c, _ = quasipolynomial(point)
-    if not point.model.delays or _ill_posed(point, c[0]) or _counts(point) != with_delays.INFINITE:
+    if not point.model.delays or _ill_posed(point, c[0]) or counts(point) != with_delays.INFINITE:
         return ()
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
-    late = [delay for delay, own in zip(delays_of_terms(point.model), c[:, top], strict=True) if own != 0]
+    acting = np.any(delays_in_terms(point.model)[c[:, top] != 0], axis=0)
+    late = [delay for delay, own in zip(point.model.delays, acting, strict=True) if own]
     return tuple(
         name for name, symbol in point.model.parameters.items() if any(sp.sympify(d).has(symbol) for d in late)
     )
@@ -120,7 +154,9 @@ def crossing_frequency(point: OperatingPoint) -> float:
     """Imaginary part (rad/s) of the root nearest to the axis, of a single rig on an edge; 0 without oscillation."""
     if point.model.delays:
         c, h = quasipolynomial(point)
-        return with_delays.nearest_to_axis(c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0]).imag
+        return with_delays.nearest_to_axis(
+            c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0], delays_in_terms(point.model)
+        ).imag
     found = spectrum(point).ravel()
     found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]
     return float(np.abs(found[np.argmax(found.real)].imag)) if found.size else 0.0

@@ -26,7 +26,7 @@ from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.linear.roots import Array, ComplexArray, quietly
-from steadyslip.linear.spectrum import is_ill_posed, spectrum
+from steadyslip.linear.spectrum import growth, is_ill_posed, spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -158,15 +158,16 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     """Largest real part of the eigenvalues (1/s): positive grows, negative decays.
 
     inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding and where
-    numbers leave the range of floating point (see `stability`).
+    numbers leave the range of floating point (see `stability`). Where a highest derivative is delayed (a body without
+    mass under a late controller, say) there may be no slowest decay, only infinitely many that come as near to one rate
+    as one likes; then it is that rate, for the given delays or others as near as one likes to them, and NaN where that
+    rate is not known to a thousandth.
     """
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> Array:
-        with np.errstate(invalid="ignore"):
-            rate = np.max(np.where(np.isnan(found := spectrum(part).real), -np.inf, found), axis=-1)
-        known = np.isfinite(rate) & np.all(np.isfinite(quasipolynomial(part)[0]), axis=(-2, -1))
-        return np.where(is_ill_posed(part), np.inf, np.where(known, rate, np.nan))
+        known = np.all(np.isfinite(quasipolynomial(part)[0]), axis=(-2, -1))
+        return np.where(is_ill_posed(part), np.inf, np.where(known, growth(part), np.nan))
 
     return point.wrap(in_chunks(point, kernel), "growth_rate", "1/s")
 

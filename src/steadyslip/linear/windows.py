@@ -10,18 +10,17 @@ in the same way, and cross to the right where |A| − |B| rises with ω.
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.linear.argument import bound_on_axis
+from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.crossing import is_ill_posed
+from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish, corners
 from steadyslip.linear.polynomials import StableSet, columns
 from steadyslip.linear.quasipolynomial import (
     count_right,
+    count_right_if_feasible,
     crossing_delays,
-    delayed_terms_dominate,
     list_crossing_delays,
     nondimensional,
     slope,
@@ -34,6 +33,7 @@ from steadyslip.linear.waves import difference_of_squares, im_of_product
 _TURNS = 100  # periods of an oscillation during the longest delay beyond which windows are not searched
 _STEPS = 8  # values of θ per decade at which the fastest possible oscillation is estimated
 _MANY = 20_000  # such periods of the rig itself beyond which the search is refused
+_ROUNDING, _CORNER = 1e-12, 1e-8  # relative distance of values of θ that rounding may make; at infinite s by products
 _PLAIN = 1e-6  # share of ds/dθ across the axis below which a root may run along it, so that roots are counted anew
 
 
@@ -54,24 +54,19 @@ def delay_set(p: Array, q: Array, spare: int) -> StableSet:
 
 
 @quietly
-def delay_set_among(c: Array, h: Array, late: NDArray[np.bool_], spare: int) -> StableSet | None:
+def delay_set_among(c: Array, h: Array, sets: Sets, late: NDArray[np.bool_], spare: int) -> StableSet | None:
     """Stable set of one delay θ > 0 (s) of a rig with several; None where its edges are too many to separate.
 
-    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `late` (m,) is True for
-    the terms that θ delays too. The `spare` highest powers may be missing.
+    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `sets` (m, d) tells
+    which delays act in each term, `late` (m,) in which θ does. The `spare` highest powers may be missing.
     """
     (scaled,), (others,), (rate,) = nondimensional(c[None], h[None])
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
-    if (
-        delayed_terms_dominate(scaled[None])[0]
-        or np.sum(c[:, 0]) == 0
-        or c[0, top] <= 0
-        or top < c.shape[1] - 1 - spare
-    ):
+    if can_vanish(scaled, sets) or np.sum(c[:, 0]) == 0 or c[0, top] <= 0 or top < c.shape[1] - 1 - spare:
         return empty_set()
-    start = int(count_right(scaled, others))
+    start = int(count_right(scaled, others, sets))
     parts = [(scaled[which], others[which]) for which in (~late, late)]
-    zeros = difference_of_squares(*parts[0], *parts[1]).zeros(bound_on_axis(scaled))
+    zeros = difference_of_squares(*parts[0], *parts[1]).zeros(float(bound_on_axis(scaled[None], sets)[0]))
     if zeros is None:
         return None
     omega, direction = (one[zeros[1] != 0] for one in zeros)
@@ -93,17 +88,17 @@ def _set_of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -
 
 
 @quietly
-def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, spare: int) -> StableSet | None:
+def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: Sets, spare: int) -> StableSet | None:
     """Stable set of θ in P + θ Q between `low` and `high`; the rig's own value is θ = 1.
 
-    P and Q are (m, n+1), with delays h (m,); the `spare` highest powers may be missing. The range is cut where
-    there may be windows without end, at the same places whatever the range. An interval that begins at an uncut
-    `low` is given as from zero, one that ends at an uncut `high` as to infinity. None where the delay is so long
-    for the rig itself that its windows are too many.
+    P and Q are (m, n+1), with delays h (m,), whose terms `sets` (m, d) tells; the `spare` highest powers may be
+    missing. The range is cut where there may be windows without end, at the same places whatever the range. An interval
+    that begins at an uncut `low` is given as from zero, one that ends at an uncut `high` as to infinity. None where the
+    delay is so long for the rig itself that its windows are too many.
     """
     scale = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(scale[0]), float(scale[-1])
-    bound = _frequency_bound(p, q, scale)
+    bound = _frequency_bound(p, q, sets, scale)
     turn = 2 * np.pi / max(float(np.max(h)), 1e-300)
     own = float(np.interp(0.0, np.log(scale), bound))
     most = turn * max(_TURNS, 2 * own / turn)
@@ -112,7 +107,7 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, spare:
     above, below = np.flatnonzero((bound > most) & (scale > 1)), np.flatnonzero((bound > most) & (scale < 1))
     end = high if not above.size else float(scale[above[0] - 1])
     start = low if not below.size else float(scale[below[-1] + 1])
-    found = _windows(p, q, h, start, end, min(most, float(np.max(bound))), spare)
+    found = _windows(p, q, h, start, end, min(most, float(np.max(bound))), sets, spare)
     if found is None:
         return None
     cut = [0.0 if start == low else start, np.inf if end == high else end]
@@ -120,8 +115,10 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, spare:
     return StableSet(intervals, found.edges, found.frequencies, found.changes)
 
 
-def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float, spare: int) -> StableSet | None:
-    candidates = _candidates(p, q, h, low, high, fast)
+def _windows(
+    p: Array, q: Array, h: Array, low: float, high: float, fast: float, sets: Sets, spare: int
+) -> StableSet | None:
+    candidates = _candidates(p, q, h, low, high, fast, sets)
     if candidates is None:
         return None
     theta, beta = candidates
@@ -129,15 +126,20 @@ def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float,
     probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours nothing crosses the axis
     count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay a count takes no time
     well_posed = ~is_ill_posed(columns(p[0] + probes[:, None] * q[0]), spare)
-    return _set_of_cells(theta, beta, (count(p, q, h, theta, beta, probes) == 0) & well_posed)
+    right = count(p, q, h, sets, theta, beta, probes)
+    return None if np.any(right == UNKNOWN) else _set_of_cells(theta, beta, (right == 0) & well_posed)
 
 
-def _count_each(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
+def _count_each(
+    p: Array, q: Array, h: Array, sets: Sets, theta: Array, beta: Array, probes: Array
+) -> NDArray[np.int64]:
     """Number of roots right of the axis at every probe θ; `theta` and `beta` are not used."""
-    return count_right(p + probes[:, None, None] * q, h)
+    return count_right_if_feasible(p + probes[:, None, None] * q, h, sets)
 
 
-def _count_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
+def _count_by_crossings(
+    p: Array, q: Array, h: Array, sets: Sets, theta: Array, beta: Array, probes: Array
+) -> NDArray[np.int64]:
     """Number of roots right of the axis at every probe θ, from few counts and the directions of the crossings between.
 
     A root crosses the axis at (theta, i beta) with ds/dθ = −Q/(P' + θ Q'). Where it may run along the axis instead,
@@ -151,28 +153,25 @@ def _count_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array,
     last = np.append(first[1:] - 1, len(theta))
     ends = np.unique(np.concatenate([first, last]))
     counted = np.full(len(probes), -1, dtype=np.int64)
-    counted[ends] = _count_each(p, q, h, theta, beta, probes[ends])
+    counted[ends] = _count_each(p, q, h, sets, theta, beta, probes[ends])
     for a, b in zip(first, last, strict=True):
         found = counted[a] + np.concatenate([[0], np.cumsum(steps[a:b])])
         if found[-1] == counted[b] and np.all(found >= 0):
             counted[a : b + 1] = found
         else:
-            counted[a : b + 1] = _count_each(p, q, h, theta, beta, probes[a : b + 1])
+            counted[a : b + 1] = _count_each(p, q, h, sets, theta, beta, probes[a : b + 1])
     return counted
 
 
-def _frequency_bound(p: Array, q: Array, theta: Array) -> Array:
-    """Upper bound (Fujiwara) of frequencies of roots on the axis, for each θ; where there is no bound, the largest."""
-    size = np.abs(p + theta[:, None, None] * q)
-    top = int(np.flatnonzero(np.any(size > 0, axis=(0, 1)))[-1])
-    left = size[:, 0, top] - np.sum(size[:, 1:, top], axis=-1)
-    left = np.where(left > 0, left, np.nan)
-    total = np.sum(size[:, :, :top], axis=1)
-    bound = 2 * np.max((total / left[:, None]) ** (1.0 / (top - np.arange(top))), axis=-1)
+def _frequency_bound(p: Array, q: Array, sets: Sets, theta: Array) -> Array:
+    """Upper bound of frequencies of roots on the axis, for each θ; where there is no bound, the largest."""
+    bound = bound_on_axis(p + theta[:, None, None] * q, sets)
     return np.asarray(np.where(np.isfinite(bound), bound, np.nanmax(bound) if np.any(np.isfinite(bound)) else 1.0))
 
 
-def _candidates(p: Array, q: Array, h: Array, low: float, high: float, fast: float) -> tuple[Array, Array] | None:
+def _candidates(
+    p: Array, q: Array, h: Array, low: float, high: float, fast: float, sets: Sets
+) -> tuple[Array, Array] | None:
     """Values of θ at which a root may be on the axis, rising, and its frequency: 0 at s = 0, inf at infinite s."""
     zeros = im_of_product(p, q, h).zeros(fast)
     if zeros is None:
@@ -181,13 +180,14 @@ def _candidates(p: Array, q: Array, h: Array, low: float, high: float, fast: flo
     above, below = value(p, h, 1j * beta), value(q, h, 1j * beta)
     theta = -(above * np.conj(below)).real / np.abs(below) ** 2
     static = -np.sum(p[:, 0]) / np.sum(q[:, 0])
-    late = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(p) - 1)))  # signs of the delayed highest coefficients
-    tops = -(p[0, -1] + late @ p[1:, -1]) / (q[0, -1] + late @ q[1:, -1])
+    top = int(np.flatnonzero(np.any((p != 0) | (q != 0), axis=0))[-1])
+    tops = -(p[:, top] @ corners(sets)) / (q[:, top] @ corners(sets))
     theta = np.concatenate([theta, [static], tops])
     beta = np.concatenate([beta, [0.0], np.full(len(tops), np.inf)])
     inside = np.isfinite(theta) & (theta > low) & (theta < high)
     theta, beta = theta[inside], beta[inside]
     order = np.argsort(theta, kind="stable")
     theta, beta = theta[order], beta[order]
-    apart = np.append(True, np.diff(theta) > 1e-12 * theta[1:]) if len(theta) else np.empty(0, dtype=bool)
-    return theta[apart], beta[apart]
+    blur = np.where(np.isinf(beta), _CORNER, _ROUNDING) * theta
+    apart = np.append(True, np.diff(theta) > np.maximum(blur[1:], blur[:-1])) if len(theta) else np.empty(0, dtype=bool)
+    return theta[apart], np.maximum.reduceat(beta, np.flatnonzero(apart)) if len(beta) else beta

@@ -31,9 +31,9 @@ Gradient = dict[sp.Symbol, sp.Expr]
 
 @dataclass(frozen=True)
 class Term:
-    """Polynomial in s times exp(−s `delay`); coefficients with the lowest power first."""
+    """Polynomial in s times exp(−s delay) for each delay in `late`; coefficients with the lowest power first."""
 
-    delay: sp.Expr
+    late: tuple[sp.Expr, ...]
     coefficients: tuple[sp.Expr, ...]
 
 
@@ -135,7 +135,7 @@ def characteristic_terms(model: Model) -> tuple[Term, ...]:
     lates = sorted({powers[1:] for powers in found} | {nothing}, key=lambda late: (sum(late), late))
     return tuple(
         Term(
-            sp.Add(*(power * delay for power, delay in zip(late, model.delays, strict=True))),
+            tuple(delay for power, delay in zip(late, model.delays, strict=True) if power),
             tuple(found.get((power, *late), sp.Integer(0)) for power in range(highest + 1)),
         )
         for late in lates
@@ -171,11 +171,10 @@ def is_written_out(model: Model) -> bool:
     return _determinant(model) is not None
 
 
-def delays_of_terms(model: Model) -> tuple[sp.Expr, ...]:
-    """Delays (s) of the terms of the characteristic equation, zero first."""
-    if is_written_out(model):
-        return tuple(term.delay for term in characteristic_terms(model))
-    return tuple(sp.Add(*late) for late in sets_of_delays(model))
+@question
+def delays_of_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
+    """Delays (s) that act in each term of the characteristic equation, none in the first; each acts once at most."""
+    return [term.late for term in characteristic_terms(model)] if is_written_out(model) else sets_of_delays(model)
 
 
 def sets_of_delays(model: Model) -> list[tuple[sp.Expr, ...]]:

@@ -147,9 +147,10 @@ class OperatingPoint(Keeper):
         """Point with some of the rigs of a flat point; steady states are not solved for again."""
         if self.single:
             return self
-        cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, *self.steady)]
+        whole = (*self.arguments, *self.steady, self.valid)
+        *cut, valid = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in whole]
         count, many = len(self.arguments), len(self.sigmas)
-        found = self.with_arguments(cut[:count], np.broadcast_shapes(*map(np.shape, cut)))
+        found = replace(self.with_arguments(cut[:count], np.broadcast_shapes(*map(np.shape, cut))), valid=valid)
         found.__dict__["sigmas"], found.__dict__["steady"] = tuple(cut[count : count + many]), tuple(cut[count:])
         return found
 

@@ -58,13 +58,12 @@ def quasipolynomial(point: OperatingPoint) -> tuple[Array, Array]:
     """
     if not point.model.delays:
         return characteristic(point)[..., None, :], np.zeros((*point.shape, 1))
-    late = point.evaluate(point.model.function(delays_of_terms(point.model)))
-    delays = np.stack([np.broadcast_to(one, point.shape) for one in late], axis=-1)
+    delays = delays_of(point) @ delays_in_terms(point.model).T
     if not is_written_out(point.model):
-        return np.stack(coefficients_from_eigenvalues(point), axis=-2), np.asarray(delays, dtype=float)
+        return np.stack(coefficients_from_eigenvalues(point), axis=-2), delays
     width, function = _term_functions(point.model)
     c = stacked(point.evaluate(function), point)
-    return c.reshape(*c.shape[:-1], -1, width), np.asarray(delays, dtype=float)
+    return c.reshape(*c.shape[:-1], -1, width), delays
 
 
 def delays_of(point: OperatingPoint) -> Array:
@@ -73,6 +72,12 @@ def delays_of(point: OperatingPoint) -> Array:
         return np.zeros((*point.shape, 0))
     found = point.evaluate(point.model.function(point.model.delays))
     return np.stack([np.broadcast_to(np.asarray(one, dtype=float), point.shape) for one in found], axis=-1)
+
+
+@question
+def delays_in_terms(model: Model) -> NDArray[np.bool_]:
+    """Table (m, d): True where a term of the quasipolynomial is delayed by a delay of the equations."""
+    return np.array([[own in late for own in model.delays] for late in delays_of_terms(model)], dtype=bool)
 
 
 @question

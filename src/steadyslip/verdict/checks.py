@@ -24,7 +24,7 @@ from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.linear.boundary import Margin, present_zeros, without_edges
 from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.spectrum import is_ill_posed, spectrum, unstable_roots
+from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum, takes_long_to_count
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -41,6 +41,9 @@ with an e-fold of velocity, stress or memory. Chosen by trial: above rounding, b
 SIDE_OFFSETS = (1e-7, 1e-5, 1e-9)
 """Distances from an edge, relative to its value, at which both sides are checked, in this order, until they agree with
 the edge. Chosen by trial: too near, rounding decides; too far, another edge lies between."""
+FURTHER_OFFSETS = (1e-3, 1e-2)
+"""Distances tried then, where the equations become ill-posed: roots under several delays are too many to be counted
+nearer to that."""
 AXIS_TOLERANCE = 1e-6
 """Allowed distance of a root from the imaginary axis at the critical stiffness, relative to the size of the root.
 Chosen by trial, as `GOOD` is."""
@@ -175,7 +178,9 @@ def spectrum_checks(point: OperatingPoint, stable: bool, on_edge: bool) -> tuple
     if growing < 0 and len(share) and not point.model.delays:  # the argument left the range of floating point
         how, growing = "conditions of Routh and Hurwitz", int(np.sum(found.values.real > 0))
     right = growing >= 0 and (on_edge or (growing == 0) == stable)
-    return values, Check("growing roots", how, float(not right), 0.0, right)
+    counted = Check("growing roots", how, float(not right), 0.0, right)
+    none = found.complete and not len(share)  # no rightmost eigenvalue: infinitely many come near a line
+    return (counted,) if none else (values, counted)
 
 
 def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Check:
@@ -196,11 +201,15 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
 def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
     """Margins without the edges that fail their check, and one check per edge: roots on both sides of it."""
     edges = [(margin, edge) for margin in margins for edge in margin.edges]
+    checks = []
+    if takes_long_to_count(operating_point(rig, branch=branch)):  # `margins` leaves parameters out
+        checks.append(Check("edges of other parameters", "counts of roots under several delays", np.inf, 0.0, False))
     if not edges:
-        return tuple(margins), ()
+        return tuple(margins), tuple(checks)
     shares = np.full(len(edges), np.inf)
-    for share in SIDE_OFFSETS:
-        rest = np.flatnonzero(np.isinf(shares))
+    for share in (*SIDE_OFFSETS, *FURTHER_OFFSETS):
+        among = [share in SIDE_OFFSETS or edge.kind == "ill-posed" for _, edge in edges]
+        rest = np.flatnonzero(np.isinf(shares) & among)
         if rest.size:
             sides = _sides(rig, [edges[i] for i in rest], share, branch)
             shares[rest] = [
@@ -208,16 +217,14 @@ def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple
             ]
     lost = np.flatnonzero(np.isinf(shares))
     touching = dict(zip(lost.tolist(), _touching(rig, [edges[i] for i in lost], branch), strict=True))
-    checks = []
     for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
         where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
         if touching.get(i, np.inf) <= AXIS_TOLERANCE:
             what, how = f"{edge.parameter} touches an edge at {where}", "a root on the imaginary axis, sides alike"
             checks.append(check(what, how, touching[i], AXIS_TOLERANCE))
         else:
-            checks.append(
-                check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, max(SIDE_OFFSETS))
-            )
+            most = max(FURTHER_OFFSETS if edge.kind == "ill-posed" else SIDE_OFFSETS)
+            checks.append(check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, most))
     return without_edges(margins, [edges[i][1] for i in lost]), tuple(checks)
 
 
@@ -270,10 +277,10 @@ def _sides_agree(edge: Boundary, below: int, above: int) -> bool:
 def _status_by_roots(point: OperatingPoint) -> NDArray[np.int64]:
     """Status of rigs from their eigenvalues, (n,); independent of the Routh-Hurwitz conditions that scans use."""
     if point.model.delays:
-        grows = unstable_roots(point) != 0
+        grows = counts(point) != 0
     else:
         real = spectrum(point).real
         grows = np.max(np.where(np.isnan(real), -np.inf, real), axis=-1) >= 0
     found = np.where(grows | is_ill_posed(point), UNSTABLE, STABLE)
     found = np.where(point.exists, found, ABSENT)
-    return np.asarray(np.where(in_range(point) & point.valid, found, UNKNOWN))
+    return np.asarray(np.where(in_range(point) & point.valid & can_be_counted(point), found, UNKNOWN))

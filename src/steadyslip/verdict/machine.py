@@ -108,13 +108,13 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
             )
         distances, of_edges = edge_checks(machine, margins(machine), 0)
         posed = numbers["growth_rate"] not in (math.inf, None)
-        leading = numbers["eigenvalues"][0] if posed else 0.0
+        leading = next(iter(numbers["eigenvalues"] if posed else ()), None)
         onset = None if point.model.delays else _onset(machine, distances)
         found = MachineAnalysis(
             rig=machine,
             reason="",
             steady=steady,
-            mode=mode_of(machine, point, complex(leading.real, abs(leading.imag))) if posed else None,
+            mode=None if leading is None else mode_of(machine, point, complex(leading.real, abs(leading.imag))),
             on_edge=edged,
             margins=distances,
             onset=onset,

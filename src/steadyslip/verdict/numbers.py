@@ -11,7 +11,7 @@ from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.polynomials import routh_column
 from steadyslip.linear.quasipolynomial import INFINITE
 from steadyslip.linear.roots import roots
-from steadyslip.linear.spectrum import is_ill_posed, is_stable, spectrum, unstable_roots
+from steadyslip.linear.spectrum import growth, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import relative_errors
@@ -49,20 +49,22 @@ def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
     """Fields of a verdict by name, from the characteristic equation; eigenvalues that fail their check are left out."""
     require_range(values)
     numbers = _with_delays(values) if values.model.delays else _without_delay(values)
-    bad = bool(is_ill_posed(values))
-    if not bad:
+    rate: float | None = math.inf
+    if not is_ill_posed(values):
         found, good = checked_spectrum(values), relative_errors(values)[1]
         if found.refined and found.complete:  # eigenvalues computed with many digits overrule the polynomial
             numbers["stable"] = bool(found.growing == 0 and np.all(found.values != 0))  # eigenvalue 0: neutral
         leading = bool(good[:1].all() and good.size)
         numbers["eigenvalues"] = tuple(complex(s) for s in found.values[good]) if leading else ()
+        no_rightmost = found.complete and not found.values.size
+        rate = float(found.values[0].real) if leading else float(growth(values)) if no_rightmost else None
+        rate = None if rate is not None and math.isnan(rate) else rate
     eigenvalues = numbers["eigenvalues"]
     if eigenvalues and eigenvalues[-1].imag > 0:  # a list of some of infinitely many ends between two of a pair
         eigenvalues = numbers["eigenvalues"] = (*eigenvalues, eigenvalues[-1].conjugate())
-    growth = math.inf if bad else float(eigenvalues[0].real) if eigenvalues else None
-    numbers["growth_rate"] = growth
-    if growth is not None and math.isfinite(growth) and growth != 0:
-        numbers["time_to_halve" if growth < 0 else "time_to_double"] = math.log(2) / abs(growth)
+    numbers["growth_rate"] = rate
+    if rate is not None and math.isfinite(rate) and rate != 0:
+        numbers["time_to_halve" if rate < 0 else "time_to_double"] = math.log(2) / abs(rate)
     oscillation = next((s for s in eigenvalues if s.imag != 0), None)
     if oscillation is not None:
         numbers["period"] = float(2 * math.pi / abs(oscillation.imag))

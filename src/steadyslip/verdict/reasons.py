@@ -27,6 +27,7 @@ REASONS = {
     "on edge": ON_EDGE,
     "free": "without stiffness nothing restores the block's place, so a disturbance neither grows nor dies",
     "never": "no {name} makes sliding stable",
+    "windows": "sliding is stable in windows of {name} too many to be listed",
     "always": "sliding is stable at every {name}",
     "beside": "with this controller sliding is stable whatever the stiffness beside it",
     "stiffness": "the stiffness {own} is {ratio} the critical stiffness {critical}",
@@ -52,6 +53,8 @@ def reason(analysis: Findings) -> str:
     if analysis.on_edge and not abs(ratio - 1) <= NEXT_TO_IT:  # on another edge than that of the stiffness
         return ON_EDGE
     if support.critical is None:
+        if not support.stable and analysis.stable:
+            return REASONS["windows"].format(name=support.name)
         if not support.stable:
             return REASONS["never"].format(name=support.name) + why_never_stable(analysis)
         return (

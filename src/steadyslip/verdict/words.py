@@ -218,6 +218,8 @@ def disturbance(analysis: Verdict) -> str:
         text = f"halves in {format_quantity(analysis.time_to_halve, 's')}"
     else:  # the sign of the leading root is known, its size is lost in rounding
         return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
+    if not analysis.eigenvalues:
+        return f"{text} at the slowest, infinitely many oscillations nearly alike"
     leading = analysis.eigenvalues[0]
     if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
         text += f", oscillating with period {format_quantity(analysis.period, 's')}"

@@ -1,0 +1,123 @@
+"""Highest power of s under delays: whether it can vanish right of the imaginary axis, and how small it can be there.
+
+Of Σ p_j(s) exp(−s h_j) the highest power is multiplied by Σ c_j exp(−s h_j). Each h_j is the sum of a set of delays
+τ_i, so that this is P(x) = Σ c_j Π x_i with x_i = exp(−s τ_i), in which no x_i occurs twice in a term. If P vanishes
+for some |x_i| <= 1, then for delays as near as one likes to the given ones infinitely many roots lie right of the axis
+or as close to it as one likes: the equations are ill-posed (strong stability of neutral equations, Hale & Verduyn Lunel
+1993, section 9.6). Where the delayed terms are together smaller than the one without delay, P does not vanish. The
+converse holds unless terms are products: of two alike bodies, P = (1 + b x)(1 + b y) vanishes for |b| >= 1, not for
+|b| > 0.41.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.linear.roots import Array, ComplexArray, quietly
+
+Sets = NDArray[np.bool_]
+"""Table (m, d): True where term j is delayed by delay i."""
+_SWEEPS = 30  # rounds over all delays; by trial: the smallest value found changes by less than 1e-6 in the last
+_STARTS = 24  # sets of phases from which P is made smaller, beside all of 0 and π, where it is real
+_SURE = 0.5  # share of the smallest value found that is used as a lower bound: another start could find a smaller one
+_STEPS = 257  # places between x = 0 and its value at which the argument of P is followed
+
+
+def highest(c: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Coefficients (rows, m) of the highest power of s, and that power (rows,), for coefficients c (rows, m, n+1)."""
+    present = np.any(c != 0, axis=-2)
+    top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
+    return np.take_along_axis(c, top[..., None, None], axis=-1)[..., 0], top
+
+
+def leads(c: Array) -> NDArray[np.bool_]:
+    """True (rows,) where of the highest power the term without delay is larger than the others together.
+
+    For coefficients c (rows, m, n+1).
+    """
+    sizes = np.abs(highest(c)[0])
+    return np.asarray(2 * sizes[:, 0] > np.sum(sizes, axis=-1))
+
+
+@quietly
+def least_size(c: Array, sets: Sets) -> Array:
+    """Lower bound (rows,) of |P| for all |x_i| <= 1, with coefficients c (rows, m) of P; 0 or less if P vanishes.
+
+    It is exact for two terms. Where delayed terms outweigh the other and some are products, P is made smaller in each
+    x_i by turns, from many starts: as P is linear in each, P = A + B x_i, it vanishes if |B| >= |A| anywhere, and else
+    is smallest on |x_i| = 1. For two delays it is certain that a zero is found: |A|² − |B|² is linear in the cosine of
+    the phase of the other, so that signs at ±1 decide.
+    """
+    found = np.asarray(np.abs(c[:, 0]) - np.sum(np.abs(c[:, 1:]), axis=-1))
+    several = np.any(c[:, np.sum(sets, axis=1) > 1] != 0, axis=-1)
+    for row in np.flatnonzero((found <= 0) & several & (c[:, 0] != 0)):
+        found[row] = _SURE * _smallest(c[row], sets)
+    return found
+
+
+def _smallest(c: Array, sets: Sets) -> float:
+    """Smallest |P| found, for coefficients c (m,) of one rig; 0 if P vanishes."""
+    count = sets.shape[1]
+    phases = 2 * np.pi * np.random.default_rng(0).random((_STARTS, count))
+    x = np.vstack([_signs(count), np.exp(1j * phases)])
+    least = np.inf
+    for _ in range(_SWEEPS):
+        for i in range(count):
+            terms = c * np.prod(np.where(sets & (np.arange(count) != i), x[:, None, :], 1.0), axis=-1)
+            with_it, without = np.sum(terms[:, sets[:, i]], axis=-1), np.sum(terms[:, ~sets[:, i]], axis=-1)
+            left = np.abs(without) - np.abs(with_it)
+            if np.any(left <= 0):
+                return 0.0
+            least = min(least, float(np.min(left)))
+            opposite = -without * np.conj(with_it)
+            x[:, i] = np.where(opposite != 0, opposite / np.abs(opposite), x[:, i])
+    return least
+
+
+def _signs(count: int) -> Array:
+    return np.array(list(product((1.0, -1.0), repeat=count))).reshape(-1, count)
+
+
+def corners(sets: Sets) -> Array:
+    """Products of x_i in each term where all x_i are 1 or −1, (m, 2^d).
+
+    If dampings are mutual, P first vanishes at one of them as delayed terms grow.
+    """
+    return np.asarray(np.prod(np.where(sets[:, None, :], _signs(sets.shape[1]), 1.0), axis=-1))
+
+
+def can_vanish(c: Array, sets: Sets) -> NDArray[np.bool_]:
+    """True (...) where the highest power of s can vanish right of the axis or on it; coefficients c (..., m, n+1)."""
+    top, _ = highest(c.reshape(-1, *c.shape[-2:]))
+    return np.asarray(least_size(top, sets) <= 0).reshape(c.shape[:-2])
+
+
+@quietly
+def bound_on_axis(c: Array, sets: Sets) -> Array:
+    """Upper bound (rows,) of |s| of roots on the axis and right of it (Fujiwara), for coefficients c (rows, m, n+1).
+
+    NaN where there is none: the highest power can vanish.
+    """
+    coefficients, top = highest(c)
+    left = least_size(coefficients, sets)
+    left = np.where(left > 0, left, np.nan)
+    total = np.sum(np.abs(c), axis=-2)
+    below = top[:, None] - np.arange(c.shape[-1])
+    ratios = np.where(below > 0, (total / left[:, None]) ** (1.0 / np.maximum(below, 1)), 0.0)
+    bound = 2.0 * np.max(ratios, axis=-1)
+    return np.asarray(np.where((top == 0) | (bound == 0), 1.0, bound))
+
+
+def argument_at(c: Array, h: Array, sets: Sets, omega: Array) -> tuple[ComplexArray, Array]:
+    """P at x_i = exp(−iω τ_i), and its argument beside that of P(0), (rows,), followed from x = 0.
+
+    For coefficients c (rows, m) of P, which must not vanish for |x_i| <= 1, delays h (rows, m) of its terms and ω
+    (rows,). Where terms are products, the argument may be larger than π.
+    """
+    size = np.linspace(0.0, 1.0, _STEPS)[:, None] ** np.sum(sets, axis=1)
+    values = (c * np.exp(-1j * h * omega[:, None]))[:, None, :] * size
+    along = np.sum(values, axis=-1)
+    return along[:, -1], np.unwrap(np.angle(along / c[:, :1]), axis=-1)[:, -1]

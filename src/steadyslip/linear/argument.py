@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.linear.neutral import Sets, argument_at, bound_on_axis, highest, leads
-from steadyslip.linear.roots import Array, ComplexArray, evaluate
+from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly
 
 UNKNOWN = -2  # count of roots where counting takes too long
 _MOST = 400_000  # unresolved pieces of the axis, of all rigs together, before counting is given up; by trial: memory
@@ -132,6 +132,7 @@ class SumsOnAxis:
         return total
 
 
+@quietly
 def count_by_argument(c: Array, h: Array, sets: Sets) -> NDArray[np.int64]:
     """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m), whose terms `sets` tells.
 

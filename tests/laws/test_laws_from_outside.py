@@ -5,6 +5,7 @@ Each law is a class and no edit. What it says of itself (kinds, standing values)
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 
@@ -365,3 +366,39 @@ def test_numbers_in_a_law_need_not_be_symbols(monkeypatch):
     one, other = (rig(friction=law(distance=1e-5)) for law in (Law, Other))
     assert ss.growth_rate(other) == pytest.approx(ss.growth_rate(one), rel=1e-12)
     assert ss.analyze(other).stable == ss.analyze(one).stable
+
+
+WRONG_ANSWERS = {
+    "strength of Faulty gives None": {"strength": None},
+    "strength of Faulty gives 'x'": {"strength": "x"},
+    "rates of Faulty gives a bare Mul; allowed: a tuple of 1": {"rates": -sp.Symbol("r")},
+    "rates of Faulty gives 2; allowed: a tuple of 1": {"rates": (0, 0)},
+    "steady_memory of Faulty gives a bare NoneType; allowed: a tuple of 1": {"steady": None},
+    r"strength of Faulty does not work with symbols .* sp\.log": {"strength": math.log},
+}
+
+
+@pytest.mark.parametrize("sentence", WRONG_ANSWERS)
+def test_what_a_method_of_a_law_must_give_is_told(sentence, monkeypatch):
+    """Instead of an error from inside SymPy."""
+    monkeypatch.setattr(ss.laws.FrictionLaw, "registry", dict(BEFORE[0]))
+    given = WRONG_ANSWERS[sentence]
+
+    class Faulty(ss.laws.FrictionLaw, name="faulty"):
+        a: float = ss.laws.parameter("1", positive, "direct effect")
+
+        def memory(self):
+            return ("Theta",)
+
+        def strength(self, v, sigma, memory, tau):
+            found = given.get("strength", sigma * (0.6 + self.a * sp.log(v / V0) + memory[0]))
+            return found(v) if callable(found) else found
+
+        def rates(self, v, sigma, memory, tau):
+            return given.get("rates", (-v * memory[0],))
+
+        def steady_memory(self, v, sigma):
+            return given.get("steady", (0,))
+
+    with pytest.raises(ss.NotAvailable, match=sentence):
+        ss.analyze(rig(friction=Faulty(a=0.01)))

@@ -141,7 +141,7 @@ def supported(e: Any, what: str) -> sp.Expr:
             name = str(one) if one.is_Atom else f"{one.func.__name__}(...)"
             raise NotAvailable(
                 f"the {what} contains {name}, which is not offered; allowed: numbers, arguments, powers, Piecewise, "
-                f"Max, Min, sign, Abs, exp, log, trigonometric and hyperbolic functions and their inverses"
+                f"Max, Min, sign, Abs, exp, log, sin, cos, tan, sinh, cosh, tanh and their inverses"
             )
     return found
 

@@ -13,7 +13,7 @@ from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import Letters
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
 from steadyslip.model.equations import HELD, MOVED, TIME, V_LP, Contact, Coordinate, Model, P, Q, Variable
-from steadyslip.model.forces import INTEGRAL, Forces, SymbolicContact, of_law
+from steadyslip.model.forces import INTEGRAL, Forces, SymbolicContact, all_of_law, of_law
 from steadyslip.model.names import Observables, check_names, merge_observables
 from steadyslip.model.statics import row_of
 
@@ -113,8 +113,8 @@ class _Assembly(Forces):
             balance=self._strength(site) - site.tau,
             unknown=own_unknown if self.single else site.tau,
             sigma_ss=site.sigma_ss,
-            steady_stress=of_law(contact, "normal_stress", contact.normal_stress(motion.steady)),
-            steady_coupling=of_law(contact, "coupling", contact.coupling(motion.steady)),
+            steady_stress=of_law(contact, "normal_stress", motion.steady),
+            steady_coupling=of_law(contact, "coupling", motion.steady),
             steady_load=None if load is None else sp.sympify(load),
             imposed=sp.sympify(contact.imposed(TIME)),
             direction=sp.sympify(friction.direction(site.velocity, site.speed)),
@@ -128,9 +128,9 @@ class _Assembly(Forces):
         law, now = site.port.friction, (site.sigma, site.memory, site.tau)
         delay = law.lateness()
         if delay == 0:
-            return of_law(law, "strength", law.strength(site.velocity, *now))
+            return of_law(law, "strength", site.velocity, *now)
         late = row_of(site.port.slip, self._delayed(delay, self.moving))
-        return of_law(law, "late_strength", law.late_strength(site.velocity, late, *now))
+        return of_law(law, "late_strength", site.velocity, late, *now)
 
     def _variables(
         self, coordinates: tuple[Coordinate, ...], contacts: tuple[Contact, ...]
@@ -148,9 +148,9 @@ class _Assembly(Forces):
                 rates.append(one.acceleration)
         for contact, site, motion in zip(contacts, self.sites, self.motions, strict=True):
             variables += [*contact.memory, *contact.own_states]
-            law = site.port.friction
-            rates += [of_law(law, "rates", e) for e in law.rates(site.velocity, site.sigma, site.memory, site.tau)]
-            rates += [of_law(site.port.contact, "rates", e) for e in site.port.contact.rates(motion)]
+            now = site.velocity, site.sigma, site.memory, site.tau
+            rates += all_of_law(site.port.friction, "rates", len(site.memory), *now)
+            rates += all_of_law(site.port.contact, "rates", len(site.states), motion)
         integral = self.mechanism.integral
         if integral is not None:
             what = "time integral of x (controller)" if self.single else "time integral of the controller's error"
@@ -182,9 +182,9 @@ class _Assembly(Forces):
             found[site.velocity] = site.speed
             found |= {site.spring: sp.sympify(motion.steady_spring), site.tau: site.tau_ss}
             found[site.sigma] = site.sigma_ss
-            memory = site.port.friction.steady_memory(site.speed, site.sigma_ss)
-            known = (of_law(site.port.friction, "steady_memory", one) for one in memory)
-            found |= dict(zip(site.memory, known, strict=True))
+            steady = site.speed, site.sigma_ss
+            memory = all_of_law(site.port.friction, "steady_memory", len(site.memory), *steady)
+            found |= dict(zip(site.memory, memory, strict=True))
             found |= dict(zip(site.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
         without = (*self.push.values(), *(one for site in self.sites for one in (site.press, site.outside)))

@@ -46,12 +46,47 @@ class SymbolicContact:
     @cached_property
     def tau_ss(self) -> sp.Expr:
         """Friction stress in steady sliding."""
-        law = self.port.friction
-        return of_law(law, "steady_strength", law.steady_strength(self.speed, self.sigma_ss))
+        given = self.speed, self.sigma_ss
+        all_of_law(self.port.friction, "steady_memory", len(self.memory), *given)  # on which the strength may rest
+        return of_law(self.port.friction, "steady_strength", *given)
 
 
-def of_law(law: object, method: str, found: Any) -> sp.Expr:
-    """What a method of a friction or contact law gave, if the Model can use it."""
+def of_law(law: object, method: str, *arguments: Any) -> sp.Expr:
+    """Expression that a method of a friction or contact law gives, if the Model can use it.
+
+    Raises
+    ------
+    NotAvailable
+        If it gives no expression, or one that cannot be computed; see `supported`.
+    """
+    return _usable(law, method, _answer(law, method, arguments))
+
+
+def all_of_law(law: object, method: str, count: int, *arguments: Any) -> tuple[sp.Expr, ...]:
+    """Expressions that a method gives for `count` memory variables; raises as `of_law` does."""
+    found = _answer(law, method, arguments)
+    if not isinstance(found, (tuple, list)) or len(found) != count:
+        given = len(found) if isinstance(found, (tuple, list)) else f"a bare {type(found).__name__}"
+        raise NotAvailable(
+            f"{method} of {type(law).__name__} gives {given}; allowed: a tuple of {count}, one expression for each "
+            "memory variable"
+        )
+    return tuple(_usable(law, method, one) for one in found)
+
+
+def _answer(law: object, method: str, arguments: tuple[Any, ...]) -> Any:
+    try:
+        return getattr(law, method)(*arguments)
+    except TypeError as error:  # float() of a symbol, by functions of `math` and `if`
+        raise NotAvailable(
+            f"{method} of {type(law).__name__} does not work with symbols ({error}); use functions of SymPy such as "
+            "sp.log, and sp.Piecewise for branches"
+        ) from error
+
+
+def _usable(law: object, method: str, found: Any) -> sp.Expr:
+    if not isinstance(found, (sp.Expr, int, float)):
+        raise NotAvailable(f"{method} of {type(law).__name__} gives {found!r}; allowed: a number or an expression")
     return supported(found, f"{method} of {type(law).__name__}")
 
 
@@ -165,7 +200,7 @@ class Forces:
             normal[port.name] = NormalStress(site.sigma_ss, sp.Integer(0))
             if port.separation and port.contact.is_compliant():
                 still = replace(self._motion(site, sp.nan, sp.nan, distance, distance), separation_rate=0)
-                pressed = sp.sympify(port.contact.normal_stress(still))
+                pressed = of_law(port.contact, "normal_stress", still)
                 at_contact, slope = pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance)
                 normal[port.name] = NormalStress(at_contact, slope)
         return statics(self.mechanism, friction, normal, self.letters.symbol)
@@ -182,7 +217,7 @@ class Forces:
         return ContactInputs(
             site.slip, site.velocity, site.acceleration, site.spring, spring_ss, site.tau, site.tau_ss,
             stiffness, site.speed, separation, steady_separation, row_of(site.port.separation, self.v),
-            site.states, tuple(map(sp.sympify, site.port.contact.steady_memory(site.speed))), site.outside,
+            site.states, all_of_law(site.port.contact, "steady_memory", len(site.states), site.speed), site.outside,
         )  # fmt: skip
 
     # -- forces
@@ -326,7 +361,7 @@ class Forces:
                 self.definitions[site.velocity] = row_of(site.port.slip, self.moving)
         self.motions = [self._contact_motion(site) for site in self.sites]
         self.normal = [
-            sp.sympify(p.port.contact.normal_stress(m)) + p.press for p, m in zip(self.sites, self.motions, strict=True)
+            of_law(p.port.contact, "normal_stress", m) + p.press for p, m in zip(self.sites, self.motions, strict=True)
         ]
         self.inertial = {
             one.name: one.inertia != 0 or any(law.has(self.a[one.name]) for law in self.normal)

@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -536,3 +538,31 @@ def test_the_edge_where_late_terms_outweigh_is_found_from_every_gain(kd):
     assert verdict.stable
     assert verdict.growth_rate == pytest.approx(rate)
     assert ("infinitely many oscillations nearly alike" in str(verdict)) == (not verdict.eigenvalues)
+
+
+def turns_around(f, box, many):
+    """Zeros of f in a box from 0 to `box` and ±i `box`, by how it turns along the sides; None if places are too few."""
+    at = [-1j * box, box - 1j * box, box + 1j * box, 1j * box, -1j * box]
+    sides = [a + (b - a) * np.linspace(0, 1, many)[1:] for a, b in pairwise(at)]
+    values = f(np.concatenate([[at[0]], *sides]))
+    steps = np.angle(values[1:] / values[:-1])
+    return round(np.sum(steps) / (2 * np.pi)) if np.max(np.abs(steps)) < 1.5 else None
+
+
+def test_counts_where_late_terms_of_the_highest_power_outweigh_are_those_around_a_box():
+    """Random sums of four terms under two delays and both together, no product of factors."""
+    chance, sets = np.random.default_rng(5), np.array([[0, 0], [1, 0], [0, 1], [1, 1]], dtype=bool)
+    seen = []
+    while len(seen) < 60:
+        c = chance.normal(size=(4, int(chance.integers(2, 5)))) * 10 ** chance.uniform(-1, 0.7)
+        c[:, -1] = np.append(1.0, chance.uniform(-1, 1, 3) * [0.95, 0.95, 0.6])
+        if np.sum(np.abs(c[1:, -1])) < 1 or neutral.least_size(c[:, -1][None], sets)[0] <= 0.05:
+            continue
+        h, box = sets @ 10 ** chance.uniform(-1, 0.5, 2), 1.05 * float(neutral.bound_on_axis(c[None], sets)[0])
+        if box > 400:
+            continue
+        around = turns_around(partial(quasi.value, c, h), box, int(120 * box * max(1, h.max())) + 2000)
+        if around is not None:
+            assert int(quasi.count_right(c, h, sets)) == around
+            seen.append(around)
+    assert len(set(seen)) > 4

@@ -7,14 +7,12 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from steadyslip.core.errors import NotAvailable
-
-if TYPE_CHECKING:
-    import numpy as np  # commands start without it
 
 _NO_FILES = ("/dev", "/proc", "/sys")
 FIGURES = (".png", ".svg", ".pdf")
@@ -143,19 +141,33 @@ def write_text(path: str | PathLike[str], text: str) -> None:
         Path(temporary).write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_columns(path: str | PathLike[str], columns: Mapping[str, np.ndarray], form: str) -> None:
-    """Write arrays as comma-separated text under their titles, in a number format such as ``%.12g``.
+def write_columns(path: str | PathLike[str], columns: Mapping[str, Iterable[Any]], form: str) -> None:
+    """Write columns as comma-separated text under their titles.
+
+    Parameters
+    ----------
+    columns : mapping of str to iterable
+        Numbers or text, as many in each; None leaves a cell empty.
+    form : str
+        Format of numbers, such as ``%.12g``.
 
     Raises
     ------
     NotAvailable
         If the file cannot be written.
     """
-    import numpy as np
 
-    with whole_file(path) as temporary:
-        table = np.column_stack(list(columns.values()))
-        np.savetxt(temporary, table, form, ",", header=",".join(columns), comments="", encoding="utf-8")
+    def quoted(one: str) -> str:
+        return '"' + one.replace('"', '""') + '"' if set(one) & set(',"\n') else one
+
+    def cells(column: Iterable[Any]) -> Iterable[str]:
+        if getattr(getattr(column, "dtype", None), "kind", "") == "f":
+            return map(form.__mod__, column.tolist())  # type: ignore[attr-defined]  # an array, often a long one
+        return (quoted(one) if isinstance(one, str) else "" if one is None else form % one for one in column)
+
+    rows = zip(*map(cells, columns.values()), strict=True)
+    with whole_file(path) as temporary, Path(temporary).open("w", encoding="utf-8", newline="\n") as target:
+        target.writelines(f"{','.join(row)}\n" for row in chain([map(quoted, columns)], rows))
 
 
 def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:

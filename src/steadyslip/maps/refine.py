@@ -23,7 +23,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.files.output import write_text
+from steadyslip.files.output import write_columns
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.maps.plan.axes import SAMPLE
@@ -94,13 +94,11 @@ class Refined(ReadOnly):
             If the file cannot be written.
         """
         words = self.map.words(self.of)
-        names = [f"{name} ({self.map.unit(name)})" for name in self.edge]
-        columns = [[repr(float(v)) for v in column] for column in self.edge.values()]
-        for side in (0, 1):
+        columns: dict[str, Any] = {f"{name} ({self.map.unit(name)})": own for name, own in self.edge.items()}
+        for side, title in enumerate(("one side", "other side")):
             sides: Any = self.sides[:, side] if len(self.sides) else []
-            columns.append([words[int(s)] if words else ("below", "above")[int(s)] for s in sides])
-        rows = [",".join([*names, "one side", "other side"]), *(",".join(row) for row in zip(*columns, strict=True))]
-        write_text(path, "\n".join(rows) + "\n")
+            columns[title] = [words[int(s)] if words else ("below", "above")[int(s)] for s in sides]
+        write_columns(path, columns, "%r")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw new points and edge; see `steadyslip.figures.refined`."""

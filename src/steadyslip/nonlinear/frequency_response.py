@@ -12,7 +12,7 @@ from steadyslip.core.areas import outside
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.files.output import write_text
+from steadyslip.files.output import write_columns
 from steadyslip.linear.frequency import transfer
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -228,17 +228,15 @@ class FrequencyResponse(ReadOnly):
                   f"linear to ({amplitude_unit})", f"lost at ({amplitude_unit})")  # fmt: skip
         limits = (given * self.linear_to, given * self.lost_at)
         nothing, steady = np.zeros_like(self.periods), np.full_like(self.periods, self.steady_friction)
-        columns: list[tuple[Any, ...]] = [
-            (ratio * self.gain, self.phase, nothing, steady, nothing, ["linear"] * len(nothing))
-        ]
-        for j in range(len(self.amplitudes)):
-            own = (self.shift[j] * answered, self.mean_friction[j], self.distortion[j], self.status[j])
-            columns.append((ratio * self.gains[j], self.phases[j], *own))
-        rows: list[tuple[Any, ...]] = [titles]
-        for amplitude, own in zip((0.0, *(given * self.amplitudes)), columns, strict=True):
-            rows += [(amplitude, *one) for one in zip(self.periods, *own, *limits, strict=True)]
-        words = (",".join(one if isinstance(one, str) else f"{one:.12g}" for one in row) for row in rows)
-        write_text(path, "\n".join([*words, ""]))
+        small = (nothing, self.periods, ratio * self.gain, self.phase, nothing, steady, nothing,
+                 np.full(len(nothing), "linear"), *limits)  # fmt: skip
+        parts: list[tuple[Array, ...]] = [small]
+        for j, amplitude in enumerate(given * self.amplitudes):
+            parts.append((np.full_like(nothing, amplitude), self.periods, ratio * self.gains[j], self.phases[j],
+                          self.shift[j] * answered, self.mean_friction[j], self.distortion[j], self.status[j],
+                          *limits))  # fmt: skip
+        columns = map(np.concatenate, zip(*parts, strict=True))
+        write_columns(path, dict(zip(titles, columns, strict=True)), "%.12g")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw gain and phase over the period; see `steadyslip.figures.frequency_response`."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
@@ -23,7 +21,7 @@ from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.words import short_names
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
-from steadyslip.files.output import write_text
+from steadyslip.files.output import write_columns, write_text
 from steadyslip.machine.slider import Slider
 
 SHOWN = {"displacement": "mm", "m": "um", "m/s": "um/s", "Pa": "MPa", "Pa/m": "GPa/m"}
@@ -122,30 +120,23 @@ class StepTable(Displayed):
             lines.append(line.about() | {"estimates": own})
         return {"lines": lines, "left_out": list(self.left_out), "methods": self.methods}
 
-    def csv_text(self) -> str:
-        """Table as comma-separated text, SI units in the header; an error is empty where a value is not determined."""
-        names = self._estimated()
-        titles = [f"{name} ({unit})" if unit else name for name, unit in ABOUT.items()]
-        titles += [f"{name}{what} ({unit})" for name, unit in names.items() for what in ("", " error")]
-        target = io.StringIO()
-        writer = csv.writer(target, lineterminator="\n")
-        writer.writerow(titles)
-        for line in self.lines:
-            own = line.estimates()
-            pairs = [(one.value, one.error if one.determined else None) if (one := own.get(name)) else (None, None)
-                     for name in names]  # fmt: skip
-            writer.writerow(map(_plain, [*line.about().values(), *(x for pair in pairs for x in pair)]))
-        return target.getvalue()
-
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the table as CSV.
+        """Write the table as CSV, SI units in the header; an error is empty where a value is not determined.
 
         Raises
         ------
         NotAvailable
             If the file cannot be written.
         """
-        write_text(path, self.csv_text())
+        about, own = [line.about() for line in self.lines], [line.estimates() for line in self.lines]
+        columns: dict[str, list[Any]] = {
+            f"{name} ({unit})" if unit else name: [one[name] for one in about] for name, unit in ABOUT.items()
+        }
+        for name, si in self._estimated().items():
+            found = [one.get(name) for one in own]
+            columns[f"{name} ({si})"] = [one and one.value for one in found]
+            columns[f"{name} error ({si})"] = [one.error if one and one.determined else None for one in found]
+        write_columns(path, columns, "%.8g")
 
     def latex_text(self) -> str:
         r"""Table as LaTeX: a ``tabular``, with the sentence for the methods section as a comment above it."""
@@ -260,10 +251,6 @@ def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
     if step.unit == "Pa" and load is not None:
         rates = (float(load.at(np.array([step.time]))[0]),) * 2
     return FittedStep(record.source, step, alone, moved, normal, rates)
-
-
-def _plain(value: Any) -> str:
-    return "" if value is None else f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
 def _shown(si: str, column: str = "") -> str:

@@ -1,6 +1,7 @@
 """Pages of machines: what they say is what Python says, to rounding, and in the same words."""
 
 import re
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -8,13 +9,15 @@ import pytest
 
 import steadyslip as ss
 from explored import ExploredMachine, MovedOnAPage, differences, same_motion
-from machines import at_random, two_mass
+from machines import at_random, surface, two_mass
 from steadyslip.explorer.assembly import page_parts
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.motion import OPTIONS
 from steadyslip.files.specifications.read import rig_from_text
 from steadyslip.kernels.layout import Setting
+from steadyslip.linear.status import status
+from steadyslip.model.point import operating_point
 from steadyslip.motion.jobs import prepare
 
 MACHINES = Path(__file__).parents[2] / "examples" / "machines"
@@ -156,3 +159,33 @@ def test_the_sketch_of_a_page_has_everything_that_moves(name):
     assert not re.search(r">[^<]*\d (k|M|G|µ|m)?(N|kg|m|rad)\b", text)  # numbers change on the page, not in the sketch
     for one in (*machine.bodies, *machine.links, *machine.contacts):
         assert one in text
+
+
+VANISHING = (
+    "bodies.p.mass", "bodies.q.mass", "links.s.damping", "links.t.damping", "contacts.c.friction.bristle_damping",
+    "contacts.c.friction.viscous",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("without", [(), ("bodies.q.mass",), ("bodies.p.mass",)])
+def test_what_vanishes_on_a_page_is_judged_as_in_python(without):
+    """Masses, dampings and what a bristle adds at once, each set to 0 or not: up to four powers of s are lost."""
+    law = ss.laws.LuGre(
+        mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
+    )
+    machine = ss.Machine(
+        bodies={"p": ss.machine.SlidingBody(mass=1.0), "q": ss.machine.SlidingBody(mass=0.5)},
+        links={
+            "s": ss.machine.Spring(between=("drive", "q"), stiffness=1e5, damping=3.0),
+            "t": ss.machine.Spring(between=("q", "p"), stiffness=2e5, damping=2.0),
+        },
+        contacts={"c": surface("p", law, load=100.0)},
+        drive=ss.machine.Pull(velocity=1e-3),
+    ).with_values(dict.fromkeys(without, 0.0))
+    explored, names = ExploredMachine(machine), [name for name in VANISHING if name not in without]
+    for kept in product((0.0, 1.0), repeat=len(names)):
+        vary = {name: share * machine.value(name) for name, share in zip(names, kept, strict=True)}
+        point = operating_point(machine, {name: np.array([value]) for name, value in vary.items()})
+        values = [float(np.ravel(one)[0]) for one in point.arguments]
+        found = explored.script("linear.set(values).assess().status", values=values)
+        assert found == int(status(point)[0]) == int(status(operating_point(machine.with_values(vary)))), vary

@@ -28,7 +28,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
-from steadyslip.model.posed import missing_inertias
+from steadyslip.model.posed import vanishing_terms
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, ROOT_TOLERANCE, joint_equation
 from steadyslip.model.underflow import highest_coefficients, highest_is_lost
@@ -93,7 +93,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         programs.append(program(model, "split", [*without, *slope]))
         programs.append(program(model, "stiffness", [model.axial_share or 1, model.gain]))
         further = {"gain": rig.gain_name()}
-    edges = _stable_set_programs(len(coefficients) - 1, 1 if any(missing_inertias(model)) else 0)
+    edges = _stable_set_programs(len(coefficients) - 1, sum(map(len, vanishing_terms(model))))
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
     facts = {
@@ -157,17 +157,23 @@ def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Progr
         if levels:
             lost = highest_is_lost([[(next(rest), next(rest)) for _ in level] for level in levels], select)
             c[-1] = select(lost > 0, float("nan"), c[-1])
-        spare = sum((select(abs(inertia) <= 0, 1.0, 0.0) for inertia in rest), start=free)
-        return _verdict_values(c, spare)
+        spare: Value = 0.0
+        for terms in vanishing:
+            gone: Value = 0.0  # the sizes of inertia, and of inertia and damping together
+            for _ in terms:
+                gone = gone + abs(next(rest))
+                spare = spare + select(gone <= 0, 1.0, 0.0)
+        return _verdict_values(c, spare, sum(map(len, vanishing)))
 
-    free, inertias = missing_inertias(model)
+    vanishing = vanishing_terms(model)
     further = [e for level in levels for pair in level for e in pair]
-    return program(model, "coefficients", [*coefficients, *further, *inertias], then=judged)
+    further += [e for terms in vanishing for e in terms]
+    return program(model, "coefficients", [*coefficients, *further], then=judged)
 
 
-def _verdict_values(c: list[Node], spare: Value) -> list[Value]:
+def _verdict_values(c: list[Node], spare: Value, most: int) -> list[Value]:
     """Coefficients, 1 or 0 for stable and for ill-posed, and the functions of `crossing.judged`, as nodes."""
-    stable, functions = crossing.judged(c, select, spare)
+    stable, functions = crossing.judged(c, select, spare, most)
     return [*c, *(select(truth, 1.0, 0.0) for truth in (stable, crossing.is_ill_posed(c, spare))), *functions]
 
 

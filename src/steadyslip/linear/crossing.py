@@ -86,9 +86,14 @@ def stiffness_on_axis(p: Polynomial, q: Polynomial, square: Any) -> Any:
 
 
 def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple[Any, Any]:
-    """k at which a root of p + k q is zero, and k at which the highest coefficient vanishes (a root is infinite)."""
-    none = (abs(p[-1]) <= 0) & (abs(q[-1]) <= 0)
-    return -p[0] / q[0], choose(none, -p[-2] / q[-2], -p[-1] / q[-1])
+    """k at which a root of p + k q is zero, and k at which the highest coefficient vanishes (a root is infinite).
+
+    The highest is that of the highest power which p or q has.
+    """
+    top = -p[0] / q[0]
+    for one, other in zip(p[1:], q[1:], strict=True):
+        top = choose((abs(one) <= 0) & (abs(other) <= 0), top, -one / other)
+    return -p[0] / q[0], top
 
 
 def linear_split(
@@ -113,32 +118,39 @@ def linear_split(
     return p, q, straight
 
 
-def is_hurwitz(c: Polynomial, choose: Choose, spare: Any) -> Any:
-    """True if all roots lie left of the axis and the highest coefficient is positive (or, if 0 and spare, the second).
+def is_hurwitz(c: Polynomial, choose: Choose, spare: int) -> Any:
+    """True if all roots lie left of the axis and the highest coefficient, but for `spare` that may be 0, is positive.
 
     For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
     """
-    return judged(c, choose, spare)[0]
+    return judged(c, choose, spare, spare)[0]
 
 
-def judged(c: Polynomial, choose: Choose, spare: Any) -> tuple[Any, list[Any]]:
+def judged(c: Polynomial, choose: Choose, spare: Any, most: int) -> tuple[Any, list[Any]]:
     """`is_hurwitz`, and factors of three functions, one of which changes sign wherever that changes.
+
+    `spare` of the highest coefficients may be 0, which is never more than `most`.
 
     The three are the lowest coefficient (one root is zero), the highest (one is infinite), and the last but one
     determinant of Hurwitz, which is the product of all sums of two roots but for a factor (Orlando; two are ±iβ). The
-    third has several factors, entries of the Routh array. Without mass the highest is the second highest.
+    third has several factors, entries of the Routh array. Where highest coefficients are 0, the next counts as such.
     """
     largest: Any = 0.0
     for one in c:
         largest = choose(abs(one) > largest, abs(one), largest)
     scaled = [one / largest for one in c]
-    full, less = routh(scaled), routh(scaled[:-1])
-    massless = abs(c[-1]) <= 0
-    stable = ((c[-1] > 0) & _all_positive(full)) | (massless & (spare >= 1) & _all_positive(less))
-    determinant = [
-        choose(massless, few, one) for one, few in zip(full[1:-1], [*less[1:-1], 1.0][: len(c) - 2], strict=True)
-    ]
-    return stable, [scaled[0], choose(massless, scaled[-2], scaled[-1]), *determinant]
+    stable: Any = False
+    gone: Any = True
+    highest, determinant = scaled[-1], routh(scaled)[1:-1]
+    for lost in range(min(most, len(c) - 2) + 1):
+        column = routh(scaled[: len(c) - lost])
+        if lost:
+            gone = (abs(c[-lost]) <= 0) & gone
+            highest = choose(gone, scaled[-1 - lost], highest)
+            factors = [*column[1:-1], *[1.0] * lost][: len(c) - 2]
+            determinant = [choose(gone, few, one) for one, few in zip(determinant, factors, strict=True)]
+        stable = (_all_positive(column) & (spare >= lost) & gone) | stable
+    return stable, [scaled[0], highest, *determinant]
 
 
 def _all_positive(values: Polynomial) -> Any:

@@ -63,10 +63,18 @@ def balance_jacobian(model: Model) -> list[list[sp.Expr]]:
     return rows
 
 
-def missing_inertias(model: Model) -> tuple[int, list[sp.Expr]]:
-    """Number of coordinates that have neither inertia nor contact, and the inertias (which may be 0) of others."""
-    free = ~_of_contacts(model) & ~_inertial(model)
-    return int(np.sum(free)), [one.inertia for one in model.coordinates if one.inertial]
+def vanishing_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
+    """Inertia and damping of each coordinate, without which its highest power of s is lost, and then the next.
+
+    The damping only where no contact determines the velocity, and the equations have the one or the other. The sum over
+    all coordinates is `spare_powers` but for dampings that leave only combinations of velocities undetermined.
+    """
+    found = [(one.inertia,) if one.inertial else () for one in model.coordinates]
+    for i in np.flatnonzero(~_of_contacts(model)):
+        damping = _dissipation_entries(model)[i * (len(found) + 1)]
+        if found[i] or damping != 0:
+            found[i] += (damping,)
+    return found
 
 
 @question

@@ -14,6 +14,7 @@ from rigs_of_theory import rig
 from steadyslip import cli, reproduce as reproducing
 from steadyslip.experiments.answers import laws, predict as predicting, uncertainty
 from steadyslip.experiments.fitting import forward, search
+from steadyslip.files import output
 from steadyslip.maps.sensitivity import LEAST
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
@@ -132,13 +133,22 @@ def test_figures_that_are_written_are_named(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} == {"fig1.png", "fig1.svg"}
 
 
-@pytest.mark.parametrize(("ending", "owner", "writer"), [(".csv", np, "savetxt"), (".png", Figure, "savefig")])
-def test_a_file_that_was_there_stays_whole_until_the_new_one_is(ending, owner, writer, monkeypatch, tmp_path):
-    def begun(*arguments, **_):
-        path = next(given for given in arguments if isinstance(given, (str, Path)))
-        Path(path).write_text("half of")
-        raise KeyboardInterrupt
+def half_a_figure(*arguments, **_):
+    path = next(given for given in arguments if isinstance(given, (str, Path)))
+    Path(path).write_text("half of")
+    raise KeyboardInterrupt
 
+
+def half_a_table(titles, rows):
+    yield from titles
+    yield next(iter(rows))
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(("ending", "owner", "writer", "begun"), [
+    (".csv", output, "chain", half_a_table), (".png", Figure, "savefig", half_a_figure),
+])  # fmt: skip
+def test_a_file_that_was_there_stays_whole_until_the_new_one_is(ending, owner, writer, begun, monkeypatch, tmp_path):
     run = ss.simulate(rig(), until=1.0)
     path = tmp_path / f"run{ending}"
     path.write_text("the last run")

@@ -157,7 +157,11 @@ velocity = "0 m/s"
         ("# only a comment", "friction", "missing table"),
         ("[friction", "rig.toml", "is not TOML"),
         ("friction = 3", "friction", "allowed: a table [friction]"),
-        (TEXT.replace('law = "rate-state"', ""), "friction.law", "allowed: coulomb-stribeck, lugre, rate-state"),
+        (
+            TEXT.replace('law = "rate-state"', ""),
+            "friction.law",
+            "allowed: coulomb, coulomb-stribeck, lugre, rate-state",
+        ),
         (TEXT.replace('law = "rate-state"', "law = 3"), "friction.law", "unknown friction law 3"),
         (TEXT.replace("b = 0.0160", ""), "friction.b", "give b and d_c (one state) or a list of states"),
         (TEXT.replace("alpha = 0.56", ""), "friction.normal_memory.alpha", "missing"),

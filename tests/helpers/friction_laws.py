@@ -99,6 +99,7 @@ LAWS = [
     ss.laws.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3),
     ss.laws.LuGre(**BRISTLE, bristle_stiffness=1e5),
     ss.laws.CoulombStribeck(**BRISTLE),
+    ss.laws.Coulomb(mu_coulomb=0.3, mu_static=0.4, viscous=0.5),
     ss.laws.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3, stribeck_exponent=0.7),
     ss.laws.CoulombStribeck(**BRISTLE, stribeck_exponent=1.3),
 ]

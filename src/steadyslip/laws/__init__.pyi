@@ -38,6 +38,7 @@ from .declare import (
 from .friction import (
     PRZ as PRZ,
     Aging as Aging,
+    Coulomb as Coulomb,
     CoulombStribeck as CoulombStribeck,
     Evolution as Evolution,
     FrictionLaw as FrictionLaw,

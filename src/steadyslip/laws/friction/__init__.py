@@ -1,6 +1,6 @@
 """Friction laws: friction stress τ(v, σ, memory), rates of the memory variables, and the steady state."""
 
-from steadyslip.laws.friction.bristle import CoulombStribeck, LuGre
+from steadyslip.laws.friction.bristle import Coulomb, CoulombStribeck, LuGre
 from steadyslip.laws.friction.evolution import PRZ, Aging, Evolution, Nagata, Slip
 from steadyslip.laws.friction.law import FrictionLaw, State
 from steadyslip.laws.friction.normal_memory import LinkerDieterich, NoMemory, NormalMemory, PrakashClifton
@@ -10,6 +10,6 @@ USUAL = RateState.name
 """Default friction law of rig files."""
 
 __all__ = [
-    "PRZ", "USUAL", "Aging", "CoulombStribeck", "Evolution", "FrictionLaw", "LinkerDieterich", "LuGre", "Nagata",
-    "NoMemory", "NormalMemory", "PrakashClifton", "RateState", "Slip", "State",
+    "PRZ", "USUAL", "Aging", "Coulomb", "CoulombStribeck", "Evolution", "FrictionLaw", "LinkerDieterich", "LuGre",
+    "Nagata", "NoMemory", "NormalMemory", "PrakashClifton", "RateState", "Slip", "State",
 ]  # fmt: skip

@@ -1,9 +1,13 @@
-"""Friction laws of machines: LuGre bristles, and Coulomb–Stribeck friction without memory."""
+"""Friction laws of machines: LuGre bristles, Coulomb–Stribeck friction without memory, and Coulomb friction."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import numpy as np
 import sympy as sp
 
+from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.records import parameter
 from steadyslip.laws.friction.law import Expression, Expressions, FrictionLaw
@@ -11,6 +15,38 @@ from steadyslip.laws.friction.law import Expression, Expressions, FrictionLaw
 REST = sp.Rational(1, 10**12)
 """Fraction of v_S below which the Stribeck curve is flat, as its slope at rest would be infinite for δ_S < 1.
 Chosen by trial, far below any velocity of interest."""
+
+
+class Coulomb(FrictionLaw, name="coulomb"):
+    """Coulomb friction, constant in sliding, with larger friction at rest and viscosity if given.
+
+    τ = σ[μ_C sign(v) + σ2 v] in sliding. At rest friction balances the load up to σ μ_S, with μ_S = μ_C unless
+    `mu_static` is given; steady sliding does not depend on it.
+    """
+
+    mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
+    mu_static: float | None = parameter(
+        "1", positive, "friction coefficient at rest μ_S; μ_C unless given", default=None
+    )
+    viscous: float = parameter("s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0)
+
+    def conditions(self) -> Iterator[Condition]:
+        if self.mu_static is not None:
+            message = "got {}, with mu_coulomb = {}; allowed: at least mu_coulomb"
+            at_rest, sliding = np.asarray(self.mu_static), np.asarray(self.mu_coulomb)
+            yield Condition("mu_static", at_rest >= sliding, message, (at_rest, sliding))
+
+    def motion_conditions(self) -> Iterator[Condition]:
+        if self.mu_static is not None:
+            message = (
+                "got {}, more than mu_coulomb = {}; simulation has no friction that is larger at rest under this law: "
+                "leave mu_static out, or use the law lugre"
+            )
+            at_rest, sliding = np.asarray(self.mu_static), np.asarray(self.mu_coulomb)
+            yield Condition("mu_static", at_rest <= sliding, message, (at_rest, sliding))
+
+    def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
+        return sigma * (self.mu_coulomb * sp.sign(v) + self.viscous * v)
 
 
 class StribeckCurve(FrictionLaw):

@@ -54,6 +54,7 @@ table `[protocol]` may say what is done to the rig in an experiment. A whole one
 - A key without default that is not required is absent unless given.
 - A table `[map]` says what to compute for many rigs at once: see [Table of a map](map-file.md).
 - `law` may also name a law of yours: see [Add a friction law](../how-to/add-a-friction-law.md).
+- A number may have a [tolerance](#tolerances): `"12 ± 20 % N/um"`.
 
 `steadyslip schema` prints the JSON schema of this format, maps and fits included, for editors. This page is written by
 `make_tables.py` from the declarations in the source.
@@ -147,7 +148,7 @@ def rig_page() -> str:
             lines += [f'## `[{section.name}]` with `{key} = "{name}"`{absent}', "", summary(law), "", *table(law)]
             lines += parts_of(law, done)
     lines += [f"## `[{PROTOCOL.name}]`", "", summary(Protocol), "", *table(Protocol), *parts_of(Protocol, done)]
-    lines += [MACHINE_HEAD, *machine_tables()]
+    lines += [MACHINE_HEAD, *machine_tables(), TOLERANCES]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -162,6 +163,34 @@ A machine has bodies, links, contacts and a drive, each body, link and contact i
 - Quantities are totals: kg, N/m, N. Where a contact has an `area`, its laws may be in stresses, too; without one only
   forces are allowed.
 - Ends of links, and what contacts slide on, are bodies, `"ground"`, or `"drive"`, what moves at the drive's velocity.
+"""
+
+
+TOLERANCES = """## Tolerances
+
+Any number of the tables of a rig or machine that takes part in its equations may be text with a tolerance; see
+[Tolerances and cures](../how-to/tolerances-and-cures.md).
+
+| text | meaning |
+|---|---|
+| `"12 ± 20 % N/um"`, also `+-` or `+/-` | anywhere from 9.6 to 14.4 N/um, evenly |
+| `"12 ± 2 N/um"` | from 10 to 14 N/um |
+| `"12 +5 % -1 % N/um"` | from 11.88 to 12.6 N/um; the rig itself has 12 |
+| `"10..14 N/um"` | from 10 to 14 N/um; the rig itself has the middle |
+| `"12 ± 2 N/um (normal)"` | normal, with the standard deviation 2 N/um, cut off where its domain ends |
+
+Percent are of the value, also of a number without unit: `"0.19 ± 20 %"` is 0.152 to 0.228.
+
+| table | keys | meaning |
+|---|---|---|
+| `[tolerances]` | `stiffness = "20 %"`, by dotted name | the same apart from the values; no ranges |
+| `[[correlations]]` | `between = ["mu_static", "mu_coulomb"]`, `value = 0.8` | their coefficient of correlation |
+| `[adjust]` | `stiffness = { from = "5 N/um", to = "60 N/um", cost = 3 }`, by dotted name | what may be changed |
+
+Without correlations parameters are independent. The limits of `[adjust]` are those of a search unless given; `cost` is
+that of doubling or halving the value, 1 unless given.
+
+Commands other than `analyze`, `report`, `cure` and `compare` take the values alone.
 """
 
 

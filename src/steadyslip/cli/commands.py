@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -67,19 +68,22 @@ def analyze(
     fitted: Fitted = None,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
-    from steadyslip.files.specifications import read_rig
-    from steadyslip.verdict import analyze as run
+    from steadyslip.files.specifications.tolerances import rig_and_tolerances
+    from steadyslip.verdict import analyze as run, tolerate
 
     formula = formula or along is not None
     if fitted is not None:
         _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, along, branch)
         return
-    read = read_rig(rig, changes or ())
+    read, tolerances = rig_and_tolerances(rig, changes or ())
     if along is not None:
         along = read.resolve(along)
     result = run(read, branch=branch, kick=kick or ())
+    within = tolerate(read, tolerances) if tolerances else None
     if as_json:
         data = result.to_dict()
+        if within is not None:
+            data["tolerances"] = within.to_dict()
         if formula:
             data |= formula_data(result, along)
         print_json(data)
@@ -88,6 +92,8 @@ def analyze(
         colour = {True: typer.colors.GREEN, False: typer.colors.RED, None: typer.colors.YELLOW}[result.stable]
         print_text(typer.style(head, bold=True, fg=colour))
         print_text(rest)
+        if within is not None:
+            print_text(f"\n{within}")
         if formula:
             print_formula(result, along)
     if any(one.interrupted for one in getattr(result, "kicks", ())):
@@ -262,18 +268,23 @@ def report(
 ) -> None:
     """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications import named_value, read_rig
+    from steadyslip.files.specifications import named_value
+    from steadyslip.files.specifications.tolerances import rig_and_tolerances
     from steadyslip.reports import report as run
 
     if output is not None:
         check_output([output], [".html"])
     refuse_branch(fitted, branch)
-    options: dict[str, Any] = {"branch": branch, "tolerances": dict(map(named_value, tolerance or ()))}
+    read, written = rig_and_tolerances(rig, changes or ())
+    given: Any = dict(map(named_value, tolerance or ()))
+    if written:
+        given = replace(written, values=dict(written.values) | {read.resolve(name): one for name, one in given.items()})
+    options: dict[str, Any] = {"branch": branch, "tolerances": given}
     if fitted is not None:
         from steadyslip.experiments import load_fit
 
         options["fit"] = load_fit(fitted)
-    found = run(read_rig(rig, changes or ()), title=rig.stem, source=rig, **options)
+    found = run(read, title=rig.stem, source=rig, **options)
     if output is None:
         print_text(f"opened {found.open()}")
         return

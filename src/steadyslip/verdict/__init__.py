@@ -3,8 +3,18 @@
 Knows no maps, figures or documents.
 """
 
+from steadyslip.files.specifications.tolerances import Adjustment, Tolerances, read_tolerances
 from steadyslip.verdict.analyze import Analysis, analyze
 from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
 
-__all__ = ["Analysis", "MachineAnalysis", "Tolerated", "analyze", "tolerate"]
+__all__ = [
+    "Adjustment",
+    "Analysis",
+    "MachineAnalysis",
+    "Tolerances",
+    "Tolerated",
+    "analyze",
+    "read_tolerances",
+    "tolerate",
+]

@@ -8,28 +8,36 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.arrays import Array
-from steadyslip.core.domains import positive
+from steadyslip.core.arrays import Array, valid_together
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_percent, format_range
-from steadyslip.core.names import resolve
-from steadyslip.core.options import checked
+from steadyslip.core.format import format_percent, format_quantity, format_range
+from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.records import Address
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.roles import Parameter
+from steadyslip.files.specifications.tolerances import Tolerances
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.model.build import model_of
 from steadyslip.model.point import operating_point
+from steadyslip.verdict.export import finite
+from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
 
-# Numbers of samples, chosen by trial: computing time against resolution of shares (1/4096) and of ranges (1/64).
-LOG2_RIGS = 12  # 2**12 = 4096 rigs with all parameters varied at once; Sobol points need a power of two
+# Numbers of rigs, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
+LOG2_CLOSED, LOG2_OTHERS = 12, 8  # rigs of one group: 2**12 where the verdict has a closed form, else 2**8
 VALUES_ALONE = 65  # values of a parameter that is varied alone, both ends included
+VALUES_SOUGHT = 17  # of each parameter in turn, in the search for a rig judged otherwise
+REACHES = (1.0, 0.1, 0.01, 0.001)  # shares of the range looked at in rounds of that search
+BINS = 32  # of equally many rigs each, between which the verdict's variance is counted as a parameter's own
+LEAST = 0.01  # share of the variance below which a parameter is not worth naming
+STUDENT = 2.131  # quantile for 95 % of Student's distribution with GROUPS - 1 degrees of freedom
+GIVEN = Tested(
+    "names and their tolerances, or what read_tolerances gives", lambda v: isinstance(v, (Mapping, Tolerances))
+)
 
 
 @dataclass(frozen=True)
@@ -40,13 +48,16 @@ class Alone(Displayed):
     ----------
     parameter : str
     low, high : float
-        Its range, SI units.
+        Its range, SI units; of a normal distribution that in which 95 % lie.
     safety : tuple of float
         Least and largest safety factor: value over edge of the parameter `Tolerated.along`; NaN without edge.
     growth : tuple of float
         Least and largest growth rate of small disturbances, 1/s.
     stable : bool or None
         Whether sliding is stable throughout the range; None if in a part of it only.
+    share : float
+        Share of the variance of the verdict, all parameters varied, that goes when this one is known; where all rigs
+        are judged alike, of the variance of the growth rate.
     """
 
     parameter: str
@@ -56,6 +67,7 @@ class Alone(Displayed):
     safety: tuple[float, float]
     growth: tuple[float, float]
     stable: bool | None
+    share: float
     area: float | None = field(default=None, repr=False)
 
 
@@ -67,9 +79,9 @@ class Tolerated(ReadOnly):
     ----------
     rig : Slider or Machine
     alone : tuple of Alone
-        Each parameter by itself, the one that matters most first.
+        Each parameter by itself, the one first whose measurement would tell most.
     stable : ndarray of bool (m,)
-        True for rigs, spread evenly over all ranges at once, that slide steadily and stably.
+        True for rigs drawn from the distributions of all parameters that slide steadily and stably.
     exists : ndarray of bool (m,)
         True for rigs that slide steadily.
     growth : ndarray (m,)
@@ -81,6 +93,13 @@ class Tolerated(ReadOnly):
         Nearest edge of stability in the parameter `along`, SI units; NaN where there is none.
     safety : ndarray (m,)
         Value of the parameter `along` over its nearest edge.
+    error : float
+        Half-width of the 95 % interval of `share`.
+    corners : int
+        Number of corners of the ranges that were tried, none where every parameter is distributed normally.
+    otherwise : dict of str to float
+        Where all rigs are judged alike, a rig within the ranges that is not, by dotted name in SI units: a corner, or
+        found by a search from the rig that is nearest to it; empty if there is none.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -91,17 +110,18 @@ class Tolerated(ReadOnly):
     along: str
     edge: Array = field(repr=False)
     safety: Array = field(repr=False)
+    error: float
+    corners: int
+    otherwise: Mapping[str, float]
 
     @property
     def share(self) -> float:
-        """Share of the rigs that slide steadily and stably."""
+        """Share of the rigs that slide steadily and stably: the chance of a stable rig."""
         return float(np.mean(self.stable))
 
     def __str__(self) -> str:
-        count, share = len(self.stable), self.share
-        whole = {1.0: f"Stable in all {count} rigs", 0.0: f"Stable in none of {count} rigs"}
         wide = max(26, 2 + max(len(one.parameter) for one in self.alone))
-        lines = [f"{whole.get(share, f'Stable in {format_percent(share)} of {count} rigs')} within the tolerances"]
+        lines = [self.headline()]
         if not np.all(self.exists):
             lines.append(f"{'no steady sliding':<{wide}}in {format_percent(1 - float(np.mean(self.exists)))} of them")
         own = self.along == STIFFNESS and isinstance(self.rig, Slider)
@@ -122,7 +142,50 @@ class Tolerated(ReadOnly):
             word = {True: "stable", False: "unstable", None: "stable in a part of it"}[one.stable]
             ends = format_range(one.low, one.high, one.unit, one.area)
             lines.append(f"{one.parameter:<{wide}}{ends} alone: {word}{beside}")
+        if len(self.alone) > 1:
+            lines.append(f"{'measure next':<{wide}}{self._next()}")
         return "\n".join(lines)
+
+    def headline(self) -> str:
+        """Sentence with the share of stable rigs, or about all of them and the corners."""
+        count, share = len(self.stable), self.share
+        if 0 < share < 1:
+            return f"Stable in {format_chance(share, self.error)} of {count} rigs within the tolerances"
+        words = f"Stable in {'all' if share else 'none of'} {count} rigs within the tolerances"
+        if self.otherwise:
+            known = self.rig.parameters()
+            values = (
+                f"{name} {format_quantity(value, known[name].role.unit, area=self.rig.area_of(name))}"
+                for name, value in self.otherwise.items()
+            )
+            kind = "but not in every one: unstable" if share else "but in another one: stable"
+            return f"{words}, {kind} at {', '.join(values)}"
+        if not self.corners:
+            return words
+        return f"{words}, {'and' if share else 'nor'} at {'all' if share else 'any'} of their {self.corners} corners"
+
+    def _next(self) -> str:
+        parts = [f"{one.parameter} ({format_percent(round(one.share, 2))})" for one in self.alone if one.share >= LEAST]
+        of = "verdict" if 0 < self.share < 1 else "growth rate"
+        return f"{', '.join(parts[:3]) or 'no single one tells much'}; shares of the variance of the {of}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units, as ``--json`` prints it."""
+        parameters = [
+            {
+                "parameter": one.parameter, "low": one.low, "high": one.high, "unit": one.unit, "stable": one.stable,
+                "safety": list(one.safety), "growth": list(one.growth), "share_of_variance": one.share,
+            }
+            for one in self.alone
+        ]  # fmt: skip
+        found: dict[str, Any] = finite(
+            {
+                "chance": self.share, "error": self.error, "rigs": len(self.stable), "corners": self.corners,
+                "otherwise": dict(self.otherwise), "exists": float(np.mean(self.exists)), "along": self.along,
+                "parameters": parameters,
+            }
+        )  # fmt: skip
+        return found
 
     @property
     def unit(self) -> str:
@@ -139,16 +202,19 @@ class Tolerated(ReadOnly):
         return draw(self, ax=ax)
 
 
-@checked()
-def tolerate(rig: Slider | Machine, tolerances: Mapping[str, Any], *, along: str | None = None) -> Tolerated:
+@checked(tolerances=GIVEN)
+def tolerate(
+    rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances, *, along: str | None = None
+) -> Tolerated:
     """Verdicts on rigs whose parameters lie within tolerances, all varied at once and each alone.
 
     Parameters
     ----------
     rig : Slider or Machine
-    tolerances : mapping of str to float or str
+    tolerances : mapping of str to float or str, or Tolerances
         By dotted name the largest deviation to either side: a number in SI units, text with a unit, or a share of the
-        value such as ``"5 %"``.
+        value such as ``"5 %"``; also ``"+5 % -1 %"`` and ``"5 % (normal)"``. Or what
+        `steadyslip.verdict.read_tolerances` gives.
     along : str, optional
         Dotted name of the parameter whose edge and safety factor are computed; it must enter the equations linearly.
         By default a slider's stiffness; for a machine growth rates only.
@@ -165,15 +231,100 @@ def tolerate(rig: Slider | Machine, tolerances: Mapping[str, Any], *, along: str
         If the parameter `along` does not enter linearly.
     """
     name = "" if along is None and isinstance(rig, Machine) else name_along(rig, along)
-    ranges = _ranges(rig, tolerances)
-    from scipy.stats import qmc
-
-    even = qmc.Sobol(len(ranges), scramble=True, rng=np.random.default_rng(0)).random_base2(LOG2_RIGS)
-    varied = {name: low + (high - low) * even[:, i] for i, (name, (low, high)) in enumerate(ranges.items())}
+    spreads = spreads_of(rig, tolerances)
+    drawn = spreads.drawn(LOG2_CLOSED if model_of(rig, ()).has_closed_form else LOG2_OTHERS)
+    possible = np.broadcast_to(spreads.possible(drawn), next(iter(drawn.values())).shape)
+    if not np.all(np.any(possible, axis=1)):
+        raise ParameterError([Problem("tolerances", "contradict each other: hardly any rig within them can exist")])
+    varied = {one: values[possible] for one, values in drawn.items()}
     every = _outcomes(rig, varied, name)
-    alone = [_alone(rig, one, low, high, name) for one, (low, high) in ranges.items()]
-    alone.sort(key=lambda one: (one.stable is not None, -_spread(one)))
-    return Tolerated(rig, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety)
+    share, error = chance_of(every.stable, possible)
+    uniform = any(not one.normal for one in spreads.of.values())
+    corners = spreads.corners() if uniform else {}
+    otherwise = {} if 0 < share < 1 else _otherwise(spreads, corners, varied, every)
+    target = every.stable.astype(float) if 0 < share < 1 else every.growth
+    alone = [
+        _alone(rig, one, *spread.ends, name, _share_of_variance(varied[one], target))
+        for one, spread in spreads.of.items()
+    ]
+    alone.sort(key=lambda one: -one.share)
+    count = len(next(iter(corners.values()))) if corners else 0
+    return Tolerated(
+        rig, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety, error, count,
+        otherwise,
+    )  # fmt: skip
+
+
+def chance_of(stable: Array, possible: Array) -> tuple[float, float]:
+    """Share of stable rigs (m,) among the `possible` ones (GROUPS, n), and the half-width of its 95 % interval.
+
+    Where all are judged alike, the interval is that of m independent draws, 3/m.
+    """
+    table = np.full(possible.shape, np.nan)
+    table[possible] = stable
+    spread = float(np.std(np.nanmean(table, axis=1), ddof=1))
+    return float(np.mean(stable)), STUDENT * spread / GROUPS**0.5 if spread else 3.0 / len(stable)
+
+
+def format_chance(share: float, error: float) -> str:
+    """Format a share and its error in percent, the error with two digits.
+
+    >>> format_chance(0.24373, 0.00121), format_chance(0.99991, 0.00004)
+    ('24.37 ± 0.12 %', '99.9910 ± 0.0040 %')
+    """
+    digits = max(0, 1 - int(np.floor(np.log10(100 * error)))) if error else 2
+    return f"{100 * share:.{digits}f} ± {100 * error:.{digits}f} %"
+
+
+def _otherwise(
+    spreads: Spreads, corners: Mapping[str, Array], varied: Mapping[str, Array], every: _Outcomes
+) -> dict[str, float]:
+    """A rig within the ranges that is not judged as all those drawn: a corner, or near the least decided rig."""
+    sign = 1.0 if every.stable[0] else -1.0  # a growth rate of the other sign is sought
+
+    def judged(rigs: Mapping[str, Array]) -> tuple[Array, Array]:
+        mask = np.broadcast_to(spreads.possible(rigs), next(iter(rigs.values())).shape)
+        if not np.any(mask):
+            return mask, np.full(mask.shape, -np.inf)
+        stable, score = np.broadcast_to(every.stable[0], mask.shape).copy(), np.full(mask.shape, -np.inf)
+        found = _outcomes(spreads.rig, {name: values[mask] for name, values in rigs.items()}, "")
+        stable[mask], score[mask] = found.stable, sign * np.nan_to_num(found.growth, nan=-np.inf)
+        return stable != every.stable[0], score
+
+    def at(rigs: Mapping[str, Array], i: int) -> dict[str, float]:
+        return {name: float(values[i]) for name, values in rigs.items()}
+
+    starts = [at(varied, int(np.argmax(np.nan_to_num(sign * every.growth, nan=-np.inf))))]
+    if corners:
+        other, score = judged(corners)
+        if np.any(other):
+            return at(corners, int(np.flatnonzero(other)[np.argmax(score[other])]))
+        starts.append(at(corners, int(np.argmax(score))))
+    for here in starts:
+        for reach in REACHES:
+            for name, one in spreads.of.items():
+                if one.normal:
+                    continue
+                line = {key: np.full(VALUES_SOUGHT, value) for key, value in here.items()}
+                near = here[name] + reach * (one.high - one.low) * np.linspace(-1, 1, VALUES_SOUGHT)
+                line[name] = np.clip(near, one.low, one.high)
+                other, score = judged(line)
+                if np.any(other):
+                    return at(line, int(np.argmax(other)))
+                here = at(line, int(np.argmax(score)))
+    return {}
+
+
+def _share_of_variance(values: Array, target: Array) -> float:
+    """Share of the variance of the target (m,) between bins of the parameter's values (m,), without their noise."""
+    known = np.isfinite(target)
+    values, target = values[known], target[known]
+    count = len(target)
+    if count <= BINS or not np.ptp(target) > 0:
+        return 0.0
+    bins = np.array_split(target[np.argsort(values)], BINS)
+    between = sum(len(one) * (np.mean(one) - np.mean(target)) ** 2 for one in bins) / (count * np.var(target))
+    return float(max(0.0, 1 - (1 - between) * (count - 1) / (count - BINS)))
 
 
 def _finite_range(values: Array) -> tuple[float, float] | None:
@@ -182,16 +333,13 @@ def _finite_range(values: Array) -> tuple[float, float] | None:
     return (float(finite.min()), float(finite.max())) if len(finite) else None
 
 
-def _spread(one: Alone) -> float:
-    low, high = one.growth if np.isnan(one.safety[0]) else one.safety
-    return high - low if np.isfinite(high - low) else 0.0
-
-
-def _alone(rig: Slider | Machine, name: str, low: float, high: float, along: str) -> Alone:
-    found, nothing = _outcomes(rig, {name: np.linspace(low, high, VALUES_ALONE)}, along), (float("nan"),) * 2
+def _alone(rig: Slider | Machine, name: str, low: float, high: float, along: str, share: float) -> Alone:
+    values, nothing = np.linspace(low, high, VALUES_ALONE), (float("nan"),) * 2
+    possible = np.broadcast_to(valid_together(rig, "", {name: values}), values.shape)
+    found = _outcomes(rig, {name: values[possible]}, along)
     whole = bool(found.stable[0]) if np.all(found.stable == found.stable[0]) else None
     safety, growth = _finite_range(found.safety) or nothing, _finite_range(found.growth) or nothing
-    return Alone(name, low, high, rig.parameters()[name].role.unit, safety, growth, whole, rig.area_of(name))
+    return Alone(name, low, high, rig.parameters()[name].role.unit, safety, growth, whole, share, rig.area_of(name))
 
 
 @dataclass(frozen=True)
@@ -213,32 +361,3 @@ def _outcomes(rig: Slider | Machine, varied: Mapping[str, Array], along: str) ->
         edge = np.asarray(edge_along(rig, along, varied)[0], dtype=float)
         safety = np.asarray(safety_factor(rig, varied, along=along), dtype=float)
     return _Outcomes((found != ABSENT) & (found != UNKNOWN), found == STABLE, growth, edge, safety)
-
-
-def _ranges(rig: Slider | Machine, tolerances: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    known = {name: one for name, one in rig.parameters().items() if one.value is not None}
-    problems: list[Problem] = []
-    found: dict[str, tuple[float, float]] = {}
-    for given, tolerance in tolerances.items():
-        try:
-            name = resolve(given, known)
-            half, value = _half_width(known[name], tolerance, rig.area_of(name)), float(known[name].value or 0.0)
-            for end in (value - half, value + half):
-                rig.with_values({name: end})
-            found[name] = (value - half, value + half)
-        except ParameterError as error:
-            problems += error.problems if given in str(error) else [one.under(given) for one in error.problems]
-    if not tolerances:
-        problems.append(Problem("tolerances", "none given; name one at least, such as friction.a='5 %'"))
-    if problems:
-        raise ParameterError(problems)
-    return found
-
-
-def _half_width(one: Address, tolerance: Any, area: float | None) -> float:
-    """Largest deviation of a parameter to either side, SI units, from a number, text with a unit or a percentage."""
-    if isinstance(tolerance, str) and tolerance.rstrip().endswith("%"):
-        share = Parameter("1", positive, "tolerance in percent").checked(tolerance.rstrip()[:-1].strip())
-        return 0.01 * share * abs(float(one.value or 0.0))
-    role = Parameter(one.role.unit, positive, "tolerance")
-    return role.read(tolerance, area) if isinstance(tolerance, str) else role.checked(tolerance)

@@ -20,8 +20,10 @@ from steadyslip.core.errors import (
 from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter
+from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.files.specifications.changes import apply, full_name, split
+from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, taken_out
 from steadyslip.files.specifications.layout import (
     MAP,
     PROTOCOL,
@@ -63,6 +65,11 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
         If the file cannot be read or anything in it is wrong; ``problems`` lists everything.
     """
     return rig_from_text(text_of(path), str(path), changes)
+
+
+def read_whole(path: str | PathLike[str], changes: Iterable[str] = ()) -> RigFileContents:
+    """Contents of a rig file, with its problems."""
+    return read_contents(_not_empty(text_of(path), str(path)), str(path), changes)
 
 
 @checked()
@@ -124,6 +131,10 @@ class RigFileContents:
     problems : list of Problem
     changed : set of str
         Full names of the values that changes replaced.
+    tables : dict
+        As parsed, with the changes.
+    tolerances : dict of str to Tolerance
+        Those written beside values, by the keys that lead to them.
     """
 
     source: str
@@ -134,6 +145,8 @@ class RigFileContents:
     problems: list[Problem]
     changed: set[str]
     lines: dict[str, int] = field(repr=False)
+    tables: Table = field(repr=False)
+    tolerances: dict[str, Tolerance] = field(repr=False)
 
     @property
     def given(self) -> Slider | Machine | None:
@@ -228,13 +241,16 @@ def read_tables(
         reader.problems += apply(change, tables, lines)
     if complete is not None and changed:  # laws that were changed have parameters of their own
         complete(tables)
+    tolerances, faults = taken_out(tables)
     found_rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
     protocol = reader.protocol(found_rig if isinstance(found_rig, Machine) else None)
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
     rig = found_rig if isinstance(found_rig, Slider) else None
     machine = found_rig if isinstance(found_rig, Machine) else None
-    return RigFileContents(source, rig, machine, protocol, said, reader.problems, changed, lines)
+    wrong = {one.name for one in faults}  # told once, as a tolerance
+    problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
+    return RigFileContents(source, rig, machine, protocol, said, problems, changed, lines, tables, tolerances)
 
 
 def _not_empty(text: str, source: str) -> str:
@@ -270,7 +286,7 @@ class _ContentsReader(TableReader):
         return self._machine() if is_machine(self.tables) else self._slider()
 
     def _unknown_tables(self, own: Iterable[Section], further: Iterable[str]) -> None:
-        known = {section.name for section in (*own, PROTOCOL)} | {MAP, *further}
+        known = {section.name for section in (*own, PROTOCOL)} | {MAP, *TOLERANCES, *further}
         for name in self.tables:
             if name not in known:
                 self.problem(name, unknown_name("table", name, sorted(known)))

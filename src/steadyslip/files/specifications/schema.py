@@ -7,6 +7,7 @@ from typing import Any
 
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, is_required, key_of
 from steadyslip.core.roles import Schema
+from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
     Section,
@@ -39,7 +40,7 @@ def rig_schema(further: Sequence[Section] = ()) -> Schema:
         both = [properties[section.name], table] if section.name in properties else None
         properties[section.name] = table if both is None else {"anyOf": both}
     properties[PROTOCOL.name] = protocol_schema()
-    properties |= further_schema(further)
+    properties |= TOLERANCES | further_schema(further)
     machine = [section.name for section in machine_sections() if section.name != "links"]
     either = [{"required": slider}, {"required": machine}]
     return {"type": "object", "properties": properties, "anyOf": either, "additionalProperties": False}

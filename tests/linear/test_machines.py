@@ -226,6 +226,33 @@ def test_what_cancels_in_the_structure_cancels_exactly():
     assert len(roots(np.array(ss.analyze(machine).characteristic_polynomial))) == 4
 
 
+@pytest.mark.parametrize("drive", ["two springs", "spring and cascade"])
+def test_a_contact_loaded_by_one_link_sees_no_other_force(drive):
+    """One block that a spring and something else pull, tilted: steady sliding and determinant, typed by hand."""
+    tangent, mu, k, c = np.tan(0.3), 0.6, 3.0, 0.2
+    tilted = ss.laws.InclinedSpring(preload=1.0, angle=0.3)
+    contact = ss.machine.Surface(body="block", friction=rate_state(0.5, 0.2, 1.0), contact=tilted, loaded_by="own")
+    links = {"own": ss.machine.Spring(between=("drive", "block"), stiffness=k, damping=c)}
+    gains = ss.machine.Cascade(velocity=1.0, body="block", kv=2.0, kp=1.5, tn=0.5)
+    if drive == "two springs":
+        links["other"] = ss.machine.Spring(between=("drive", "block"), stiffness=5.0, damping=0.1)
+    machine = ss.Machine(
+        bodies={"block": ss.machine.SlidingBody(mass=2.0)}, links=links, contacts={"guide": contact},
+        drive=ss.machine.Pull(velocity=1.0) if drive == "two springs" else gains,
+    )  # fmt: skip
+    share = k / (k + 5.0) if drive == "two springs" else 0.0  # an integral leaves the spring without stretch
+    load = 1.0 / (1.0 + tangent * mu * share)
+    assert ss.steady_state(machine).contacts["guide"].normal_force == pytest.approx(load, rel=1e-12)
+
+    def determinant(s):
+        other = 5.0 + 0.1 * s if drive == "two springs" else 1.5 * (1 + 1 / (0.5 * s)) * (2.0 + s)
+        friction = load * (0.5 * s - 0.3 * s / (s + 1)) + mu * tangent * (k + c * s)
+        return 2.0 * s**2 + k + c * s + other + friction
+
+    for s in ss.eigenvalues(machine):
+        assert abs(determinant(s)) < 1e-10 * abs(2.0 * s**2)
+
+
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.campaign
 def test_eigenvalues_of_machines_at_random_make_theory_11s_matrix_singular(seed):

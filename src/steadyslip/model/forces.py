@@ -115,7 +115,8 @@ class Forces:
         if self.imposed:
             self._check_loading()
         names = [one.name for one in mechanism.coordinates]
-        self.single = len(names) == 1 and [dict(port.slip) for port in mechanism.contacts] == [{names[0]: 1}]
+        own = [(dict(port.slip), port.loaded_by) for port in mechanism.contacts]
+        self.single = len(names) == 1 and own == [({names[0]: 1}, "")]
         self.bare = not all(port.name for port in mechanism.contacts)
 
         def symbols(of: str, alone: str) -> dict[str, sp.Symbol]:
@@ -241,8 +242,8 @@ class Forces:
             for several in groups.values()
         ]  # fmt: skip
 
-    def _pull(self, name: str, elements: list[Element]) -> sp.Expr:
-        """Force of elements on a coordinate, without that of the steady displacements."""
+    def _pull(self, name: str, elements: list[Element], integral: bool = True) -> sp.Expr:
+        """Force of elements, and of integral action, on a coordinate, without that of the steady displacements."""
         total, acting = sp.Integer(0), [one for one in elements if name in one.acts]
         if self.imposed:
             drive_elements = [one for one in acting if one in self.drive_elements]
@@ -252,6 +253,8 @@ class Forces:
         for one in self._grouped(acting):
             total -= one.acts[name] * one.stiffness * row_of(one.senses, self._delayed(one.delay, self.x))
             total -= one.acts[name] * one.damping * row_of(one.senses, self._delayed(one.delay, self.moving))
+        if not integral:
+            return total
         late = 0 if self.mechanism.integral is None else self.mechanism.integral.delay
         return total - self._integrated(name, self._delayed(late, {"": INTEGRAL})[""])
 
@@ -340,10 +343,10 @@ class Forces:
         self.late[late] = (symbol, delay)
         return late
 
-    def _steady_pull(self, name: str, elements: list[Element]) -> sp.Expr:
-        """Force of elements on a coordinate in steady sliding, without dashpots, which `_pull` includes."""
+    def _steady_pull(self, name: str, elements: list[Element], integral: bool) -> sp.Expr:
+        """Force of elements, and of integral action, in steady sliding, without dashpots, which `_pull` includes."""
         total = sp.Add(*(-one.acts.get(name, 0) * self.statics.tension(one) for one in elements))
-        return self._simplified(total - self._integrated(name, self.statics.integral))
+        return self._simplified(total - self._integrated(name, self.statics.integral) if integral else total)
 
     def _integrated(self, name: str, integral: sp.Expr) -> sp.Expr:
         """Force of integral action on a coordinate; the steady part only if the drive's force is imposed."""
@@ -380,10 +383,10 @@ class Forces:
         if port.loaded_by:
             pulling = [one for one in self.mechanism.elements if one.name == port.loaded_by]
             body = next(name for name in port.slip if name in pulling[0].acts)
-        lever = port.slip[body] * port.area
-        steady = self._steady_slider_pull() if self.single else self._steady_pull(body, pulling) / lever
+        lever, integral = port.slip[body] * port.area, not (belt or port.loaded_by)
+        steady = self._steady_slider_pull() if self.single else self._steady_pull(body, pulling, integral) / lever
         moving = sp.Add(*(-one.acts.get(body, 0) * self._tension(one, {}, self.speeds) for one in pulling)) / lever
-        self.definitions[site.spring] = steady + self._pull(body, pulling) / lever
+        self.definitions[site.spring] = steady + self._pull(body, pulling, integral) / lever
         behind = (
             pulling
             if port.loaded_by

@@ -130,9 +130,19 @@ STRUCTURE = {
     "write 'rotary-pd'": (
         two_mass(), {"bodies": {"motor": ss.machine.RotatingBody(), "table": ss.machine.SlidingBody()}},
         "drive.control"),
-    "does not; see the kinds of link": (
+    "does not; between these two: kind = 'spring'": (
         two_mass(), {"links": {"screw": ss.machine.Screw(between=BOTH, lead=1.0, stiffness=1.0)}},
         "links.screw.between"),
+    'exchange the two: between = ["motor", "table"]': (
+        three_bodies(), {"links": {**three_bodies().links, "screw": ss.machine.Screw(
+            between=("table", "motor"), lead=0.4, stiffness=1.0)}}, "links.screw.between"),
+    "write control = 'rotary-steady' in [drive]": (
+        three_bodies(), {"links": {**three_bodies().links, "shaft": ss.machine.Shaft(
+            between=("drive", "motor"), stiffness=1.0)}, "drive": ss.machine.Pull(velocity=1.0)},
+            "links.shaft.between"),
+    "unknown body 'tble'": (
+        two_mass(), {"drive": ss.machine.PositionPD(velocity=1.0, velocity_of="tble", body="motor", kp=1.0)},
+        "drive.velocity_of"),
     "does not move away from the surface": (
         two_mass(), {"links": {"screw": ss.machine.Spring(between=BOTH, stiffness=1.0, angle=0.1)}}, "links.screw"),
     "unknown link 'belt'": (
@@ -261,3 +271,68 @@ def test_results_of_machines_can_be_shown_in_notebooks_and_documents():
         assert "table" in result._repr_html_()
         assert "table" in ss.report(result).html
     assert "1 N<" in machine._repr_html_()  # a preload, not 1 Pa
+
+
+FEED = """
+[bodies.motor]
+motion = "rotation"
+inertia = "40 kg cm^2"
+[bodies.table]
+mass = "300 kg"
+[links.screw]
+kind = "screw"
+between = ["motor", "table"]
+lead = "10 mm/rev"
+stiffness = "120 N/um"
+[contacts.guide]
+body = "table"
+[contacts.guide.friction]
+law = "lugre"
+mu_coulomb = 0.1
+mu_static = 0.15
+v_stribeck = "1 mm/s"
+bristle_stiffness = "1e5 1/m"
+[contacts.guide.contact]
+law = "constant"
+preload = "3 kN"
+[drive]
+control = "rotary-pd"
+body = "motor"
+kp = "600 N m/rad"
+velocity = "500 mm/min"
+velocity_of = "table"
+"""
+
+
+def test_the_feed_of_any_body_is_the_velocity_of_its_drive(tmp_path):
+    fed = ss.rig_from_text(FEED)
+    turned = ss.rig_from_text(FEED.replace('velocity_of = "table"', "").replace("500 mm/min", "50 rev/min"))
+    assert fed.drive.velocity == pytest.approx(turned.drive.velocity, rel=1e-14)
+    assert fed.speeds()["table"] == pytest.approx(0.5 / 60, rel=1e-14)
+    assert fed.with_values({"drive.velocity": turned.drive.velocity}) == turned
+    (file := tmp_path / "axis.toml").write_text(FEED)
+    assert ss.read_rig(file, ["drive.velocity=250 mm/min"]).speeds()["table"] == pytest.approx(0.25 / 60)
+    assert ss.rig_from_text(ss.rig_to_text(fed)) == fed
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('velocity_of = "table"', "", "'motor' turns; for that of another body write velocity_of = \"table\""),
+        ("500 mm/min", "50 rev/min", "'50 rev/min' has the wrong dimension; expected a quantity in m/s"),
+        ("rotary-pd", "pd", "got 'pd', but 'motor' turns; write 'rotary-pd'"),
+        ('"table"\n', '"tabel"\n', "did you mean 'table'?"),
+        ('["motor", "table"]', '["table", "motor"]', 'exchange the two: between = ["motor", "table"]'),
+    ],
+)
+def test_a_mistake_in_a_feed_is_answered_in_one_sentence(old, new, words):
+    with pytest.raises(ss.RigFileError, match=re.escape(words)) as caught:
+        ss.rig_from_text(new.join(FEED.rsplit(old, 1)))
+    assert len(caught.value.problems) == 1
+
+
+def test_a_feed_where_nothing_moves_is_refused():
+    post = FEED.replace("[contacts.guide]", '[bodies.post]\n[links.bolt]\nbetween = ["ground", "post"]\n'
+                        'stiffness = "1 N/m"\n[contacts.guide]').replace('of = "table"', 'of = "post"')  # fmt: skip
+    with pytest.raises(ss.RigFileError, match="'post' stands still in steady sliding"):
+        ss.rig_from_text(post)

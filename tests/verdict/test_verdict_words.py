@@ -1,5 +1,7 @@
 """What the verdict says is true: cases once said wrongly, and random rigs of every kind (`words_at_random`)."""
 
+import re
+
 import mpmath
 import numpy as np
 import pytest
@@ -200,3 +202,74 @@ def test_no_oscillation_is_said_to_grow_where_roots_are_real(stiffness, mass):
     leading = found.eigenvalues[0]
     assert ("without oscillating" in text_of(a_rig).split("stable for")[0]) == (leading.imag == 0)
     assert "oscillation grows" not in found.reason
+
+
+def test_all_speeds_at_which_an_axis_is_stable_are_told():
+    """Between 0.365 and 55.5 mm/min this LuGre axis judders: on both sides `boundary` agrees with the sentence."""
+    axis = ss.Slider(
+        friction=ss.laws.LuGre(mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, stribeck_exponent=0.8,
+                               viscous=1.25, bristle_stiffness=1.25e5),
+        contact=ss.laws.ConstantNormalStress(preload=1.6e5), stiffness=6e8, mass=1.2e4, damping=2.5e5,
+        drive=ss.machine.SteadyDrive(0.5e-3 / 60), area=0.02,
+    )  # fmt: skip
+    low, high = (edge.value for edge in ss.boundary(axis, "drive.velocity"))
+    numbers = f"below {low * 6e4:.4g} mm/min, or above {high * 6e4:.4g} mm/min"
+    assert f"stable speeds {1e6 * low:.4g} um/s" not in text_of(axis)
+    told = re.search(r"stable speeds below ([\d.]+) um/s, or above ([\d.]+) um/s", text_of(axis))
+    assert told is not None, numbers
+    assert [float(one) for one in told.groups()] == pytest.approx([1e6 * low, 1e6 * high], rel=1e-3)
+    for speed, stable in ((0.99 * low, True), (1.01 * low, False), (0.99 * high, False), (1.01 * high, True)):
+        assert ss.analyze(axis.with_values({"drive.velocity": speed})).stable is stable
+
+
+def test_a_speed_far_beyond_its_friction_law_is_questioned():
+    fast = unit_rig("slip", 0.5, 0.4).with_values({"v_ref": 1e-5, "drive.velocity": 20.0})
+    assert "2e+06 times v_ref" in text_of(fast)
+    assert "read in m/s" not in text_of(fast.with_values({"drive.velocity": 0.9}))
+    assert "read in m/s" not in text_of(fast.with_values({"v_ref": 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("contact", "told"),
+    [
+        (ss.laws.InclinedSpring(preload=5e6, angle=-0.4), True),
+        (ss.laws.SelfEnergising(preload=5e6, gain=0.2), False),
+        (ss.laws.ConstantNormalStress(preload=5e6), False),
+    ],
+)
+def test_what_the_pull_contains_is_told_where_it_presses_the_contact(contact, told):
+    one = rig(friction=rate_state(mu_ref=0.3), contact=contact).with_values({"damping": 3.0, "radiation_damping": 2.0})
+    text = text_of(one)
+    assert ("follows T, the pull of the spring and the damper; radiation damping is not in it" in text) is told
+
+
+def test_what_the_pull_contains_is_told_of_machines_without_links_to_the_ground():
+    text = """
+[bodies.block]
+mass = "2 kg"
+[links.arm]
+between = ["drive", "block"]
+stiffness = "9 N/m"
+[links.seal]
+between = ["ground", "block"]
+damping = "3 N s/m"
+[contacts.foot]
+body = "block"
+[contacts.foot.friction]
+law = "rate-state"
+a = 0.02
+b = 0.03
+d_c = "1 m"
+mu_ref = 0.3
+v_ref = "1 m/s"
+[contacts.foot.contact]
+law = "inclined-spring"
+preload = "5 N"
+angle = "-20 deg"
+[drive]
+velocity = "1 m/s"
+"""
+    words = " ".join(str(ss.analyze(ss.rig_from_text(text))).split())
+    assert "the pull T the normal force of foot follows T, the pull of links.arm a disturbance" in words
+    plain = text.replace('law = "inclined-spring"', 'law = "constant"').replace('angle = "-20 deg"', "")
+    assert "the pull T" not in str(ss.analyze(ss.rig_from_text(plain)))

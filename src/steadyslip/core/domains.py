@@ -36,6 +36,10 @@ below_one = Domain(0, 1, True, False, "a number from 0 to below 1")
 tolerance = Domain(1e-14, 0.1, True, True, "a number from 1e-14 to 0.1")  # from some roundings of a float on
 steps = Domain(1, 1e12, True, True, "a whole number from 1 to 1e12", whole=True)  # upper bound chosen by trial
 angle = Domain(-math.pi / 2, math.pi / 2, False, False, "an angle between -90 deg and 90 deg, both excluded")
+line = Domain(
+    -math.pi / 2, math.pi / 2, False, False,
+    "an angle between -90 deg and 90 deg, both excluded (a line at 150 deg is one at -30 deg)",
+)  # fmt: skip
 acute = Domain(0, math.pi / 2, False, False, "an angle between 0 and 90 deg, both excluded")
 turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 360 deg")
 count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)  # bound chosen by trial

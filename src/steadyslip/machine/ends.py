@@ -24,7 +24,7 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
             yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", by, links))
     drive = tables.get("drive")
     driven = drive if isinstance(drive, dict) else {}
-    for key in ("body", "measured", "speed_measured"):
+    for key in ("body", "measured", "speed_measured", "velocity_of"):
         yield from unknown_body(f"drive.{key}", driven.get(key), list(bodies))
     named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
     named += [surface.get(key) for surface in contacts.values() for key in ("body", "against")]

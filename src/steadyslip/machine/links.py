@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from steadyslip.core.domains import angle, nonnegative, positive
+from steadyslip.core.domains import line, nonnegative, positive
 from steadyslip.core.entries import Names
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, option, parameter, setting
@@ -62,7 +62,7 @@ class Spring(Link, name="spring"):
     damping: float = parameter("N s/m", nonnegative, "damping c along the link", default=0.0, structural=True)
     direction: str = option("slide", "normal", doc="along the slide, or away from the surface", default="slide")
     angle: float = parameter(
-        "rad", angle, "by which the second end lies higher, seen along the slide", default=0.0, structural=True
+        "rad", line, "by which the second end lies higher, seen along the slide", default=0.0, structural=True
     )
 
     def inconsistencies(self) -> Iterator[Problem]:

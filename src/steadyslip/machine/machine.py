@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -27,7 +28,7 @@ from steadyslip.machine.mechanism import (
     Mechanism,
 )
 from steadyslip.machine.rig import Rig
-from steadyslip.machine.servo import MachineDrive
+from steadyslip.machine.servo import MachineDrive, control_for, wrong_control
 from steadyslip.machine.surfaces import Surface
 
 _SPEED_TOLERANCE = 1e-9  # relative difference of two speeds of one end that counts as rounding; chosen by trial
@@ -57,6 +58,24 @@ class Machine(Rig):
 
     # -- checks
 
+    def _settled(self) -> Iterator[Problem]:
+        """Convert a velocity that is given at another body (`velocity_of`) to that of the drive."""
+        yield from super()._settled()
+        name = self.drive.velocity_of
+        if name is None or not all(len(link.between) == 2 for link in self.links.values()):
+            return
+        where, unknown = "drive.velocity_of", list(self._end("drive.velocity_of", name, ()))
+        yield from unknown
+        speed = self._speeds()[0].get(name)
+        if unknown or speed is None:
+            return  # a body that floats is reported with the others
+        if not speed > 0:
+            does = "stands still" if speed == 0 else "moves backwards"
+            yield Problem(where, f"{name!r} {does} in steady sliding; name a body that moves forwards")
+            return
+        given = self.drive.velocity
+        object.__setattr__(self, "drive", replace(self.drive, velocity=given * (given / speed), velocity_of=None))
+
     def inconsistencies(self) -> Iterator[Problem]:
         faults = [*self._name_problems(), *self._end_problems()]
         yield from faults
@@ -82,15 +101,10 @@ class Machine(Rig):
     def _end_problems(self) -> Iterator[Problem]:
         """Yield Problems with ends of links, contacts and drive: unknown bodies, or the wrong kind of motion."""
         for name, link in self.links.items():
-            for end, turning in zip(link.between, link.turning, strict=True):
-                where = f"links.{name}.between"
-                problems = list(self._end(where, end))
-                yield from problems
-                if not problems and self._turns(end) not in (turning, None):
-                    does = "slides" if turning else "turns"
-                    yield Problem(
-                        where, f"{end!r} {does}, which this end of a {link.name} does not; see the kinds of link"
-                    )
+            problems = [wrong for end in link.between for wrong in self._end(f"links.{name}.between", end)]
+            yield from problems
+            if not problems and not self._fits(type(link), link.between):
+                yield self._wrong_ends(name, link)
             kept = [end for end in link.between if end in self.bodies and not self._lifts(end)]
             if "y" in link.directions() and kept:
                 message = (
@@ -116,11 +130,26 @@ class Machine(Rig):
                     yield from self._end(f"drive.{key}", end, ())
             body = self.bodies.get(self.drive.driven())
             if body is not None and body.turns != self.drive.turns:
-                kind = f"rotary-{self.drive.name}" if body.turns else self.drive.name.removeprefix("rotary-")
-                does = "turns" if body.turns else "slides"
-                yield Problem(
-                    "drive.control", f"got {self.drive.name!r}, but {self.drive.driven()!r} {does}; write {kind!r}"
-                )
+                yield wrong_control(self.drive.name, str(self.drive.driven()), body.turns)
+
+    def _fits(self, kind: type[Link], ends: Sequence[str]) -> bool:
+        """True if the ends turn or slide as those of a kind of link do."""
+        return all(self._turns(end) in (turning, None) for end, turning in zip(ends, kind.turning, strict=True))
+
+    def _wrong_ends(self, name: str, link: Link) -> Problem:
+        """Problem of a link with an end that turns where it should slide, or the reverse; with what would be right."""
+        first, second = link.between
+        wrong = next(end for end, turning in zip(link.between, link.turning, strict=True)
+                     if self._turns(end) not in (turning, None))  # fmt: skip
+        message = f"{wrong!r} {'turns' if self._turns(wrong) else 'slides'}, which this end of a {link.name} does not; "
+        if self._fits(type(link), (second, first)):
+            message += f"exchange the two: between = {json.dumps([second, first])}"
+        elif wrong == LOAD_POINT and self.drive.driven() is None:
+            message += f"write control = {control_for(self.drive.name, not self.drive.turns)!r} in [drive]"
+        else:
+            fits = [repr(kind) for kind, one in Link.registry.items() if self._fits(one, link.between)]  # type: ignore[arg-type]
+            message += f"between these two: kind = {' or '.join(fits)}" if fits else "see the kinds of link"
+        return Problem(f"links.{name}.between", message)
 
     def _turns(self, end: str) -> bool | None:
         if end == GROUND:

@@ -11,16 +11,24 @@ from typing import Any, ClassVar
 
 from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.entries import Text
+from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter, setting
 
 
 class MachineDrive(FrozenRecord, family="drive of a machine"):
-    """Base of drives; `velocity` is that of the driven body, or of the load point, which links call ``drive``."""
+    """Base of drives; `velocity` is that of the driven body, or of the load point, which links call ``drive``.
+
+    With `velocity_of` it is that of another body, such as the feed of a table, until the machine converts it.
+    """
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
     turns: ClassVar[bool] = False
 
     velocity: float = parameter("m/s", positive, "velocity v0 in steady sliding")
+    velocity_of: str | None = setting(
+        Text("the body whose velocity is given, in m/s or rad/s; that on which the drive acts unless given"),
+        default=None,
+    )
 
     def driven(self) -> str | None:
         """Body on which a controller acts; None for a load point."""
@@ -136,3 +144,14 @@ class RotaryCascade(Cascade, name="rotary-p-pi"):
     turns: ClassVar[bool] = True
     velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
     kp: float = parameter("N m s/rad", positive, "gain Kp of the speed loop")
+
+
+def control_for(control: str, turns: bool) -> str:
+    """Name of the same kind of drive for a body that turns, or for one that slides."""
+    return f"rotary-{control.removeprefix('rotary-')}" if turns else control.removeprefix("rotary-")
+
+
+def wrong_control(control: str, body: str, turns: bool) -> Problem:
+    """Problem of a drive of the other kind of motion than the body on which it acts."""
+    does = "turns" if turns else "slides"
+    return Problem("drive.control", f"got {control!r}, but {body!r} {does}; write {control_for(control, turns)!r}")

@@ -30,7 +30,7 @@ from steadyslip.verdict.export import as_dict
 from steadyslip.verdict.findings import Findings
 from steadyslip.verdict.machine import MachineAnalysis, analyze_machine
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.words import headline, verdict
+from steadyslip.verdict.words import headline, unlikely_speed, verdict
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -212,6 +212,7 @@ def _warnings(
             "this verdict is for the one at "
             f"{format_quantity(states[values.branch].normal_stress, 'Pa', area=rig.area)}"
         )
+    found += unlikely_speed("the drive's velocity is", float(rig.drive.velocity), rig.friction)
     if not rig.friction.memory() and rig.friction.lateness() == 0:
         found.append(
             "this friction law has no memory of sliding, so it cannot predict a critical stiffness; "

@@ -18,6 +18,7 @@ from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
 from steadyslip.linear.modes import Mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import GROUND
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.sliding import SteadyMachine, steady_machine
@@ -35,7 +36,9 @@ from steadyslip.verdict.words import (
     headline,
     margin_table,
     onset_words,
+    stable_speeds,
     threshold_words,
+    unlikely_speed,
     verdict_text,
 )
 
@@ -75,9 +78,25 @@ class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
 def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
     """Rows (label, text) on steady sliding, small disturbances, leading mode, onset and kicks of a machine."""
     rows = [("steady sliding", _sliding(found.steady)), ("a disturbance", disturbance(found))] if found.steady else []
+    rows += [row for name in found.rig.contacts for row in _pull(found.rig, name)]
     rows += [("the mode", found.mode.words())] if found.mode else []
+    rows += stable_speeds(found)
     rows += [("onset", onset_words(found.onset))] if found.onset else []
     return rows + [("a kick", threshold_words(kick)) for kick in found.kicks]
+
+
+def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
+    """Row (label, text) on what T, the force that presses a contact, contains; none if one link alone."""
+    surface = machine.contacts[name]
+    at = [link for link, one in machine.links.items() if surface.held in one.between and "x" in one.directions()]
+    controlled = machine.drive.driven() == surface.held
+    if len(at) + controlled < 2 or not surface.contact.follows_spring():
+        return []
+    inside = [surface.loaded_by] if surface.loaded_by else [
+        link for link in at if GROUND not in machine.links[link].between
+    ]  # fmt: skip
+    parts = [f"links.{link}" for link in inside] + ["the controller"] * (controlled and not surface.loaded_by)
+    return [("the pull T", f"the normal force of {name} follows T, the pull of {' and '.join(parts)}")]
 
 
 def machine_meaning(found: MachineAnalysis) -> list[str]:
@@ -202,6 +221,8 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
         f"the friction coefficient of contact {name} is not positive in steady sliding; check level and velocity"
         for name in pulled
     )
+    for name, one in steady.contacts.items():
+        found += unlikely_speed(f"contact {name} slides at", one.slip_rate, machine.contacts[name].friction)
     blind = [name for name, touch in machine.contacts.items() if not touch.friction.memory()]
     if not blind:
         return found

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import textwrap
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED, in_words
 from steadyslip.core.format import format_quantity
+from steadyslip.core.records import parameters
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.reasons import NEXT_TO_IT, in_stiffness
 from steadyslip.verdict.support import gain_words, support_stiffness
 
 if TYPE_CHECKING:
+    from steadyslip.laws.friction import FrictionLaw
     from steadyslip.linear.boundary import Margin
     from steadyslip.linear.search import Boundary
     from steadyslip.nonlinear.kicks.threshold import Threshold
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
 
 # Chosen by trial: length of the text against completeness.
 REMOTE = 100  # edges further than this factor from a value are listed apart
+FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
+BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text
 
 _ONSETS = {
@@ -136,6 +141,7 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
             f"normal {force} {_stress(analysis, steady.normal_stress)}, "
             f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}",
         ),
+        *_pull(analysis.rig),
         ("a disturbance", disturbance(analysis)),
         ("stable for", _stable_set(analysis)),
     ]
@@ -146,9 +152,51 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
         rows.append(
             ("along the axis", f"critical stiffness {in_stiffness(analysis, analysis.critical_axial_stiffness)}")
         )
+    rows += stable_speeds(analysis)
     if analysis.onset is not None:
         rows.append(("onset", onset_words(analysis.onset)))
     return rows + [("a kick", threshold_words(kick)) for kick in analysis.kicks]
+
+
+def _pull(rig: Slider) -> list[tuple[str, str]]:
+    """Row (label, text) on what T, the force that presses a contact, contains; none if the spring alone."""
+    control = [rig.drive.proportional(), rig.drive.derivative(), rig.drive.integral()]
+    inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
+    pulling = [f"the {name}" for name, there in inside.items() if there]
+    if (pulling == ["the spring"] and not rig.radiation_damping) or not rig.contact.follows_spring():
+        return []
+    text = f"the normal force follows T, the pull of {' and '.join(pulling)}"
+    return [("the pull T", text + ("; radiation damping is not in it" if rig.radiation_damping else ""))]
+
+
+def unlikely_speed(what: str, speed: float, friction: FrictionLaw) -> tuple[str, ...]:
+    """Question whether a speed (m/s) far beyond those of a friction law was meant; empty if it is not."""
+    kinds = ("reference rate", "velocity scale")
+    own = {name: one.value for name, one in parameters(friction).items() if one.role.kind in kinds and one.value}
+    if not own or speed < FAST or speed < BEYOND_LAW * max(own.values()):
+        return ()
+    name, scale = max(own.items(), key=lambda item: item[1])
+    return (
+        f"{what} {format_quantity(speed, 'm/s')}, {speed / scale:.2g} times {name} of its friction, "
+        f"{format_quantity(scale, 'm/s')}; a velocity without a unit is read in m/s",
+    )
+
+
+def stable_speeds(analysis: Verdict) -> list[tuple[str, str]]:
+    """Row (label, text) of all drive velocities at which sliding is stable; none if there is one edge at most."""
+    margin = next((one for one in analysis.margins if one.parameter == "drive.velocity"), None)
+    if margin is None or len(margin.edges) < 2:
+        return []
+    ends = [0.0, *(edge.value for edge in margin.edges), math.inf]
+    below = [edge.stable == "below" for edge in margin.edges] + [False]
+    above = [False] + [edge.stable == "above" for edge in margin.edges]
+    sides = zip(pairwise(ends), below, above, strict=True)
+    windows = [between for between, up_to_its_end, from_its_start in sides if up_to_its_end or from_its_start]
+    parts = []
+    for low, high in windows:
+        first, last = format_quantity(low, margin.unit), format_quantity(high, margin.unit)
+        parts.append(f"above {first}" if high == math.inf else f"{first} to {last}" if low else f"below {last}")
+    return [("stable speeds", ", or ".join(parts) or f"none up to {format_quantity(margin.searched[1], margin.unit)}")]
 
 
 def onset_words(onset: Onset) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
@@ -13,11 +15,13 @@ from steadyslip.core.errors import (
     NotAvailable,
     ParameterError,
     Problem,
+    QuantityError,
     RigFileError,
     repr_short,
     unknown_name,
 )
 from steadyslip.core.options import checked
+from steadyslip.core.quantities import parse
 from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance
@@ -39,6 +43,7 @@ from steadyslip.files.specifications.toml import NotToml, Table, tables_of
 from steadyslip.machine.ends import unknown_ends
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
@@ -274,6 +279,14 @@ def _rigid(links: Any) -> tuple[Any, list[str]]:
     return links | {name: links[name] | {"stiffness": 1.0} for name in names}, names
 
 
+def _is_quantity(value: Any, unit: str) -> bool:
+    """True for text with a number and a unit of the dimension of `unit`."""
+    try:
+        return isinstance(value, str) and math.isfinite(parse(value, unit))
+    except QuantityError:
+        return False
+
+
 class _ContentsReader(TableReader):
     """Reader of one file's tables."""
 
@@ -308,7 +321,7 @@ class _ContentsReader(TableReader):
                     raw, rigid = _rigid(raw)
                 found[section.name] = self.members(Part(section.family, "", keyed=True), raw, section.name)
             else:
-                found[section.name] = self.record(section.family, self._table(section.name), f"{section.name}.")
+                found[section.name] = self._drive(self._table(section.name), found.get("bodies"))
         if len(self.problems) == before:
             machine = self._built(Machine, found, "")
             try:
@@ -318,6 +331,31 @@ class _ContentsReader(TableReader):
                 return None
         self.problems += list(unknown_ends(self.tables))
         return None
+
+    def _drive(self, table: Table, bodies: Mapping[str, Any] | None) -> FrozenRecord | None:
+        """Read the drive of a machine, its velocity in the unit of the body named by ``velocity_of``."""
+        control = str(table.get(*MachineDrive.chosen_by))
+        driven, feed = ((bodies or {}).get(str(table.get(key))) for key in ("body", "velocity_of"))
+        kinds: Mapping[str, Any] = MachineDrive.registry
+        law = kinds.get(control)
+        if driven is not None and law is not None and driven.turns != law.turns:
+            self.problems.append(wrong_control(control, table["body"], driven.turns))
+            return None
+        given = table.get("velocity")
+        if feed is not None and given is not None:
+            role = Parameter("rad/s" if feed.turns else "m/s", positive, f"velocity of {table['velocity_of']!r}")
+            value = self._value(role, given, "drive.velocity")
+            table = table | {"velocity": 1.0 if value is None else value}
+        elif law is not None and _is_quantity(given, "m/s" if law.turns else "rad/s"):
+            table = table | {"velocity": 1.0}
+            if "velocity_of" in table:  # a name of no body, which is reported as such
+                return self.record(MachineDrive, table, "drive.")
+            where = table.get("body", "the load point")
+            does = "turns" if law.turns else "slides"
+            others = [name for name, one in (bodies or {}).items() if one.turns != law.turns]
+            hint = f"; for that of another body write velocity_of = {json.dumps(others[0])}" if others else ""
+            self.problem("drive.velocity", f"got {given!r}, but {where!r} {does}{hint}")
+        return self.record(MachineDrive, table, "drive.")
 
     def _slider(self) -> Slider | None:
         before = len(self.problems)

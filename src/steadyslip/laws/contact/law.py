@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
+
+import sympy as sp
 
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import NotAvailable, Problem
@@ -144,6 +146,13 @@ class ContactLaw(FrozenRecord, family="contact law"):
     def is_imposed(self) -> bool:
         """True if the normal stress does not depend on the motion."""
         return type(self).coupling is ContactLaw.coupling
+
+    def follows_spring(self) -> bool:
+        """True if the normal stress depends on T, the stress that spring, dashpot and controller exert."""
+        memory = tuple(sp.Symbol(f"memory_{i}") for i in range(len(self.memory())))
+        letters: dict[str, Any] = {item.name: sp.Symbol(item.name) for item in fields(ContactInputs)}
+        inputs = ContactInputs(**letters | {"memory": memory, "steady_memory": memory})
+        return inputs.spring in sp.sympify(self.coupling(inputs)).free_symbols
 
     def has_pores(self) -> bool:
         """True if the law depends on the surrounding pore pressure, `ContactInputs.outside`."""

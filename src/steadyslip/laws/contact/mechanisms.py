@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import sympy as sp
 
 from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import acute, angle, nonnegative, positive, real, turn
+from steadyslip.core.domains import acute, angle, line, nonnegative, positive, real, turn
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import option, parameter
 from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, PreloadedContact, Shape
@@ -27,7 +27,7 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
     B0...B3 = 0, c tan ψ, tan ψ, 0 with c a dashpot beside the spring. Lock-up: ψ <= −arccot μss (eq. 27).
     """
 
-    angle: float = parameter("rad", angle, "spring angle ψ, positive when it pulls out of the surface", letter="psi")
+    angle: float = parameter("rad", line, "spring angle ψ, positive when it pulls out of the surface", letter="psi")
 
     def coupling(self, motion: ContactInputs) -> Expression:
         return -motion.spring * sp.tan(self.angle)

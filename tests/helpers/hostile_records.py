@@ -510,6 +510,27 @@ def _(path):
         file.truncate(2**30)
 
 
+@case("many-headers.csv")
+def _(path):
+    path.write_bytes(b"".join(b"time (s),mu (%d)\n" % k for k in range(10**6)) + b"1,2\n" * 10)
+
+
+@case("headers-and-numbers.csv")
+def _(path):
+    path.write_bytes(b"".join(b"time (s),mu (%d)\n" % k for k in range(15_000)) + b"1,2\n" * 400_000)
+
+
+@case("days-that-are-none.csv")
+def _(path):
+    path.write_bytes(b"time,mu\n" + b"".join(b"31/02/2020 25:61:%d,0.6\n" % (k % 99) for k in range(10**6)))
+
+
+@case("many-candidates.csv")
+def _(path):
+    names = ",".join(f"mu{k}" for k in range(2999))
+    path.write_text(f"time,{names}\n" + (",".join(["1.5"] * 3000) + "\n") * 30)
+
+
 @case("segments.lvm")
 def _(path):
     end = b"***End_of_Header***\n"

@@ -19,6 +19,7 @@ SOME = [
     "one-number-often.parquet", "damaged-3.parquet", "entities.xlsx", "line-numbers.xlsx",
     "deep-elements.xlsx", "damaged-0.xlsx", "numbers-that-are-not-there.tdms", "long-name.tdms", "damaged-4.tdms",
     "numbers-that-are-not-there.nc", "same-bytes.nc", "quotes.csv", "blanks.txt", "damaged-5.csv",
+    "many-headers.csv", "days-that-are-none.csv", "many-candidates.csv",
 ]  # fmt: skip
 
 

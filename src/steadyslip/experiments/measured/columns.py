@@ -188,7 +188,7 @@ def assign_columns(
             continue
         candidates = _preferred(role, guesses.get(role, []), names)
         if len(candidates) > 1:
-            several = ", ".join(f"{names[i]!r} (column {i + 1})" for i in candidates)
+            several = listed(f"{names[i]!r} (column {i + 1})" for i in candidates)
             which = "NAME" if len({names[i] for i in candidates}) == len(candidates) else "NUMBER"
             problems.append(Problem(role, f"several columns could be it: {several}; say which with {role}={which}"))
         elif candidates:

@@ -23,6 +23,7 @@ from steadyslip.files.inputs import read_bytes
 
 SHOWN = 8  # damaged lines listed in a message
 HEADER_LINES = 500  # lines in which the end of a header is looked for with the lines below; chosen by trial
+MOST_HEADER, NAMED = 20_000, 500  # lines in which numbers begin; lines above them that may name columns
 MOST_TEXT = 2**30  # bytes of a file
 MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines parsed in Python (a minute of CPU time); characters of a line
 OTHER_FORMATS = {
@@ -134,7 +135,9 @@ def _layout(path: Path, text: str) -> _Layout:
     if not body:
         hints = (_hint(cell) for _, line in rows[:50] for cell in _cells(line, delimiter))
         advice = next((one for one in hints if one), "")
-        raise NotAvailable(f"{str(path)!r} has no lines of numbers in it; it begins with {rows[0][1][:60]!r}{advice}")
+        where = "it" if len(rows) <= MOST_HEADER else f"its first {MOST_HEADER} lines"
+        begins = f"it begins with {rows[0][1][:60]!r}{advice}"
+        raise NotAvailable(f"{str(path)!r} has no lines of numbers in {where}; {begins}")
     count = _usual_count(header, body, delimiter)
     names, units = _names(header, comments, body[0][0], delimiter, count)
     _check_split(path, header, body, delimiter, count)
@@ -249,7 +252,10 @@ def _moment(cell: str) -> float | None:
 
 
 def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[Line]]:
-    """Split lines into header and body: at the first line of numbers followed by another, or at the first one."""
+    """Split lines into header and body: at the first line of numbers followed by another, or at the first one.
+
+    The body is empty if the first `MOST_HEADER` lines hold no numbers.
+    """
     of_numbers = [_holds_numbers(line, delimiter) for _, line in rows[:HEADER_LINES]]
     alone = [k for k, own in enumerate(of_numbers) if own]
     for place in alone:
@@ -257,7 +263,7 @@ def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[L
             return rows[:place], rows[place:]
     if alone:
         return rows[: alone[0]], rows[alone[0] :]
-    for place, (_, line) in enumerate(rows[HEADER_LINES:], start=HEADER_LINES):
+    for place, (_, line) in enumerate(rows[HEADER_LINES:MOST_HEADER], start=HEADER_LINES):
         if _holds_numbers(line, delimiter):
             return rows[:place], rows[place:]
     return rows, []
@@ -286,7 +292,7 @@ def _names(
 ) -> tuple[list[str], list[str | None]]:
     """Names and units of the columns from the header or from comments; numbers as names without both."""
     lines = [line for _, line in header] or [line for i, line in comments if i < first]
-    split = [cells for line in lines if len(cells := _header_cells(line, delimiter, count)) == count]
+    split = [cells for line in lines[-NAMED:] if len(cells := _header_cells(line, delimiter, count)) == count]
     return names_and_units(split, count)
 
 

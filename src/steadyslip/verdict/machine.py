@@ -77,8 +77,10 @@ class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
 
 def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
     """Rows (label, text) on steady sliding, small disturbances, leading mode, onset and kicks of a machine."""
-    rows = [("steady sliding", _sliding(found.steady)), ("a disturbance", disturbance(found))] if found.steady else []
-    rows += [row for name in found.rig.contacts for row in _pull(found.rig, name)]
+    rows = []
+    if found.steady:
+        pulls = [row for name in found.rig.contacts for row in _pull(found.rig, name)]
+        rows = [("steady sliding", _sliding(found.steady)), *pulls, ("a disturbance", disturbance(found))]
     rows += [("the mode", found.mode.words())] if found.mode else []
     rows += stable_speeds(found)
     rows += [("onset", onset_words(found.onset))] if found.onset else []

@@ -92,6 +92,16 @@ def test_without_its_delay_a_machine_is_as_it_was():
     assert ss.eigenvalues(axis, {"drive.delay": [0.0]})[0] == pytest.approx(ss.eigenvalues(axis), rel=1e-12)
 
 
+@pytest.mark.parametrize("terms", [2, 3])
+def test_a_root_of_what_nothing_late_acts_on_is_found(terms):
+    """A post that swings on its own beside a block: a factor of all terms, whose first leads at every frequency."""
+    post, block = np.array([100.0, 0.02, 1.0]), np.array([5.0, 10.0, 5.0])
+    late = [np.array([one, 0.0, 0.0]) for one in (0.3, 0.2)][: terms - 1]
+    c = np.array([np.convolve(post, one) for one in (block, *late)])
+    found = quasi.rightmost(c, np.array([0.0, 0.05, 4.0])[:terms], apart(terms), 2)
+    assert found == pytest.approx(np.roots(post[::-1]), rel=1e-9)
+
+
 # --- other routes -----------------------------------------------------------------------------------
 
 

@@ -318,6 +318,8 @@ def _size(c: Array, h: Array, s: Any) -> Any:
 
 def _near_axis(c: Array, h: Array, sets: Sets) -> Iterator[float]:
     """Frequencies near which a root may lie on the imaginary axis, starting values for Newton's method."""
+    common = roots(c[:1])[0]  # zeros of all terms, of what nothing late acts on: there each term may lead
+    yield from np.abs(common.imag[np.isfinite(common)]).tolist()
     if len(c) == 2:  # sizes of both terms agree there; the next root is within half a turn
         found = np.array([one for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one)])
         turn = 2 * np.pi / float(np.max(h)) if np.max(h) > 0 else 0.0

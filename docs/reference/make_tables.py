@@ -52,6 +52,10 @@ table `[protocol]` may say what is done to the rig in an experiment. A whole one
   with `kind = "velocity-step"` and its keys.
 - A measured column is a list of numbers, `[0, 1.5, 3]`, or of texts with units.
 - A key without default that is not required is absent unless given.
+- Friction per load may be written as that of a load: `bristle_stiffness = "400 N/um at 3.2 kN"` are 125 000 1/m.
+- A table `[unknown]` has intervals of parameters that are not known, by dotted name, which `analyze` answers for:
+  `friction.bristle_stiffness = ["6 N/um at 3.2 kN", "600 N/um at 3.2 kN"]`. See
+  [Friction from a table](../how-to/friction-from-a-table.md).
 - A table `[map]` says what to compute for many rigs at once: see [Table of a map](map-file.md).
 - `law` may also name a law of yours: see [Add a friction law](../how-to/add-a-friction-law.md).
 - A number may have a [tolerance](#tolerances): `"12 ± 20 % N/um"`.

@@ -69,21 +69,26 @@ def analyze(
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.files.specifications.tolerances import rig_and_tolerances
-    from steadyslip.verdict import analyze as run, tolerate
+    from steadyslip.files.specifications.unknowns import intervals_of
+    from steadyslip.verdict import analyze as run, stable_within, tolerate
 
     formula = formula or along is not None
     if fitted is not None:
         _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, along, branch)
         return
     read, tolerances = rig_and_tolerances(rig, changes or ())
+    unknown = intervals_of(read, rig, changes or ())
     if along is not None:
         along = read.resolve(along)
     result = run(read, branch=branch, kick=kick or ())
     within = tolerate(read, tolerances) if tolerances else None
+    anywhere = stable_within(read, unknown) if unknown else None
     if as_json:
         data = result.to_dict()
         if within is not None:
             data["tolerances"] = within.to_dict()
+        if anywhere is not None:
+            data["unknown"] = anywhere.to_dict()
         if formula:
             data |= formula_data(result, along)
         print_json(data)
@@ -92,13 +97,13 @@ def analyze(
         colour = {True: typer.colors.GREEN, False: typer.colors.RED, None: typer.colors.YELLOW}[result.stable]
         print_text(typer.style(head, bold=True, fg=colour))
         print_text(rest)
-        if within is not None:
-            print_text(f"\n{within}")
+        for more in filter(None, (within, anywhere)):
+            print_text(f"\n{more}")
         if formula:
             print_formula(result, along)
     if any(one.interrupted for one in getattr(result, "kicks", ())):
         raise typer.Exit(130)
-    if require_stable and (not result.stable or result.on_edge):
+    if require_stable and (not result.stable or result.on_edge or not (anywhere is None or anywhere.everywhere)):
         raise typer.Exit(1)
 
 
@@ -141,6 +146,10 @@ def fit(
     files: Annotated[
         list[Path], typer.Argument(metavar="RECORD... [SPEC.toml]", help="records of experiments, and how to fit them")
     ],
+    law: Annotated[
+        str | None,
+        typer.Option("--law", help="the file is a table of speeds and friction: fit this law's steady curve, as lugre"),
+    ] = None,
     changes: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="change a value of SPEC, such as fit.trend=2; repeatable"),
@@ -152,11 +161,17 @@ def fit(
     steps: Annotated[bool, typer.Option("--steps", help="also fit every step alone")] = False,
     output: Annotated[
         list[Path] | None,
-        outputs("write .nc, .html, .json, .png, .svg or .pdf, or the table of all steps as .csv or .tex"),
+        outputs(
+            "write .nc, .html, .json, .png, .svg or .pdf, or the table of all steps as .csv or .tex; with --law "
+            "the rig as .toml, or .json"
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Which friction do these records show, and how sure is that?"""
+    if law is not None:
+        _fit_speeds(files, law, changes or (), output or (), as_json)
+        return
     from steadyslip.core.errors import ParameterError, Problem
     from steadyslip.experiments import bootstrap as resample, fit_files, population_files, step_table
     from steadyslip.experiments.commands import (
@@ -224,6 +239,16 @@ def fit(
         print_text(f"wrote {path}")
     if stopped:
         raise typer.Exit(130)
+
+
+def _fit_speeds(files: Sequence[Path], law: str, changes: Sequence[str], output: Sequence[Path], as_json: bool) -> None:
+    """Fit a law to a table of speeds, and write the rig."""
+    from steadyslip.experiments.commands import SPEED_ENDINGS, write_speeds
+    from steadyslip.experiments.from_speeds import fit_speed_files
+    from steadyslip.files.output import check_output
+
+    check_output(output, SPEED_ENDINGS)
+    output_result(fit_speed_files(files, law, changes), output, as_json, write_speeds)
 
 
 @app.command()

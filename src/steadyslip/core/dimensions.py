@@ -72,6 +72,7 @@ PREFIXABLE = PLAIN_WORDS | {prefix + base for base in _PREFIXED for prefix in _P
 """SI unit words with every prefix and without."""
 
 _TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
+_AT = re.compile(r"(.+?)\s+at\s+((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)", re.A)
 _ONE = re.compile(r"1\s*(?=/|$)")
 _SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
 _PLAIN = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
@@ -88,6 +89,12 @@ def unit(text: str) -> tuple[float, Dimension]:
     A unit is words with small integer powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
     arithmetic, a slash divides by the one factor after it. Words missing from the table are looked up in pint.
 
+    With ``at`` it is per that quantity: ``"N/um at 3.2 kN"`` are 1/m, the stiffness of bristles per load.
+
+    >>> factor, dimension = unit("N/um at 4 kN")
+    >>> factor, dimension == unit("1/m")[1]
+    (250.0, True)
+
     Raises
     ------
     QuantityError
@@ -95,6 +102,12 @@ def unit(text: str) -> tuple[float, Dimension]:
     """
     if len(text) > MOST_TEXT:
         raise QuantityError(f"{repr_short(text)} is not a unit: too long")
+    if whole := _AT.fullmatch(text.translate(MICRO)):
+        factor, dimension = unit(whole[1])
+        size, per = unit(whole[3])
+        if not 0 < float(whole[2]) * size < math.inf:
+            raise QuantityError(f"{text!r} is at no load above zero")
+        return factor / (float(whole[2]) * size), dimension.times(per, -1)
     factor, dimension = 1.0, Dimension()
     for word, power in factors(text):
         value, base = _TABLE.get(word) or _from_pint(word)

@@ -20,6 +20,8 @@ from steadyslip.core.errors import QuantityError, repr_short
 
 _MASS, _WEIGHT = Dimension(1), Dimension(1, 1, -2)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
+PER_LOAD = ("1", "1/m", "s/m")
+"""Units of friction per load, which machine people know as forces: a coefficient, bristles, viscous friction."""
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
@@ -76,6 +78,8 @@ def parse(text: str, expected: str) -> float:
                 "; it is per unit area: laws of a contact take that where it has an area, [contacts.NAME] "
                 "area = '0.01 m^2', all else is of the whole"
             )
+        elif found == wanted.times(_WEIGHT) and expected in PER_LOAD:
+            message += f"; name the load that it is of: '{text} at 3.2 kN'"
         elif (found, wanted) == (_MASS, _WEIGHT):
             message += "; a mass presses with its weight, mass times 9.81 m/s^2"
         raise QuantityError(message)

@@ -15,6 +15,7 @@ from .fitting.estimate import Estimate
 from .fitting.fit import fit
 from .fitting.result import Fit, load_fit
 from .from_files import fit_files, population_files
+from .from_speeds import fit_friction_table
 from .measured.read import read_record, record_from_arrays
 from .measured.record import Record
 from .spec import Spec, lab_rig, read_spec
@@ -39,6 +40,7 @@ __all__ = [
     "cross_validate",
     "fit",
     "fit_files",
+    "fit_friction_table",
     "lab_rig",
     "load_draws",
     "load_fit",

@@ -14,10 +14,12 @@ from steadyslip.experiments.answers.population import Population
 from steadyslip.experiments.answers.step_table import StepTable
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.speed_result import SpeedFit
 from steadyslip.files.output import FIGURES, write_by_ending, write_text
 from steadyslip.files.standalone import write_page
 
 TABLES = (".csv", ".tex")
+SPEED_ENDINGS = (".toml", ".json")
 ENDINGS = (".nc", ".html", ".json", *TABLES, *FIGURES)
 
 
@@ -83,6 +85,18 @@ def write_population(found: Population, path: Path) -> None:
         write_page(found, target, "Population")
 
     write_by_ending(path, {".nc": found.save, ".html": as_page, ".json": as_text}, found.plot)
+
+
+def write_speeds(found: SpeedFit, path: Path) -> None:
+    """Write the fit of a table of speeds: its rig as .toml, its numbers as .json.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    numbers = path.suffix.lower() == SPEED_ENDINGS[1]
+    write_text(path, json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n" if numbers else found.rig_text())
 
 
 def as_json(fit: Fit, comparison: LawComparison | None) -> dict[str, Any]:

@@ -49,7 +49,7 @@ _BY_UNIT = {
     "rad/s": "angular_frequency critical_angular_frequency",
     "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r",
     "m^2": "area",
-    "N": "normal_force friction_force force_drop pull",
+    "N": "load normal_force friction_force force_drop pull",
 }
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
 RESULT_UNIT = frozenset("value error low high amount absolute values".split())  # noqa: SIM905 -- a list of words

@@ -7,14 +7,18 @@ from steadyslip.files.specifications.tolerances import Adjustment, Tolerances, r
 from steadyslip.verdict.analyze import Analysis, analyze
 from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
+from steadyslip.verdict.unknown import StableValues, StableWithin, stable_within
 
 __all__ = [
     "Adjustment",
     "Analysis",
     "MachineAnalysis",
+    "StableValues",
+    "StableWithin",
     "Tolerances",
     "Tolerated",
     "analyze",
     "read_tolerances",
+    "stable_within",
     "tolerate",
 ]

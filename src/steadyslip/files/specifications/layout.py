@@ -44,6 +44,13 @@ class Section:
 PROTOCOL = Section("protocol", Protocol)
 """Table for protocols, which a rig file may have besides those of the rig."""
 
+UNKNOWN = "unknown"
+"""Name of the table of intervals of what is not known, which others ignore."""
+UNKNOWN_SCHEMA = {
+    "type": "object",
+    "description": "intervals of parameters that are not known, by dotted name: two numbers, or texts with units",
+}
+
 MAP = "map"
 """Name of the table of maps, which others ignore."""
 

@@ -31,6 +31,7 @@ from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, tak
 from steadyslip.files.specifications.layout import (
     MAP,
     PROTOCOL,
+    UNKNOWN,
     Section,
     is_machine,
     machine_sections,
@@ -299,7 +300,7 @@ class _ContentsReader(TableReader):
         return self._machine() if is_machine(self.tables) else self._slider()
 
     def _unknown_tables(self, own: Iterable[Section], further: Iterable[str]) -> None:
-        known = {section.name for section in (*own, PROTOCOL)} | {MAP, *TOLERANCES, *further}
+        known = {section.name for section in (*own, PROTOCOL)} | {MAP, UNKNOWN, *TOLERANCES, *further}
         for name in self.tables:
             if name not in known:
                 self.problem(name, unknown_name("table", name, sorted(known)))

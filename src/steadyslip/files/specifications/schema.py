@@ -10,6 +10,8 @@ from steadyslip.core.roles import Schema
 from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
+    UNKNOWN,
+    UNKNOWN_SCHEMA,
     Section,
     has_choice,
     machine_sections,
@@ -40,7 +42,7 @@ def rig_schema(further: Sequence[Section] = ()) -> Schema:
         both = [properties[section.name], table] if section.name in properties else None
         properties[section.name] = table if both is None else {"anyOf": both}
     properties[PROTOCOL.name] = protocol_schema()
-    properties |= TOLERANCES | further_schema(further)
+    properties |= TOLERANCES | {UNKNOWN: UNKNOWN_SCHEMA} | further_schema(further)
     machine = [section.name for section in machine_sections() if section.name != "links"]
     either = [{"required": slider}, {"required": machine}]
     return {"type": "object", "properties": properties, "anyOf": either, "additionalProperties": False}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,8 +42,8 @@ _SPLIT_THOUSANDS = re.compile(r"(^|,)[-+]?\d{1,3},\d{3}(\.\d*)?(,|$)")
 _BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 
 
-def read_text(path: Path, skip_bad_lines: bool) -> Table:
-    """Columns of a text file, or of an XLOOK file, which has no ending of its own.
+def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes] = bytes) -> Table:
+    """Columns of a text file, or of an XLOOK file, which has no ending of its own; `mended` may replace words first.
 
     Raises
     ------
@@ -51,7 +52,7 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
     ParameterError
         If lines are damaged.
     """
-    raw = read_bytes(path, MOST_TEXT)
+    raw = mended(read_bytes(path, MOST_TEXT))
     if is_xlook(raw):
         names, units, values = read_xlook(raw, str(path))
         known = [None if unit is None else known_unit(unit) for unit in units]

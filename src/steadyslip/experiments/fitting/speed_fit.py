@@ -1,0 +1,245 @@
+"""Fit of a friction law's steady curve to friction measured at constant speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.dimensions import unit
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.results import ReadOnly
+from steadyslip.core.roles import Parameter
+from steadyslip.experiments.fitting.estimate import Estimate
+from steadyslip.experiments.fitting.presliding import BristleStiffness
+from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, SteadyCurve, steady_curve
+from steadyslip.experiments.measured.speeds import SpeedTable
+from steadyslip.experiments.numerics.profiled import Minimum, intervals, least
+from steadyslip.laws.friction.law import FrictionLaw
+
+LEVELS = (0.6827, 0.95)
+"""Probabilities of the intervals: one standard deviation of a normal error, and the usual one."""
+VISCOUS, EXPONENT = "viscous", "stribeck_exponent"
+HELD = {EXPONENT: 2.0, VISCOUS: 0.0}
+"""Parameters that are held, in this order, where rows are few: Gauss's exponent, no viscosity."""
+SAME = 1e-6  # relative difference of speeds or loads that count as one
+
+
+@dataclass(frozen=True)
+class SpeedEstimate(Estimate):
+    """Parameter of a steady friction curve; `likely` is the 68 % interval, `remark` says what the table does not tell.
+
+    The error is half the width of the 68 % interval, inf where that has no end.
+    """
+
+    likely: tuple[float, float] = (float("nan"), float("nan"))
+    remark: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionFit(ReadOnly):
+    """Steady friction in one direction.
+
+    Attributes
+    ----------
+    forward : bool
+    estimates : tuple of SpeedEstimate
+        With load: friction coefficients and values per load. Without: forces (torques) and the like.
+    law : FrictionLaw
+        With the estimates; what a table cannot tell has a value from `UNTOLD`'s middle.
+    load : float
+        N, the median of the table; 1 where it has none, so that coefficients are forces.
+    speed, friction, fitted : ndarray (n,)
+        m/s (rad/s), N (N m) or coefficients.
+    scatter : float
+        Standard deviation of friction about the curve: a share of it, or N (N m) with absolute errors.
+    freedom : int
+        Rows less parameters.
+    correlation : ndarray (p, p)
+    notes : tuple of str
+    """
+
+    forward: bool
+    estimates: tuple[SpeedEstimate, ...]
+    law: FrictionLaw = field(repr=False)
+    load: float
+    speed: Array = field(repr=False)
+    friction: Array = field(repr=False)
+    fitted: Array = field(repr=False)
+    scatter: float
+    freedom: int
+    correlation: Array = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> SpeedEstimate:
+        """Estimate by name."""
+        found = {one.name: one for one in self.estimates}
+        if name not in found:
+            raise KeyError(unknown_name("estimate", name, found))
+        return found[name]
+
+    def beside(self, name: str) -> float:
+        """Value of an estimate beside the law, 0 where it is not one."""
+        return {one.name: one.value for one in self.estimates}.get(name, 0.0)
+
+
+def fit_direction(
+    table: SpeedTable, law: type[FrictionLaw], forward: bool, held: Mapping[str, float], relative: bool
+) -> DirectionFit:
+    """Fit one direction of a table.
+
+    Raises
+    ------
+    NotAvailable
+        If it has too few speeds for the law.
+    """
+    rows = (table.speed > 0) == forward
+    speed, friction = np.abs(table.speed[rows]), table.friction[rows]
+    load = np.ones(len(speed)) if table.load is None or table.is_coefficient else table.load[rows]
+    curve, notes = _chosen(table, law, speed, load, held, forward)
+    low, high = curve.bounds(speed, load, friction)
+
+    def residuals(inner: Array) -> tuple[Array, Array]:
+        return curve.residuals(inner, speed, load, friction, relative)
+
+    starts = curve.starts(speed, load, friction, relative)
+    found, ends = intervals(least(residuals, starts, low, high), LEVELS)
+    values = curve.values(found.at)
+    typical = float(np.median(load))
+    if table.load is not None:
+        typical = float(np.median(table.load[rows]))
+    estimates = tuple(
+        _estimate(curve, i, values[i], ends[i], (low[i], high[i]), speed, table) for i in range(len(curve.free))
+    )
+    own = {name: float(value) for name, value in zip(curve.free, values, strict=True) if name not in (OFFSET, DAMPING)}
+    return DirectionFit(
+        forward, estimates, _with(curve.law, own), typical, speed, friction, curve.force(values, speed, load)[0],
+        float(np.sqrt(found.variance)), found.freedom, _correlation(found), tuple(notes),
+    )  # fmt: skip
+
+
+def _with(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
+    """Law with values, checked by its constructor."""
+    every = {item.name: getattr(law, item.name) for item in fields(law)} | dict(values)
+    return type(law)(**every)
+
+
+def _distinct(values: Array) -> int:
+    return 1 + int(np.sum(np.diff(np.sort(values)) > SAME * np.abs(values).max()))
+
+
+def _chosen(
+    table: SpeedTable,
+    law: type[FrictionLaw],
+    speed: Array,
+    load: Array,
+    held: Mapping[str, float],
+    forward: bool,
+) -> tuple[SteadyCurve, list[str]]:
+    """Curve with as many free parameters as the rows can tell, and notes on what is held."""
+    notes: list[str] = []
+    reference = float(np.exp(np.mean(np.log(speed))))
+    speeds, fixed = _distinct(speed), dict(held)
+    curve = steady_curve(law, reference, fixed, ())
+    if unknown := [name for name in held if name not in curve.roles]:
+        raise ParameterError([Problem(unknown[0], unknown_name("parameter", unknown[0], curve.roles))])
+    more = [OFFSET] if _distinct(load) > 1 else []
+    more += [DAMPING] if more and VISCOUS in curve.free else []
+    for name, value in HELD.items():
+        if name in curve.free and (len(curve.free) > speeds or len(curve.free) + len(more) >= len(speed)):
+            fixed[name] = value
+            notes.append(f"{name} is held at {value:g}: {len(speed)} rows at {speeds} speeds do not tell it as well")
+            curve = steady_curve(law, reference, fixed, ())
+    while more and len(curve.free) + len(more) >= len(speed):
+        notes.append(f"{more.pop()} is left out: {len(speed)} rows do not tell it as well")
+    if len(curve.free) > speeds or len(curve.free) >= len(speed):
+        way = "forward" if forward else "backward"
+        raise NotAvailable(
+            f"{table.source!r} has {len(speed)} rows at {speeds} speeds {way}; the law {law.name!r} needs "
+            f"{len(curve.free)} speeds in {len(curve.free) + 1} rows at least"
+        )
+    return (steady_curve(law, reference, fixed, more) if more else curve), notes
+
+
+def _correlation(found: Minimum) -> Array:
+    covariance = found.covariance()
+    with np.errstate(all="ignore"):
+        size = np.sqrt(np.diag(covariance))
+        return np.asarray(covariance / np.outer(size, size))
+
+
+def _estimate(
+    curve: SteadyCurve, i: int, value: float, ends: Array, bounds: tuple[float, float], speed: Array, table: SpeedTable
+) -> SpeedEstimate:
+    name, role = curve.free[i], curve.roles[curve.free[i]]
+    si = np.exp(ends) if curve.logarithmic[i] else np.array(ends)
+    least_one = 0.0 if role.domain.low == 0 else -np.inf
+    si = np.where(np.isneginf(ends), least_one, si)
+    (low68, high68), (low, high) = si
+    error = float(high68 - low68) / 2
+    remark = ""
+    if role.kind == "velocity scale" and not speed.min() <= value <= speed.max():
+        side, end = ("below the slowest", speed.min()) if value < speed.min() else ("above the fastest", speed.max())
+        size = unit(table.speed_unit)[0]
+        remark = f"{side} measured speed, {end / size:.4g} {table.speed_unit}: beyond the table"
+    open_below = bool(np.isneginf(ends[1, 0])) and (curve.logarithmic[i] or least_one < 0)
+    open_above = bool(np.isposinf(ends[1, 1]))
+    if open_below or open_above:
+        which = "" if open_below and open_above else " from below" if open_below else " from above"
+        remark = "; ".join(filter(None, [remark, f"not determined{which} by these speeds"]))
+    return SpeedEstimate(
+        name, float(value), error, unit_told(role, table, bool(curve.logarithmic[i])), float(low), float(high), None,
+        (float(low68), float(high68)), remark,
+    )  # fmt: skip
+
+
+def unit_told(role: Parameter, table: SpeedTable, bent: bool) -> str:
+    """SI unit in which a table tells a parameter: forces where it has no load, angles where it turns.
+
+    `bent` is true for what friction does not rise with in proportion, scales and exponents.
+    """
+    shown = role.unit
+    if table.load is None and not table.is_coefficient and not bent:
+        shown = {"1": "N", "s/m": "N s/m"}.get(shown, shown)
+    if table.turns:
+        turned = {"N": "N m", "N s/m": "N m s/rad", "m/s": "rad/s", "s/m": "s/rad"}
+        shown = turned.get(shown, shown)
+    return shown
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedFindings(ReadOnly):
+    """Friction of a table of speeds as a law, forward and backward apart.
+
+    Attributes
+    ----------
+    table : SpeedTable
+    law : str
+        Name of the law.
+    forward, backward : DirectionFit or None
+        None where the table has no such speeds.
+    bristles : BristleStiffness or None
+        From a loop before sliding, if one was given.
+    relative : bool
+        True if the errors of friction are shares of it.
+    """
+
+    table: SpeedTable = field(repr=False)
+    law: str
+    forward: DirectionFit | None
+    backward: DirectionFit | None
+    bristles: BristleStiffness | None = None
+    relative: bool = True
+
+    @property
+    def main(self) -> DirectionFit:
+        """The forward fit, or the backward one where there is no other."""
+        if (found := self.forward or self.backward) is None:
+            raise InternalError("a fit of a table without rows")
+        return found
+
+    def __getitem__(self, name: str) -> SpeedEstimate:
+        """Estimate of `main` by name."""
+        return self.main[name]

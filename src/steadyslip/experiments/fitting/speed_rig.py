@@ -1,0 +1,180 @@
+"""Rig file of a fit to a table of speeds; what the table does not tell is marked, or carried as an interval."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+
+from steadyslip.core.dimensions import unit
+from steadyslip.core.format import display_units, format_quantity
+from steadyslip.core.records import FrozenRecord, parameters
+from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedFindings
+from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, UNTOLD
+from steadyslip.files.specifications.layout import UNKNOWN
+
+BRISTLES, BRISTLE_DAMPING, SLIP = "bristle_stiffness", "bristle_damping", "slip distance"
+DEFLECTION = (1e-6, 1e-5, 1e-4)
+"""Least, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals give way by
+1 to 50 um (Armstrong-Helouvry 1991). Of joints, some 10 cm from their axis, ten times as many rad."""
+RAD_A_METRE = 10.0
+STIFFNESS, MASS, SHAFT, INERTIA = (
+    "20 N/um",
+    100.0,
+    "1e4 N m/rad",
+    0.1,
+)  # of a common axis, of a common joint; kg, kg m^2
+COEFFICIENT_LOAD = 1000.0  # N, where a table of coefficients has no load
+CHANGE = "CHANGE: a table of speeds does not tell it"
+
+
+def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
+    """Least, usual and largest value of parameters of the law that a table of speeds does not tell, in law units."""
+    one, turns = found.main, found.table.turns
+    load = rig_load(found)
+    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load)
+    short, usual, long = (length * (RAD_A_METRE if turns else 1.0) for length in DEFLECTION)
+    ranges: dict[str, tuple[float, float, float]] = {}
+    known = parameters(one.law)
+    for name, address in known.items():
+        if address.role.kind == SLIP and address.value is not None:
+            ranges[name] = (short, usual, long)
+    if BRISTLES in known:
+        ranges[BRISTLES] = (level / long, level / usual, level / short)
+        if found.bristles is not None:
+            ranges[BRISTLES] = (found.bristles.low / load, found.bristles.value / load, found.bristles.high / load)
+        if BRISTLE_DAMPING in known:
+            critical = 2 * math.sqrt(ranges[BRISTLES][1] * (INERTIA if turns else MASS) / load)
+            ranges[BRISTLE_DAMPING] = (0.0, 0.0, critical)
+    return ranges
+
+
+def rig_load(found: SpeedFindings) -> float:
+    """Load (N) of the rig: the table's median, one of many of coefficients, or 1 for forces without a load."""
+    if found.table.load is None and found.table.is_coefficient:
+        return COEFFICIENT_LOAD
+    return found.main.load
+
+
+def rig_text(found: SpeedFindings) -> str:
+    """A complete rig file: a slider, or a machine of one body where the table turns."""
+    with display_units([found.table.speed_unit]):
+        return _text(found, untold(found))
+
+
+def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> str:
+    lines = [f"# Friction of {found.table.source}: steadyslip fit --law {found.law}."]
+    lines += ["# Lines with CHANGE are not told by a table of speeds: give those of your machine."]
+    if found.table.load is None and not found.table.is_coefficient:
+        force = "torque" if found.table.turns else "force"
+        lines += [
+            f"# The table has no load: it is 1 N here, and coefficients are {force}s in N{' m' * found.table.turns}."
+        ]
+    lines += ["", *(_joint if found.table.turns else _axis)(found, ranges)]
+    where = "contacts.bearing.friction" if found.table.turns else "friction"
+    if ranges:
+        lines += ["", f"[{UNKNOWN}]  # analyze says which of these values are stable; delete a line once it is known"]
+        lines += [
+            f"{where}.{name} = [{_written(found, name, low)}, {_written(found, name, high)}]"
+            for name, (low, _, high) in ranges.items()
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _axis(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
+    one = found.main
+    offset, damping = one.beside(OFFSET), one.beside(DAMPING)
+    slowest = one.speed.min() / unit(found.table.speed_unit)[0]
+    drag = [f'radiation_damping = "{damping:.6g} N s/m"  # viscous drag that does not follow the load']
+    return [
+        *_friction(found, ranges, "friction"), "", "[contact]", 'law = "constant"',
+        _preload(found) + (f", with {format_quantity(offset, 'N')} that presses beside the load" if offset else ""), "",
+        "[slider]", 'area = "1 m^2"  # so that forces and stresses have the same numbers',
+        f'stiffness = "{STIFFNESS}"  # {CHANGE}', f'mass = "{MASS:g} kg"  # {CHANGE}',
+        *(drag if damping else []), "", "[drive]",
+        f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
+    ]  # fmt: skip
+
+
+def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
+    one, where = found.main, "contacts.bearing"
+    slowest = one.speed.min() / unit(found.table.speed_unit)[0]
+    damping = one.beside(DAMPING)
+    drag = [
+        "[links.drag]",
+        'kind = "shaft"',
+        'between = ["joint", "ground"]',
+        f'damping = "{damping:.6g} N m s/rad"',
+        "",
+    ]
+    return [
+        "[bodies.joint]", 'motion = "rotation"', f'inertia = "{INERTIA:g} kg m^2"  # {CHANGE}', "",
+        "[links.shaft]", 'kind = "shaft"', 'between = ["drive", "joint"]', f'stiffness = "{SHAFT}"  # {CHANGE}', "",
+        *(drag if damping else []), f"[{where}]", 'body = "joint"',
+        'radius = "1 m"  # so that m/s are rad/s, and N are N m', "",
+        *_friction(found, ranges, f"{where}.friction"), "",
+        f"[{where}.contact]", 'law = "constant"', _preload(found), "", "[drive]",
+        'control = "rotary-steady"',
+        f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
+    ]  # fmt: skip
+
+
+def _preload(found: SpeedFindings) -> str:
+    told = (
+        "the table's"
+        if found.table.load is not None
+        else CHANGE
+        if found.table.is_coefficient
+        else "the table has none"
+    )
+    return f'preload = "{rig_load(found) + found.main.beside(OFFSET):.6g} N"  # {told}'
+
+
+def _friction(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]], where: str) -> list[str]:
+    lines = [f"[{where}]", f'law = "{found.law}"']
+    told = {estimate.name: estimate for estimate in found.main.estimates}
+    for name, address in parameters(found.main.law).items():
+        if name in told:
+            lines.append(f"{name} = {_written(found, name, told[name].value)}  # {_interval(found.main, name)}")
+        elif name in ranges:
+            source = (
+                "from the loop" if name == BRISTLES and found.bristles is not None else f"{CHANGE}, see [{UNKNOWN}]"
+            )
+            lines.append(f"{name} = {_written(found, name, ranges[name][1])}  # {source}")
+        elif address.value is not None and address.value != _default(found.main.law, name):
+            said = "held, not fitted" if address.role.kind not in UNTOLD else "only what it makes with others is told"
+            lines.append(f"{name} = {_written(found, name, address.value)}  # {said}")
+    if found.forward is not None and found.backward is not None:
+        lines.append("# backward:")
+        lines += [
+            f"# {one.name} = {_written(found, one.name, one.value)}  # {_interval(found.backward, one.name)}"
+            for one in found.backward.estimates
+        ]
+    return lines
+
+
+def _default(law: FrozenRecord, name: str) -> object:
+    return next(item.default for item in fields(law) if item.name == name)  # type: ignore[arg-type]
+
+
+def _interval(one: DirectionFit, name: str) -> str:
+    estimate = one[name]
+    ends = [
+        "any" if not math.isfinite(end) else format_quantity(end, estimate.unit)
+        for end in (estimate.low, estimate.high)
+    ]
+    return f"95 %: {ends[0]} to {ends[1]}" + (f"; {estimate.remark}" if estimate.remark else "")
+
+
+def _written(found: SpeedFindings, name: str, value: float) -> str:
+    """TOML value of a parameter, in the units of the table; stiffness and damping of bristles at the rig's load."""
+    known = parameters(found.main.law)
+    own = known[name].role.unit if name in known else "1"
+    load = rig_load(found)
+    if own == "1":
+        return f"{value:.8g}"
+    if name in (BRISTLES, BRISTLE_DAMPING) and not found.table.turns:
+        scale, size = (1e-6, "N/um") if name == BRISTLES else (1e-3, "N s/mm")
+        return f'"{value * load * scale:.6g} {size} at {load:.6g} N"'
+    if own == "m/s" and not found.table.turns:
+        return f'"{value / unit(found.table.speed_unit)[0]:.8g} {found.table.speed_unit}"'
+    return f'"{value:.8g} {own}"'

@@ -1,0 +1,163 @@
+"""`fit_friction_table`: a friction law from friction that was measured at constant speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.domains import positive
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.options import checked
+from steadyslip.core.records import role_of
+from steadyslip.core.roles import Parameter
+from steadyslip.experiments.fitting.presliding import fit_loop
+from steadyslip.experiments.fitting.speed_fit import fit_direction
+from steadyslip.experiments.fitting.speed_result import SpeedFit
+from steadyslip.experiments.measured.speeds import SpeedTable, is_loop, read_loop, read_speed_table, table_from_arrays
+from steadyslip.files.specifications.changes import named_value
+from steadyslip.files.specifications.layout import find_law
+from steadyslip.laws.friction import LuGre
+from steadyslip.laws.friction.law import FrictionLaw
+
+ERRORS = ("relative", "absolute")
+
+
+@checked()
+def fit_friction_table(
+    table: str | PathLike[str] | Mapping[str, Any] | SpeedTable,
+    law: str = LuGre.name,
+    *,
+    load: Any = None,
+    loop: str | PathLike[str] | None = None,
+    hold: Mapping[str, Any] | None = None,
+    errors: str = "relative",
+    **columns: Any,
+) -> SpeedFit:
+    """Fit a friction law to friction that was measured at constant speeds.
+
+    Each direction is fitted alone. Parameters that the rows are too few for are held: the Stribeck exponent at 2, then
+    the viscosity at 0. Where the load differs between rows, load that presses beside it and viscous drag that does not
+    follow it are fitted as well.
+
+    Parameters
+    ----------
+    table : path, or mapping of str to array_like
+        File with columns of speed, force or torque or friction coefficient, and optionally of load and direction; or
+        arrays by these names in SI units, ``{"speed": [...], "force": [...]}``. Negative speeds are backward.
+    law : str
+        Registered name of a friction law.
+    load : float or str, optional
+        Constant load, N, if there is no column of it. Without any load, coefficients are forces.
+    loop : path, optional
+        Table of displacement and force before sliding, which tells the stiffness of bristles.
+    hold : mapping of str to float or str, optional
+        Parameters of the law that are known.
+    errors : str
+        ``"relative"`` if each error is a share of the friction measured, as of a gauge of 1 % of its reading;
+        ``"absolute"`` if they are of one size, as of 1 % of full scale.
+    **columns
+        Column or unit by role where names do not tell: ``speed="mm/min"``, ``force="F2"``.
+
+    Returns
+    -------
+    SpeedFit
+        Estimates with errors and 68 and 95 % intervals; prints itself; `rig_text` is a rig file.
+
+    Raises
+    ------
+    ParameterError
+        If the table, a column, or an option is not valid.
+    NotAvailable
+        If there are too few speeds for the law, or a file cannot be read.
+
+    Notes
+    -----
+    Intervals hold the values at which the least sum of squares of the other parameters exceeds the overall one by no
+    more than s² t², with s² from the residuals and Student's t for rows less parameters.
+
+    Examples
+    --------
+    >>> import steadyslip as ss
+    >>> speed = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2]  # m/s
+    >>> table = {"speed": speed, "force": [91.2, 82.4, 64.9, 53.1, 53.3, 59.6]}
+    >>> found = ss.experiments.fit_friction_table(table, load="500 N",
+    ...                                           hold={"stribeck_exponent": 1.0})
+    >>> print(found["mu_coulomb"])
+    mu_coulomb = 0.1012 ± 0.00092
+    """
+    if errors not in ERRORS:
+        raise ParameterError([Problem("errors", f"got {errors!r}; allowed: {' or '.join(map(repr, ERRORS))}")])
+    if isinstance(table, SpeedTable):
+        read = table
+    elif isinstance(table, Mapping):
+        pressed = {} if load is None else {"load": Parameter("N", positive, "load").checked(load)}
+        read = table_from_arrays({**table, **pressed})
+    else:
+        read = read_speed_table(table, load=load, **columns)
+    kind: Any = find_law(FrictionLaw, law)
+    held = _held(kind, hold or {})
+    sides = {
+        side: fit_direction(read, kind, side, held, errors == "relative")
+        for side in (True, False)
+        if np.any((read.speed > 0) == side)
+    }
+    bristles = None
+    if loop is not None:
+        measured = read_loop(loop)
+        if measured.turns != read.turns:
+            raise ParameterError([Problem("loop", "turns where the table slides, or the other way round")])
+        bristles = fit_loop(measured)
+    return SpeedFit(read, law, sides.get(True), sides.get(False), bristles, errors == "relative")
+
+
+def _held(law: Any, given: Mapping[str, Any]) -> dict[str, float]:
+    """Held parameters in SI units."""
+    found, problems = {}, []
+    roles = {item.name: role for item in fields(law) if isinstance(role := role_of(item), Parameter)}
+    for name, value in given.items():
+        try:
+            if name not in roles:
+                raise ParameterError([Problem("", unknown_name("parameter", name, roles))])
+            found[name] = roles[name].checked(_number(value))
+        except ParameterError as error:
+            problems += [one.under(name) for one in error.problems]
+    if problems:
+        raise ParameterError(problems, title="hold")
+    return found
+
+
+def _number(value: Any) -> Any:
+    """A number from a text that is one; other values unchanged, to be checked by what reads them."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return value
+
+
+def fit_speed_files(files: Sequence[Path], law: str, changes: Sequence[str]) -> SpeedFit:
+    """Fit the tables of a command line: one of speeds, and perhaps a loop before sliding.
+
+    Raises
+    ------
+    ParameterError
+        If there is more than one table of speeds or loop.
+    """
+    loops = [path for path in files if is_loop(path)]
+    tables = [path for path in files if path not in loops]
+    if len(tables) != 1 or len(loops) > 1:
+        message = f"got {len(tables)} tables of speeds and {len(loops)} of displacement; allowed: one, and one or none"
+        raise NotAvailable(message)
+    options: dict[str, Any] = {}
+    hold: dict[str, Any] = {}
+    names = {item.name for item in fields(find_law(FrictionLaw, law))}  # type: ignore[arg-type]
+    for name, value in map(named_value, changes):
+        own = name.removeprefix("friction.")
+        (hold if own in names else options)[own] = value
+    if len(loops) == 1:
+        options["loop"] = loops[0]
+    return fit_friction_table(tables[0], law, hold=hold, **options)

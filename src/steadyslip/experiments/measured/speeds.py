@@ -1,0 +1,360 @@
+"""Reading of friction measured at constant speeds, and of loops of displacement and force before sliding."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.dimensions import Dimension, unit
+from steadyslip.core.domains import positive
+from steadyslip.core.errors import ParameterError, Problem, QuantityError
+from steadyslip.core.roles import Parameter
+from steadyslip.experiments.measured.columns import known_unit, listed, split_name
+from steadyslip.experiments.measured.formats import FORMATS, read_columns
+from steadyslip.experiments.measured.formats.table import Table
+from steadyslip.experiments.measured.formats.text import read_text
+
+WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
+FEWEST_ROWS = 3
+_UNITS = {
+    "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg"),
+    "displacement": ("m", "rad"), "direction": ("1",),
+}  # fmt: skip
+"""Units of each role, the first where the file has none."""
+_WORDS = {
+    "direction": r"dir|direction|richtung|sense|sinn",
+    "load": r"load|normal|normalkraft|normalforce|last|preload|vorspann|vorspannung|fn|belastung|clamp|weight",
+    "torque": r"torque|moment|drehmoment|reibmoment|frictiontorque|tau|m|t|tf|mr",
+    "friction": r"mu|µ|μ|cof|reibwert|reibzahl|reibungszahl|coefficient|frictioncoefficient",
+    "force": r"force|kraft|reibkraft|reibungskraft|frictionforce|friction|f|ff|fr|fric|drag",
+    "speed": r"speed|velocity|vel|v|rate|geschw|geschwindigkeit|drehzahl|n|omega|ω|w|feed|vorschub|feedrate|qd|dq",
+    "displacement": r"displacement|disp|position|pos|x|s|weg|angle|winkel|deflection|presliding|q|phi|φ",
+}
+"""Words of headers by role."""
+_FORWARD = r"forward|forwards|fwd|fw|vor|vorwärts|hin|positive|pos|cw|\+"
+_BACKWARD = r"backward|backwards|bwd|back|bw|reverse|rück|rückwärts|zurück|negative|neg|ccw|[-−–]"
+_CELL = re.compile(rf"(?i)(?<![^\s,;|\t\"])(?:(?P<forward>{_FORWARD})|(?P<backward>{_BACKWARD}))(?![^\s,;|\t\"])")
+_SPELLED = {
+    "nm": "N m", "n·m": "N m", "n.m": "N m", "n*m": "N m", "mnm": "mN m", "nmm": "N mm", "ncm": "N cm", "knm": "kN m",
+    "u/min": "rpm", "min-1": "rpm", "1/min": "rpm", "r/min": "rpm", "rev/min": "rpm", "rps": "rev/s",
+}  # fmt: skip
+_ANGLE = Dimension(angle=1)
+
+
+@dataclass(frozen=True)
+class SpeedTable:
+    """Friction at constant speeds, by rows.
+
+    Attributes
+    ----------
+    source : str
+    speed : ndarray (n,)
+        m/s, or rad/s where `turns`; negative backward.
+    friction : ndarray (n,)
+        Positive: N, N m where `turns`, or a coefficient where `is_coefficient`.
+    load : ndarray (n,) or None
+        N.
+    turns, is_coefficient : bool
+    speed_unit : str
+        As in the file.
+    notes : tuple of str
+    """
+
+    source: str
+    speed: Array
+    friction: Array
+    load: Array | None
+    turns: bool
+    is_coefficient: bool
+    speed_unit: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Force over displacement before sliding, in the order of measurement.
+
+    Attributes
+    ----------
+    source : str
+    displacement : ndarray (n,)
+        m, or rad where `turns`.
+    force : ndarray (n,)
+        N, or N m where `turns`.
+    turns : bool
+    """
+
+    source: str
+    displacement: Array
+    force: Array
+    turns: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Role:
+    """A column that was found: its SI values, its unit, and the direction that its name says (0: none)."""
+
+    values: Array
+    unit: str
+    side: int = 0
+
+
+def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: Any) -> SpeedTable:
+    """Read a table of friction at constant speeds.
+
+    Columns are found by their names and units: ``speed [mm/min]``, ``F (N)``, ``torque_Nm``, ``mu``, ``load [kN]``,
+    ``direction`` (words or signs; negative speeds are backward without it). Two columns of friction, ``forward [N]``
+    and ``backward [N]``, are read as two rows each.
+
+    Parameters
+    ----------
+    path : path
+    load : float or str, optional
+        Constant load, N, if there is no column of it.
+    **columns
+        Column or unit by role: ``speed="mm/min"``, ``force="F2"``, ``torque=("M", "N m")``.
+
+    Raises
+    ------
+    ParameterError
+        If columns are missing or contradict each other.
+    NotAvailable
+        If the file cannot be read.
+    """
+    source = str(path)
+    found, notes = _roles(Path(path), columns)
+    kinds = [role for role in ("force", "torque", "friction") if role in found]
+    if "speed" not in found or len(kinds) != 1:
+        lacking = "speed" if "speed" not in found else "force"
+        both = f"has columns of {' and of '.join(kinds)}; leave one out" if len(kinds) > 1 else "has no column for it"
+        names = listed(repr(name) for name in _table(Path(path)).names)
+        raise _fault(source, lacking, f"{both}; a table of speeds has speed, force or torque or friction, and if known "
+                     f"load and direction; its columns are {names}")  # fmt: skip
+    kind, speed = kinds[0], found["speed"][0]
+    turns = unit(speed.unit)[1].angle == 1
+    if kind != "friction" and turns != (kind == "torque"):
+        says = f"got speeds in {speed.unit} and a {kind}"
+        raise _fault(source, kind, f"{says}; allowed: a force with m/s, or a torque with rad/s or rpm")
+    rows = [_stacked(speed.values, one, found.get("direction")) for one in found[kind]]
+    v, f = (np.concatenate([row[i] for row in rows]) for i in range(2))
+    pressed = np.tile(found["load"][0].values, len(rows)) if "load" in found else None
+    if load is not None:
+        pressed = np.full(len(v), Parameter("N", positive, "load").checked(load))
+    clean = np.isfinite(v) & np.isfinite(f) & (np.isfinite(pressed) if pressed is not None else True)
+    if not np.all(clean):
+        notes.append(f"{np.sum(~clean)} rows without a number left out")
+    if np.any(still := clean & (v == 0)):
+        notes.append(f"{np.sum(still)} rows at rest left out: friction at rest is not that of sliding")
+    keep = clean & (v != 0)
+    v, f, pressed = v[keep], f[keep], None if pressed is None else pressed[keep]
+    if len(v) < FEWEST_ROWS:
+        raise _fault(source, "speed", f"got {len(v)} rows of sliding; a table of speeds has {FEWEST_ROWS} at least")
+    if pressed is not None and not np.all(pressed > 0):
+        raise _fault(source, "load", f"got {pressed.min():g} N; allowed: loads above 0")
+    return SpeedTable(
+        source, v, _unsigned(source, v, f, kind), pressed, turns, kind == "friction", speed.unit, tuple(notes)
+    )
+
+
+def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:
+    """Table of arrays in SI units by role: speed (m/s, or rad/s with torque), force, torque or friction, load.
+
+    Raises
+    ------
+    ParameterError
+        If arrays are missing, or differ in length.
+    """
+    kinds = [role for role in ("force", "torque", "friction") if role in arrays]
+    if "speed" not in arrays or len(kinds) != 1 or set(arrays) - {"speed", "load", *kinds}:
+        raise _fault(
+            "arrays", "table", f"got {listed(arrays)}; allowed: speed, one of force, torque and friction, and load"
+        )
+    try:
+        found = {role: np.atleast_1d(np.asarray(values, dtype=float)) for role, values in arrays.items()}
+        v, f, *pressed = np.broadcast_arrays(*(found[role] for role in ("speed", kinds[0], "load") if role in found))
+    except (TypeError, ValueError) as error:
+        raise _fault("arrays", "table", "allowed: numbers, as many of one column as of the other") from error
+    turns = kinds[0] == "torque"
+    every = np.stack([v, f, *pressed])
+    if not np.all(np.isfinite(every)) or np.any(v == 0) or not all(np.all(one > 0) for one in pressed):
+        raise _fault("arrays", "table", "allowed: finite numbers, speeds that are not 0, loads above 0")
+    speed_unit = "rad/s" if turns else "m/s"
+    return SpeedTable(
+        "arrays", v, _unsigned("arrays", v, f, kinds[0]), pressed[0] if pressed else None, turns,
+        kinds[0] == "friction", speed_unit,
+    )  # fmt: skip
+
+
+def read_loop(path: str | PathLike[str], **columns: Any) -> Loop:
+    """Read a table of displacement and force (or angle and torque) before sliding.
+
+    Raises
+    ------
+    ParameterError
+        If columns are missing.
+    """
+    found, notes = _roles(Path(path), columns)
+    kind = "torque" if "torque" in found else "force"
+    if "displacement" not in found or kind not in found:
+        raise _fault(str(path), "displacement", "a loop before sliding has columns of displacement and force")
+    x, f = found["displacement"][0], found[kind][0].values
+    keep = np.isfinite(x.values) & np.isfinite(f)
+    return Loop(str(path), x.values[keep], f[keep], unit(x.unit)[1].angle == 1, tuple(notes))
+
+
+def is_loop(path: str | PathLike[str]) -> bool:
+    """True if a table has a column of displacement and none of speed."""
+    found, _ = _roles(Path(path), {})
+    return "displacement" in found and "speed" not in found
+
+
+def _fault(source: str, name: str, message: str) -> ParameterError:
+    return ParameterError([Problem(name, message)], title=source)
+
+
+def _table(path: Path) -> Table:
+    return read_columns(path) if path.suffix.lower() in FORMATS else read_text(path, False, _directions)
+
+
+def _directions(raw: bytes) -> bytes:
+    """Text with 1 and -1 for words of directions in lines that have numbers."""
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    lines = [
+        _CELL.sub(lambda word: "1" if word["forward"] else "-1", line) if re.match(r"[^#%]*\d", line) and i else line
+        for i, line in enumerate(text.splitlines())
+    ]
+    return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]], list[str]]:
+    """Columns of a file by role, and notes; of friction there may be two, forward and backward."""
+    table = _table(path)
+    if unknown := [name for name in given if name not in _UNITS]:
+        raise _fault(str(path), unknown[0], f"unknown column role; allowed: {', '.join(_UNITS)}")
+    heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
+    chosen = {role: _asked(str(path), role, value, table.names, heads) for role, value in given.items()}
+    taken = {place for place, _ in chosen.values() if place is not None}
+    notes = list(table.notes)
+    found: dict[str, list[_Role]] = {}
+    for i, (name, (head, own)) in enumerate(zip(table.names, heads, strict=True)):
+        asked = next((role for role, (place, _) in chosen.items() if place == i), None)
+        role = asked or (None if i in taken else _guess(head, own))
+        if role is None or (asked is None and chosen.get(role, (None, None))[0] is not None):
+            continue
+        stated = chosen.get(role, (None, None))[1] or own
+        if stated is None:
+            stated = _UNITS[role][0]
+            if role not in ("friction", "direction"):
+                notes.append(f"{role}: column {name!r} has no unit; read as {stated}")
+        factor, dimension = unit(stated)
+        if dimension not in [unit(one)[1] for one in _UNITS[role]]:
+            wanted = " or ".join(_UNITS[role])
+            raise _fault(str(path), role, f"column {name!r} is in {stated}; expected a unit such as {wanted}")
+        if dimension == unit("kg")[1]:
+            factor *= WEIGHT
+            notes.append(f"load: kg press with {WEIGHT} N each")
+        found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, _side(head)))
+    for role, several in found.items():
+        if len(several) > 1 and not (role in ("force", "torque", "friction") and all(one.side for one in several)):
+            alike = [name for name, head in zip(table.names, heads, strict=True) if _guess(*head) == role]
+            message = f"several columns could be it: {listed(map(repr, alike))}; say which with {role}=NAME"
+            raise _fault(str(path), role, message)
+    return found, notes
+
+
+def _head(name: str, apart: str | None) -> tuple[str, str | None]:
+    """Name of a column without its unit, and its unit."""
+    head, own = split_name(name)
+    if own is None:
+        match = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name) or re.fullmatch(
+            r"(.+)[_ ,]([^_ ,]+)", name.strip()
+        )
+        spelled = match and (_SPELLED.get(match[2].strip().lower()) or known_unit(match[2]))
+        if match and spelled:
+            head, own = match[1].strip(), spelled
+    found = own or apart
+    return head.strip(), found and _SPELLED.get(found.lower(), found)
+
+
+def _asked(
+    source: str, role: str, value: Any, names: Sequence[str], heads: Sequence[tuple[str, str | None]]
+) -> tuple[int | None, str | None]:
+    """Column and unit of an option: either, or a pair of both."""
+    stated = None
+    if isinstance(value, (tuple, list)) and len(value) == 2:
+        value, stated = value
+    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= len(names):
+        return value - 1, stated
+    text = str(value)
+    for known in (list(names), [head for head, _ in heads]):
+        if known.count(text) == 1:
+            return known.index(text), stated
+    try:
+        spelled = _SPELLED.get(text.strip().lower()) or known_unit(text)
+        if spelled and unit(spelled)[1] in [unit(one)[1] for one in _UNITS[role]]:
+            return None, spelled
+    except QuantityError:
+        pass
+    raise _fault(source, role, f"got {value!r}; allowed: a column ({listed(map(repr, names))}) or a unit")
+
+
+def _guess(head: str, own: str | None) -> str | None:
+    """Role of a column by its name and unit; None if none is."""
+    words = {word for word in re.split(r"[^a-zµμφωäöüß]+", head.lower()) if word}
+    joined = re.sub(r"[^a-zµμφωäöüß]", "", head.lower())
+    fits = list(_UNITS)
+    if own is not None and own != "1":
+        dimension = unit(own)[1]
+        fits = [role for role, allowed in _UNITS.items() if dimension in [unit(one)[1] for one in allowed]]
+        fits = [role for role in fits if role not in ("friction", "direction")]
+    named = [
+        role
+        for role, pattern in _WORDS.items()
+        if role in fits and (re.fullmatch(pattern, joined) or any(re.fullmatch(pattern, word) for word in words))
+    ]
+    if named:
+        return named[0]
+    if own is not None and own != "1" and fits:
+        return "force" if "force" in fits else fits[0]
+    if _side(head):
+        return "force"
+    return None
+
+
+def _side(head: str) -> int:
+    """1 for a name that says forward, -1 backward, 0 neither."""
+    words = [word for word in re.split(r"[\s_()\[\],.]+", head.lower()) if word]
+    words += [head[-1]] if head and head[-1] in "+-−–" else []
+    forward, backward = (any(re.fullmatch(side, word) for word in words) for side in (_FORWARD, _BACKWARD))
+    return int(forward) - int(backward)
+
+
+def _stacked(speed: Array, one: _Role, direction: list[_Role] | None) -> tuple[Array, Array]:
+    """Signed speed and friction of one column of friction."""
+    if direction is not None:
+        return np.abs(speed) * np.where(direction[0].values > 0, 1.0, -1.0), one.values
+    return (np.abs(speed) * one.side if one.side else speed), one.values
+
+
+def _unsigned(source: str, speed: Array, friction: Array, kind: str) -> Array:
+    """Friction without signs, which may be those of the speeds, of the pull, or none."""
+    for side in (1.0, -1.0):
+        own = friction[np.sign(speed) == side]
+        if np.any(own == 0) or (len(own) and np.any(np.sign(own) != np.sign(own[0]))):
+            way = "forward" if side > 0 else "backward"
+            raise _fault(source, kind, f"got {own.min():g} to {own.max():g} (SI) at {way} speeds; allowed: friction of "
+                         "one sign in each direction, none of it zero")  # fmt: skip
+    return np.asarray(np.abs(friction))

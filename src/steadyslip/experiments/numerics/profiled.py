@@ -1,0 +1,189 @@
+"""Bounded least squares of a few parameters, with intervals from the profile of the sum of squares.
+
+Friction curves of a handful of speeds are far from linear in some parameters, and straight-line errors would cover
+too little there: an interval holds the values at which the best sum of squares is not larger than chance makes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+
+Residuals = Callable[[Array], tuple[Array, Array]]
+"""Function of the parameters (p,) that gives residuals (n,) and their Jacobian (n, p)."""
+
+TOLERANCE = 1e-10  # relative, of a search's sum of squares and step: far below noise
+MOST_EVALUATIONS = 200  # of one search; dozens suffice
+FIRST_DAMPING, EASED, MOST_DAMPING = 1e-4, 10.0, 1e10  # of the descent, relative to the squared slopes
+MOST_STEPS = 40  # outward steps of an end of an interval, each half as long again: over all bounds
+PRECISION = 1e-3  # of the ends of intervals, as a share of their width: three digits of an error are enough
+BETTER = 1e-6  # relative fall of the sum of squares that counts as another minimum
+EXACT = 1e-20  # mean square residual below which there is no noise to estimate, only rounding
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Least squares within bounds.
+
+    Attributes
+    ----------
+    at : ndarray (p,)
+    ssq : float
+    low, high : ndarray (p,)
+        Bounds.
+    """
+
+    residuals: Residuals
+    at: Array
+    ssq: float
+    low: Array
+    high: Array
+
+    @property
+    def freedom(self) -> int:
+        """Residuals less parameters."""
+        return len(self.residuals(self.at)[0]) - len(self.at)
+
+    @property
+    def variance(self) -> float:
+        """Mean square of the noise, estimated from the residuals."""
+        return self.ssq / self.freedom
+
+    def covariance(self) -> Array:
+        """Covariance of the parameters (p, p) near the minimum, as if residuals were linear; inf where singular."""
+        jacobian = self.residuals(self.at)[1]
+        size = np.linalg.norm(jacobian, axis=0)
+        if not np.all(size > 0):
+            return np.full((len(self.at),) * 2, np.inf)
+        scaled = jacobian / size
+        values, vectors = np.linalg.eigh(scaled.T @ scaled)
+        if values[0] <= len(values) * np.finfo(float).eps * values[-1]:
+            return np.full((len(self.at),) * 2, np.inf)
+        return np.asarray((vectors / values) @ vectors.T * self.variance / np.outer(size, size))
+
+
+def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) -> Minimum:
+    """Least sum of squares within bounds, the best of searches from several starts."""
+    from scipy.optimize import least_squares
+
+    every = np.ones(len(low), dtype=bool)
+    start, _ = min((_descended(residuals, one, low, high, every) for one in starts), key=lambda one: one[1])
+    found = least_squares(
+        lambda at: residuals(at)[0], np.clip(start, low, high), lambda at: residuals(at)[1], bounds=(low, high),
+        x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE, max_nfev=MOST_EVALUATIONS,
+    )  # fmt: skip
+    return Minimum(residuals, found.x, float(2 * found.cost), low, high)
+
+
+def _descended(residuals: Residuals, start: Array, low: Array, high: Array, free: Array) -> tuple[Array, float]:
+    """Parameters and sum of squares after Levenberg's descent in the free ones, quick from a start that is near."""
+    at = np.where(free, np.clip(start, low, high), start)
+    own, jacobian = residuals(at)
+    ssq, damping = float(own @ own), FIRST_DAMPING
+    for _ in range(MOST_EVALUATIONS):
+        slope = jacobian.T @ own
+        moving = free & ~((at <= low) & (slope > 0)) & ~((at >= high) & (slope < 0))
+        if not np.any(moving):
+            break
+        part = jacobian[:, moving]
+        normal = part.T @ part
+        size = np.diag(normal) + np.finfo(float).tiny
+        step = np.zeros(len(at))
+        step[moving] = np.linalg.lstsq(normal + damping * np.diag(size), -slope[moving], rcond=None)[0]
+        trial = np.where(moving, np.clip(at + step, low, high), at)
+        new, new_jacobian = residuals(trial)
+        reached = float(new @ new)
+        if reached < ssq:
+            done = ssq - reached < TOLERANCE * ssq
+            at, own, jacobian, ssq, damping = trial, new, new_jacobian, reached, damping / EASED
+            if done:
+                break
+        elif damping > MOST_DAMPING:
+            break
+        else:
+            damping *= EASED
+    return at, ssq
+
+
+class _Improved(Exception):
+    """A search for an end of an interval found a smaller sum of squares than the minimum."""
+
+    def __init__(self, at: Array) -> None:
+        super().__init__()
+        self.at = at
+
+
+def intervals(minimum: Minimum, levels: tuple[float, ...]) -> tuple[Minimum, Array]:
+    """Intervals of every parameter from its profile and Student's t, the noise estimated.
+
+    Parameters
+    ----------
+    minimum : Minimum
+    levels : tuple of float
+        Probabilities, such as 0.6827 and 0.95.
+
+    Returns
+    -------
+    minimum : Minimum
+        That given, or a better one that was found on the way.
+    ends : ndarray (p, levels, 2)
+        Infinite where a bound is reached before the sum of squares tells against the value.
+    """
+    from scipy.special import stdtrit
+
+    for _ in range(len(minimum.at) + 1):
+        limits = [float(stdtrit(minimum.freedom, 0.5 + level / 2)) for level in levels]
+        try:
+            ends = [_ends(minimum, i, limits) for i in range(len(minimum.at))]
+            return minimum, np.array(ends)
+        except _Improved as better:
+            minimum = least(minimum.residuals, [better.at], minimum.low, minimum.high)
+    return minimum, np.full((len(minimum.at), len(levels), 2), (-np.inf, np.inf))
+
+
+def _ends(minimum: Minimum, i: int, limits: list[float]) -> Array:
+    """Ends of the intervals of one parameter (levels, 2) at limits of t."""
+    error = float(np.sqrt(minimum.covariance()[i, i]))
+    own = float(minimum.at[i])
+    if minimum.variance < EXACT and np.isfinite(error):
+        return np.array([[own - t * error, own + t * error] for t in limits])
+    width = float(minimum.high[i] - minimum.low[i])
+    step = error if 0 < error < width else 0.01 * width
+    return np.array([[_end(minimum, i, t, side * step) for side in (-1.0, 1.0)] for t in limits])
+
+
+def _end(minimum: Minimum, i: int, limit: float, step: float) -> float:
+    """Value beyond which the sum of squares exceeds its least by t² times the variance; infinite without one."""
+    from scipy.optimize import brentq
+
+    own, bound = float(minimum.at[i]), float(minimum.low[i] if step < 0 else minimum.high[i])
+    last, free = minimum.at, np.arange(len(minimum.at)) != i
+
+    def excess(value: float) -> float:
+        nonlocal last
+        start = last.copy()
+        start[i] = value
+        at, ssq = _descended(minimum.residuals, start, minimum.low, minimum.high, free)
+        if ssq < minimum.ssq * (1 - BETTER):
+            raise _Improved(at)
+        last = at
+        return float(np.sqrt(max(ssq - minimum.ssq, 0.0) / minimum.variance)) - limit
+
+    inner, size = own, limit * step
+    for _ in range(MOST_STEPS):
+        outer = own + size
+        beyond = outer <= bound if step < 0 else outer >= bound
+        outer = bound if beyond else outer
+        if excess(outer) >= 0:
+            if inner == own:
+                last = minimum.at
+            found = brentq(lambda x: excess(x) if x != own else -limit, inner, outer, xtol=PRECISION * abs(size))
+            return float(found)
+        if beyond:
+            break
+        inner, size = outer, 1.5 * size
+    return float(np.copysign(np.inf, step))

@@ -1,0 +1,261 @@
+"""Friction laws from tables of speeds: reading, intervals that cover, and the rig files made of them."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import steadyslip as ss
+from command import run as command
+from steadyslip.core.quantities import parse
+from steadyslip.experiments.fitting.presliding import fit_loop, loop_forces
+from steadyslip.experiments.measured.speeds import Loop, read_speed_table
+from steadyslip.files.specifications.unknowns import read_unknowns
+from steadyslip.verdict import stable_within
+
+MM_MIN = 1e-3 / 60
+SPEEDS = np.array([0.1, 0.5, 2, 5, 10, 20, 60, 200]) * MM_MIN
+AXIS = {"mu_coulomb": 0.11, "mu_static": 0.19, "v_stribeck": 8 * MM_MIN, "viscous": 12.5, "stribeck_exponent": 0.8}
+LOAD = 3200.0
+
+
+def curve(v, mu_coulomb, mu_static, v_stribeck, viscous, stribeck_exponent):
+    return mu_coulomb + (mu_static - mu_coulomb) * np.exp(-((v / v_stribeck) ** stribeck_exponent)) + viscous * v
+
+
+def fitted(force, speed=SPEEDS, **options):
+    return ss.experiments.fit_friction_table({"speed": speed, "force": force, "load": LOAD}, **options)
+
+
+def covered(count, seed, errors="relative"):
+    """How many of `count` tables have the truth in the 68 and in the 95 % interval, by parameter."""
+    rng, exact = np.random.default_rng(seed), LOAD * curve(SPEEDS, **AXIS)
+    hits = dict.fromkeys(AXIS, np.zeros(2, dtype=int))
+    for _ in range(count):
+        noise = 0.01 * rng.standard_normal(len(SPEEDS)) * (exact if errors == "relative" else exact.mean())
+        found = fitted(exact + noise, errors=errors)
+        for name, true in AXIS.items():
+            one = found[name]
+            hits[name] = hits[name] + [one.likely[0] <= true <= one.likely[1], one.low <= true <= one.high]
+    return hits
+
+
+def within_bounds(hits, count):
+    """True if numbers of hits are likely at the stated probabilities; of 10 numbers one in a hundred sets fails."""
+    return all(
+        binom.ppf(0.0005, count, p) <= hit <= binom.ppf(0.9995, count, p)
+        for both in hits.values()
+        for hit, p in zip(both, (0.6827, 0.95), strict=True)
+    )
+
+
+@pytest.mark.parametrize("errors", ["relative", "absolute"])
+def test_intervals_cover(errors):
+    assert within_bounds(hits := covered(30, 5, errors), 30), hits
+
+
+@pytest.mark.campaign
+def test_intervals_of_a_thousand_tables_cover():
+    assert within_bounds(hits := covered(1000, 1), 1000), hits
+
+
+def test_a_table_without_noise_gives_its_parameters():
+    found = fitted(LOAD * curve(SPEEDS, **AXIS))
+    for name, true in AXIS.items():
+        assert found[name].value == pytest.approx(true, rel=1e-4)
+
+
+def test_critical_stiffness_of_a_table_is_that_of_its_slope(tmp_path):
+    """Massless, without bristle damping, in the limit of no viscosity: k_cr = N σ0 Δ/g, Δ = -dμ/d ln v.
+
+    At none at all nothing opposes velocity, and any mass makes it unstable.
+    """
+    found = fitted(LOAD * curve(SPEEDS, **{**AXIS, "viscous": 0.0}), hold={"viscous": 0.0})
+    path = tmp_path / "guide.toml"
+    path.write_text(found.rig_text(), encoding="utf-8")
+    rig = ss.read_rig(path, ["mass=0 kg", "drive.velocity=3 mm/min", "friction.viscous=1e-9 s/m"])
+    v, law = 3 * MM_MIN, rig.friction
+    power = (v / law.v_stribeck) ** law.stribeck_exponent
+    falling = (law.mu_static - law.mu_coulomb) * np.exp(-power)
+    g, slope = law.mu_coulomb + falling, falling * power * law.stribeck_exponent
+    expected = LOAD * law.bristle_stiffness * slope / g
+    assert ss.critical_stiffness(rig) == pytest.approx(expected, rel=1e-10)
+
+
+TEXTS = {
+    "german": (
+        "v [mm/min];Reibkraft (N);Last [kN]\n0,1;602,1;3,2\n0,5;590;3,2\n10;470,5;3,2\n",
+        0.1 / 60e3,
+        602.1,
+        3200,
+    ),
+    "plain": ("speed,force,load\n0.001,60,300\n0.002,50,300\n0.01,40,300\n", 0.001, 60.0, 300),
+    "joint": ("velocity_rad/s\ttorque_Nm\n0.1\t5\n0.2\t4\n1\t3.5\n", 0.1, 5.0, None),
+    "rpm": ("n [1/min],M [Nm]\n3,5\n2,4\n30,3\n", 0.1 * np.pi, 5.0, None),
+    "words": ("speed [m/min],F [N],direction\n6,7,backward\n2,6,forward\n1,7.5,forward\n", -0.1, 7.0, None),
+    "signs": ("speed [m/min],F [N],direction\n6,-7,-\n2,6,+\n1,7.5,+\n", -0.1, 7.0, None),
+    "mass": ("speed [mm/s],mu,load [kg]\n1,.2,100\n2,.18,100\n3,.17,100\n", 0.001, 0.2, 980.665),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_tables_are_read_as_printed(name, tmp_path):
+    text, speed, friction, load = TEXTS[name]
+    path = tmp_path / "table.csv"
+    path.write_text(text, encoding="utf-8")
+    found = read_speed_table(path)
+    assert found.speed[0] == pytest.approx(speed, rel=1e-12)
+    assert found.friction[0] == pytest.approx(friction)
+    assert load is None if found.load is None else found.load[0] == pytest.approx(load)
+
+
+def test_two_columns_of_friction_are_two_directions(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("v [mm/s], forward [N], backward [N]\n1,50,55\n2,40,44\n5,33,36\n", encoding="utf-8")
+    found = read_speed_table(path)
+    assert found.speed.tolist() == [0.001, 0.002, 0.005, -0.001, -0.002, -0.005]
+    assert found.friction.tolist() == [50, 40, 33, 55, 44, 36]
+
+
+BAD = {
+    "speed [rpm],force [N]\n1,5\n2,4\n3,3\n": "got speeds in rpm and a force",
+    "a,b\n1,5\n2,4\n3,3\n": "has no column for it",
+    "speed [mm/s],force [N]\n1,5\n2,-4\n3,3\n": "of one sign in each direction",
+    "speed [mm/s],force [N],load [N]\n1,5,0\n2,4,1\n3,3,1\n": "loads above 0",
+    "speed [mm/s],F1 [N],F2 [N]\n1,5,0\n2,4,1\n3,3,1\n": "several columns could be it",
+    "speed [mm/s],force [N]\n1,5\n2,4\n": "of sliding; a table of speeds has 3 at least",
+    "speed [mm/s],force [N]\n1,5\n2,4\n3,4\n": "needs 3 speeds in 4 rows at least",
+    "speed [N],force [N]\n1,5\n2,4\n3,4\n": "several columns could be it",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_table_is_one_sentence(text, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(text, encoding="utf-8")
+    said = command("fit", path, "--law", "lugre")
+    assert said.returncode == 2
+    assert BAD[text] in said.stderr
+    assert len(said.stderr.strip().splitlines()) == 1
+
+
+def test_five_points_are_enough():
+    few = np.array([0.1, 2, 10, 40, 200]) * MM_MIN
+    found = fitted(LOAD * curve(few, **{**AXIS, "stribeck_exponent": 2.0}), speed=few)
+    assert found["mu_static"].value == pytest.approx(0.19, rel=1e-3)
+    assert "stribeck_exponent is held at 2" in str(found)
+
+
+def test_speeds_above_the_stribeck_velocity_leave_it_undetermined():
+    fast = np.array([60, 80, 100, 120, 150, 200, 250, 300]) * MM_MIN
+    force = LOAD * curve(fast, **AXIS) * (1 + 0.01 * np.random.default_rng(2).standard_normal(8))
+    assert "not determined" in str(fitted(force, speed=fast))
+
+
+def test_load_that_is_not_in_the_table_and_drag_beside_it():
+    """F = (N + 400 N) g(v) + 3e4 N s/m v at three loads; the rig has both."""
+    load = np.repeat([1000.0, 2000.0, 4000.0], len(SPEEDS))
+    speed = np.tile(SPEEDS, 3)
+    force = (load + 400.0) * curve(speed, **{**AXIS, "viscous": 0.0}) + 3e4 * speed
+    noise = 1 + 1e-4 * np.random.default_rng(1).standard_normal(len(force))
+    found = ss.experiments.fit_friction_table({"speed": speed, "force": force * noise, "load": load})
+    assert found["internal_preload"].low < 400.0 < found["internal_preload"].high
+    assert found["damping"].low < 3e4 < found["damping"].high
+    assert found["damping"].value == pytest.approx(3e4, rel=0.1)
+    assert found["viscous"].value < 2.0
+    rig = ss.rig_from_text(found.rig_text())
+    assert rig.contact.preload == pytest.approx(2400.0, rel=0.01)
+    assert rig.radiation_damping == pytest.approx(found["damping"].value, rel=1e-5)
+
+
+def test_directions_are_fitted_apart():
+    speed = np.concatenate([SPEEDS, -SPEEDS])
+    force = LOAD * curve(np.abs(speed), **AXIS) * np.where(speed > 0, 1.0, 1.1)
+    found = fitted(force, speed=speed)
+    assert found.backward["mu_static"].value == pytest.approx(1.1 * found.forward["mu_static"].value, rel=1e-3)
+    assert "# mu_static = 0.209" in found.rig_text()
+
+
+@pytest.mark.parametrize("law", ["lugre", "coulomb-stribeck", "rate-state"])
+@pytest.mark.parametrize("turns", [False, True])
+def test_rig_files_are_read_and_analysed(law, turns, tmp_path):
+    speed, force = (SPEEDS * 1e4, LOAD * curve(SPEEDS, **AXIS)) if turns else (SPEEDS, LOAD * curve(SPEEDS, **AXIS))
+    found = ss.experiments.fit_friction_table({"speed": speed, ("torque" if turns else "force"): force}, law)
+    path = tmp_path / "guide.toml"
+    path.write_text(found.rig_text(), encoding="utf-8")
+    said = command("analyze", path)
+    assert said.returncode == 0, said.stderr
+    rig, unknown = read_unknowns(path)
+    assert bool(unknown) == (law != "coulomb-stribeck")
+    assert ("Not known" in said.stdout) == bool(unknown)
+    assert rig.parameters()
+    assert "CHANGE" in path.read_text(encoding="utf-8")
+
+
+def test_unknown_values_are_told_by_their_edge(tmp_path):
+    path = tmp_path / "guide.toml"
+    path.write_text(fitted(LOAD * curve(SPEEDS, **AXIS)).rig_text(), encoding="utf-8")
+    rig, unknown = read_unknowns(path, ["drive.velocity=3 mm/min", "stiffness=2 N/um"])
+    found = stable_within(rig, unknown)
+    (one,) = [value for value in found.each if value.parameter == "friction.bristle_stiffness"]
+    ((low, edge),) = one.values
+    assert low == one.low < edge < one.high
+    assert any(edge == pytest.approx(other.value, rel=1e-8) for other in ss.boundary(rig, one.parameter))
+    assert "stable below" in str(found)
+    assert not found.everywhere
+    _, known = read_unknowns(path, ["bristle_stiffness=100 N/um at 3.2 kN"])
+    assert set(known) == {"friction.bristle_damping"}
+
+
+def test_a_bad_interval_names_its_line(tmp_path):
+    path = tmp_path / "guide.toml"
+    text = fitted(LOAD * curve(SPEEDS, **AXIS)).rig_text()
+    path.write_text(text.replace('friction.bristle_damping = ["0', 'friction.bristle_damp = ["0'), encoding="utf-8")
+    with pytest.raises(ss.RigFileError, match=r"line .*unknown.friction.bristle_damp"):
+        read_unknowns(path)
+
+
+def loop(stiffness=4e8, noise=4.0):
+    there = np.concatenate([np.linspace(0, 1.5, 12), np.linspace(1.5, -1.5, 20)[1:], np.linspace(-1.5, 1.5, 20)[1:]])
+    force, _ = loop_forces(there * 1e-6, stiffness, 608.0, 0.0)
+    return there * 1e-6, force + noise * np.random.default_rng(0).standard_normal(len(force))
+
+
+def test_a_loop_tells_the_bristles(tmp_path):
+    x, f = loop()
+    found = fit_loop(Loop("loop", x, f, turns=False))
+    assert abs(found.value - 4e8) < 4 * found.error
+    assert found.error < 0.01 * found.value
+    path, table, rig = tmp_path / "loop.csv", tmp_path / "table.csv", tmp_path / "guide.toml"
+    path.write_text("x [um],F [N]\n" + "".join(f"{a * 1e6},{b}\n" for a, b in zip(x, f, strict=True)), encoding="utf-8")
+    rows = zip(SPEEDS, LOAD * curve(SPEEDS, **AXIS), strict=True)
+    table.write_text("v [m/s],F [N],load [N]\n" + "".join(f"{v},{f},{LOAD}\n" for v, f in rows), encoding="utf-8")
+    said = command("fit", path, table, "--law", "lugre", "-o", rig)
+    assert said.returncode == 0, said.stderr
+    assert "from the loop" in said.stdout
+    assert ss.read_rig(rig).friction.bristle_stiffness * LOAD == pytest.approx(found.value, rel=1e-5)
+
+
+def test_loop_forces_obey_their_equation():
+    """Bristles by many small steps, and derivatives by differences."""
+    x = np.array([0.0, 1e-6, -0.5e-6, 2e-6])
+    force, slopes = loop_forces(x, 4e8, 600.0, 20.0)
+    fine = np.concatenate([np.linspace(a, b, 20001)[:-1] for a, b in pairwise(x)] + [x[-1:]])
+    now = 20.0
+    for step in np.diff(fine):
+        middle = now + 0.5 * 4e8 * (1 - now * np.sign(step) / 600.0) * step
+        now += 4e8 * (1 - middle * np.sign(step) / 600.0) * step
+    assert force[-1] == pytest.approx(now, rel=1e-7)
+    up, _ = loop_forces(x, 4e8 * np.exp(1e-6), 600.0, 20.0)
+    assert (up - force)[1:] / 1e-6 == pytest.approx(slopes[1:, 0], rel=1e-4)
+
+
+def test_bristles_per_load():
+    assert parse("400 N/µm at 3.2 kN", "1/m") == pytest.approx(125000.0, rel=1e-14)
+    assert parse("4 N s/mm at 3.2 kN", "s/m") == pytest.approx(1.25)
+    assert parse("352 N at 3.2 kN", "1") == 0.11
+    with pytest.raises(ss.QuantityError, match="name the load that it is of"):
+        parse("400 N/um", "1/m")
+    with pytest.raises(ss.QuantityError):
+        parse("400 N/um at 0 N", "1/m")

@@ -31,7 +31,6 @@ from .core.errors import (
     UnknownNameError as UnknownNameError,
 )
 from .experiments import (
-    compare as compare,
     compare_laws as compare_laws,
     fit as fit,
     fit_files as fit_files,
@@ -123,6 +122,7 @@ from .schemas import (
 )
 from .verdict import (
     analyze as analyze,
+    cure as cure,
     tolerate as tolerate,
 )
 

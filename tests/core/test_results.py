@@ -86,7 +86,7 @@ def results(tmp_path_factory):
         fit.plan.records[0], fit, fit["friction.a"], ss.experiments.bootstrap(fit, 16, progress=False),
         ss.experiments.profile(fit, "friction.a", count=5), ss.predict(near, fit),
         ss.experiments.precision(lab.rig(), lab.STEP, until=80.0),
-        ss.compare({"one": fit, "two": fit}), ss.sensitivity(near, over, points=64, progress=False),
+        ss.experiments.compare({"one": fit, "two": fit}), ss.sensitivity(near, over, points=64, progress=False),
         _map(folder), ss.Map(near, {"stiffness": [1e9, 2e9]}), ss.build_model(near),
     ]  # fmt: skip
     for one in found:

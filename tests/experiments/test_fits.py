@@ -302,7 +302,7 @@ def test_criteria_prefer_the_law_that_made_the_record():
     assert str(found).splitlines()[1].startswith("aging")
     other = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, 3))
     with pytest.raises(ss.ParameterError, match="other records"):
-        ss.compare({"one": found.fits["slip"], "two": other})
+        ss.experiments.compare({"one": found.fits["slip"], "two": other})
     with pytest.raises(ss.ParameterError, match="two states"):
         ss.compare_laws(ss.lab_rig(), record, ("slips",))
 

@@ -195,7 +195,7 @@ def test_bic_decides():
             criteria=lambda noise: (aic, bic),
         )  # fmt: skip
 
-    found = ss.compare({"rich": fit(2, 0.0, 4.0), "poor": fit(1, 1.0, 0.0)})
+    found = ss.experiments.compare({"rich": fit(2, 0.0, 4.0), "poor": fit(1, 1.0, 0.0)})
     assert found.best == "poor"
     assert found.weights == pytest.approx({"poor": 1 / (1 + np.exp(-2)), "rich": 1 - 1 / (1 + np.exp(-2))})
     assert found.verdict.startswith("The records hardly tell 'poor' from 'rich', which has a sum of squares -11.11%")

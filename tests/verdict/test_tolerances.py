@@ -16,6 +16,7 @@ from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.specifications.tolerances import rig_and_tolerances
 from steadyslip.verdict import Tolerances
 from steadyslip.verdict.spreads import GROUPS, spreads_of
+from toleranced import AXIS
 
 OWN = rig(friction=rate_state(), stiffness=9e9)
 EDGE = float(ss.critical_stiffness(OWN))
@@ -137,28 +138,6 @@ def test_the_safety_of_a_machine_is_that_of_the_parameter_that_is_named():
         ss.safety_factor(machine)
     with pytest.raises(ss.NotAvailable, match="linearly"):
         ss.tolerate(machine, {"drive.kp": "5 %"}, along="contacts.guide.friction.mu_ref")
-
-
-AXIS = """
-[friction]
-law = "lugre"
-mu_coulomb = "0.11 ± 20 %"
-mu_static = "0.19 +- 20 %"
-v_stribeck = "8 +/- 20 % mm/min"
-stribeck_exponent = 0.8
-viscous = "1.25 s/m"
-bristle_stiffness = "125000 ± 20 % 1/m"
-[contact]
-law = "constant"
-preload = "2.56..3.84 kN"
-[slider]
-area = "200 cm^2"
-stiffness = "12 ± 20 % N/um"
-mass = "240 kg"
-damping = "5 N s/mm"
-[drive]
-velocity = "0.5 mm/min"
-"""
 
 
 @pytest.fixture

@@ -142,6 +142,25 @@ def _predicted(
 
 
 @app.command()
+def cure(
+    rig: RigFile,
+    changes: Changes = None,
+    sure: Annotated[str, typer.Option(help="chance of stable sliding that is asked for")] = "95 %",
+    output: Annotated[list[Path] | None, outputs("write .html")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """What to change so that it slides stably with a chance, what that costs, and what would make it fail first."""
+    from steadyslip.files.output import check_output
+    from steadyslip.files.specifications.tolerances import rig_and_tolerances
+    from steadyslip.files.standalone import write_page
+    from steadyslip.verdict import cure as run
+
+    check_output(output or (), (".html",))
+    found = run(*rig_and_tolerances(rig, changes or ()), sure=sure)
+    output_result(found, output or (), as_json, partial(write_page, kind="Cures"))
+
+
+@app.command()
 def fit(
     files: Annotated[
         list[Path], typer.Argument(metavar="RECORD... [SPEC.toml]", help="records of experiments, and how to fit them")

@@ -5,6 +5,7 @@ Knows no maps, figures or documents.
 
 from steadyslip.files.specifications.tolerances import Adjustment, Tolerances, read_tolerances
 from steadyslip.verdict.analyze import Analysis, analyze
+from steadyslip.verdict.cures import Cures, Window, cure
 from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
 from steadyslip.verdict.unknown import StableValues, StableWithin, stable_within
@@ -12,12 +13,15 @@ from steadyslip.verdict.unknown import StableValues, StableWithin, stable_within
 __all__ = [
     "Adjustment",
     "Analysis",
+    "Cures",
     "MachineAnalysis",
     "StableValues",
     "StableWithin",
     "Tolerances",
     "Tolerated",
+    "Window",
     "analyze",
+    "cure",
     "read_tolerances",
     "stable_within",
     "tolerate",

@@ -1,0 +1,456 @@
+"""`cure`: what to change about a rig so that it is stable with a chance that is asked for, and what it costs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.core.options import Tested, checked
+from steadyslip.core.pages import Displayed
+from steadyslip.core.results import ReadOnly
+from steadyslip.files.specifications.tolerances import Adjustment, Tolerances
+from steadyslip.linear.boundary import boundary, margins
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.verdict.chances import Chances, chances_of
+from steadyslip.verdict.export import finite
+from steadyslip.verdict.tolerances import GIVEN, format_chance
+
+DECADES = 3.0  # searched to each side of a value without limits
+SCANNED, COARSE = 97, 17  # values along one parameter, and of each of a pair: by trial, time against windows missed
+FROM_ZERO = 145  # values of a parameter that is zero, over the twelve decades that `boundary` searches
+BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is looked at too
+HALVINGS, FEW_HALVINGS = 52, 12  # of a bracket: to the last digit of one rig, to 1e-5 of many
+NEAR = np.linspace(-0.02, 0.02, 5)  # relative places about an edge where the whole sample is judged
+PAIRS = 3  # cheapest pairs of the coarse search that are narrowed
+PRELOAD = "normal stress"  # kind of the parameters that press a contact, whatever a law calls them
+DESIGN = (
+    ("velocity",), ("stiffness", "axial_stiffness", "kp", "kv"), ("damping", "kd", "ki", "tn"), ("mass", "inertia"),
+    (PRELOAD,), ("viscous",),
+)  # fmt: skip
+"""What a designer chooses, in the order of asking: speed, stiffness, damping, mass, preload, lubricant."""
+SURE = Tested(
+    "a chance between 0 and 1, or text such as '95 %'",
+    lambda v: isinstance(v, str) or (isinstance(v, (int, float)) and not isinstance(v, bool) and 0 < v <= 1),
+)
+
+
+@dataclass(frozen=True)
+class Window(Displayed):
+    """Values of one parameter at which the chance is reached, the others unchanged.
+
+    Attributes
+    ----------
+    parameter, unit : str
+    value : float
+        The rig's own.
+    windows : tuple of (float, float)
+        Rising; an end that is one of `limits` is no edge.
+    limits : tuple of float
+        Range that was searched.
+    cost : float
+        Of the change to the nearest window; 0 inside one, infinite if there is none.
+    """
+
+    parameter: str
+    unit: str
+    value: float
+    windows: tuple[tuple[float, float], ...]
+    limits: tuple[float, float]
+    cost: float
+    area: float | None = field(default=None, repr=False)
+
+    @property
+    def nearest(self) -> float | None:
+        """End of a window nearest to the rig's own value; None inside a window or without one."""
+        if not self.windows or any(low <= self.value <= high for low, high in self.windows):
+            return None
+        return min((end for one in self.windows for end in one), key=lambda end: distance(self.value, end))
+
+    @property
+    def leaves(self) -> float | None:
+        """Nearest edge of the window around the rig's own value; None if it is in none, or if that has no edge."""
+        for ends in self.windows:
+            if ends[0] <= self.value <= ends[1]:
+                edges = [end for end in ends if end not in self.limits]
+                return min(edges, key=lambda end: distance(self.value, end), default=None)
+        return None
+
+    def __str__(self) -> str:
+        low, high = (self.written(end) for end in self.limits)
+        if not self.windows:
+            return f"not reached from {low} to {high}"
+        return "; ".join(self._window(*one) for one in self.windows)
+
+    def _window(self, low: float, high: float) -> str:
+        if low == self.limits[0]:
+            return (
+                f"at every value up to {self.written(high)}"
+                if high == self.limits[1]
+                else f"up to {self.written(high)}"
+            )
+        if high == self.limits[1]:
+            return f"from {self.written(low)} up"
+        return f"{self.written(low)} to {self.written(high)}"
+
+    def written(self, value: float) -> str:
+        """Format a value of the parameter."""
+        return format_quantity(value, self.unit, area=self.area)
+
+
+@dataclass(frozen=True, eq=False)
+class Cures(ReadOnly):
+    """Changes of a rig after which it is stable with a chance that is asked for.
+
+    Attributes
+    ----------
+    rig : Slider or Machine
+    sure : float
+        The chance that is asked for.
+    chance, error : float
+        Chance of the rig as it is, and half-width of its 95 % interval; 0 or 1 and 0 without tolerances.
+    windows : tuple of Window
+        Of every adjustable parameter, in the order of the file or of `DESIGN`.
+    pair : dict of str to float
+        Values of the two parameters whose change together costs least, SI units; empty if one alone costs no more, or
+        if no pair reaches it.
+    pair_cost : float
+        Infinite if `pair` is empty.
+    fails : tuple of Window
+        For a rig with enough chance as it is: of every parameter whose change would lose it, that first which needs the
+        smallest.
+    """
+
+    rig: Slider | Machine = field(repr=False)
+    sure: float
+    chance: float
+    error: float
+    windows: tuple[Window, ...]
+    pair: Mapping[str, float]
+    pair_cost: float
+    fails: tuple[Window, ...]
+
+    @property
+    def best(self) -> Window | None:
+        """The cheapest single change; None if none reaches the chance, or none is needed."""
+        found = [one for one in self.windows if one.nearest is not None]
+        return min(found, key=lambda one: one.cost, default=None)
+
+    def __str__(self) -> str:
+        wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails))
+        now = format_chance(self.chance, self.error) if self.error else "stable" if self.chance else "unstable"
+        wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
+        if self.chance >= self.sure:
+            lines = [f"Already {wanted} (now {now}). What would lose it first:"]
+            lines += [
+                f"{one.parameter:<{wide}}{_change(one, one.leaves)}" for one in self.fails if one.leaves is not None
+            ]
+            return "\n".join(lines if self.fails else [f"Already {wanted} (now {now}), whatever single value changes"])
+        lines = [f"To be {wanted} (now {now})"]
+        if (best := self.best) is not None:
+            lines.append(
+                f"cheapest single change: {best.parameter} {_change(best, best.nearest)}, cost {best.cost:.3g}"
+            )
+        else:
+            lines.append("no single change reaches it")
+        if self.pair:
+            of = {one.parameter: one for one in self.windows}
+            both = " and ".join(f"{name} {_change(of[name], value)}" for name, value in self.pair.items())
+            lines.append(f"cheapest pair: {both}, cost {self.pair_cost:.3g}")
+        else:
+            lines.append("no pair is cheaper" if best is not None else "nor does any pair of changes")
+        lines += [f"{one.parameter:<{wide}}{one.written(one.value)} now; {one}" for one in self.windows]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units, as ``--json`` prints it."""
+
+        def data(one: Window) -> dict[str, Any]:
+            return {
+                "parameter": one.parameter, "unit": one.unit, "value": one.value, "limits": list(one.limits),
+                "windows": [list(ends) for ends in one.windows], "cost": one.cost, "nearest": one.nearest,
+                "leaves": one.leaves,
+            }  # fmt: skip
+
+        found: dict[str, Any] = finite(
+            {
+                "sure": self.sure, "chance": self.chance, "error": self.error,
+                "best": None if self.best is None else self.best.parameter,
+                "pair": dict(self.pair), "pair_cost": self.pair_cost,
+                "windows": [data(one) for one in self.windows], "fails": [data(one) for one in self.fails],
+            }
+        )  # fmt: skip
+        return found
+
+
+def _change(one: Window, to: float | None) -> str:
+    if to is None:
+        return "unchanged"
+    return f"from {one.written(one.value)} to {one.written(to)}"
+
+
+def distance(value: float, other: float) -> float:
+    """Doublings from one value to another; 1 from or to zero, or through it."""
+    return abs(math.log2(other / value)) if value * other > 0 else float(value != other)
+
+
+@checked(tolerances=GIVEN, sure=SURE)
+def cure(
+    rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances | None = None, *, sure: float | str = 0.95,
+    adjust: Mapping[str, Any] | None = None,
+) -> Cures:  # fmt: skip
+    """Find what to change about a rig so that it is stable with a given chance.
+
+    Parameters
+    ----------
+    rig : Slider or Machine
+    tolerances : mapping of str to float or str, or Tolerances, optional
+        As for `tolerate`; without them the rig itself is to be stable.
+    sure : float or str
+        The chance, such as ``"95 %"``.
+    adjust : mapping of str to Adjustment, optional
+        What may be changed; by default that of `tolerances`, or else what a designer chooses: speed, stiffness,
+        damping, mass, preload and lubricant, within three decades to each side, each doubling at cost 1.
+
+    Returns
+    -------
+    Cures
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not allowed, or the rig has nothing that may be changed.
+    """
+    wanted = _share(sure)
+    chances = chances_of(rig, tolerances or {})
+    own = adjust or (tolerances.adjust if isinstance(tolerances, Tolerances) else {}) or default_adjust(rig)
+    given = {rig.resolve(name): one for name, one in own.items()}
+    if not given:
+        raise ParameterError([Problem("adjust", "the rig has nothing that a designer chooses; name what may change")])
+    chance, error = chances.whole({})
+    windows = tuple(_windows(chances, name, one, wanted) for name, one in given.items())
+    pair: dict[str, float] = {}
+    cost = math.inf
+    if chance < wanted:
+        least = min((one.cost for one in windows), default=math.inf)
+        pair, cost = _cheapest_pair(chances, windows, given, wanted, least)
+    fails = _fails(chances, windows, wanted) if chance >= wanted else ()
+    return Cures(rig, wanted, chance, error, windows, pair, cost, fails)
+
+
+def _share(sure: float | str) -> float:
+    from steadyslip.core.domains import share
+    from steadyslip.core.roles import Parameter
+
+    try:
+        found = Parameter("1", share, "chance").checked(sure)
+    except ParameterError as error:
+        raise ParameterError([one.under("sure") for one in error.problems]) from error
+    if not found > 0:
+        raise ParameterError([Problem("sure", "got 0; allowed: a chance above 0, such as '95 %'")])
+    return found
+
+
+def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:
+    """What a designer chooses about a rig, in the order of `DESIGN`."""
+    found = {}
+    for words in DESIGN:
+        for name, one in rig.parameters().items():
+            last = PRELOAD if one.role.kind == PRELOAD else name.rpartition(".")[2]
+            starts = one.value or (last in ("damping", "kd", "viscous") and one.value is not None)
+            if last in words and starts and not (one.value == 0 and one.role.adds_state):
+                found[name] = Adjustment()
+    return found
+
+
+def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]:
+    """Range of a parameter that is searched, within its domain; SI units."""
+    value, domain = chances.own(name), chances.rig.parameters()[name].role.domain
+    ends = sorted((value * 10.0**-DECADES, value * 10.0**DECADES))
+    if not value:
+        searched = next((m.searched for m in margins(chances.rig) if m.parameter == name), (0.0, 1.0))
+        ends = [0.0, searched[1]]
+    low = max(ends[0] if one.low is None else one.low, domain.low)
+    high = min(ends[1] if one.high is None else one.high, domain.high)
+    if domain.high == high and not domain.high_allowed:
+        high = math.nextafter(high, low)
+    if domain.low == low and not domain.low_allowed:
+        low = math.nextafter(low, high)
+    return low, high
+
+
+def _scan(chances: Chances, name: str, limits: tuple[float, float]) -> Array:
+    """Values of a parameter to try, rising: its own, evenly on a log scale between the limits, beside its edges."""
+    low, high = limits
+    own = chances.own(name)
+    if low * high > 0:
+        values = np.geomspace(low, high, SCANNED)
+        values[0], values[-1] = low, high
+    elif low == 0:
+        values = np.append(0.0, np.geomspace(high * 1e-12, high, FROM_ZERO))
+    else:
+        values = np.linspace(low, high, SCANNED)
+    try:
+        edges = np.array([edge.value for edge in boundary(chances.rig, name, between=limits)])
+    except (NotAvailable, ParameterError):
+        edges = np.array([])
+    beside = np.concatenate([[own], edges * (1 - BESIDE), edges * (1 + BESIDE)])
+    values = np.unique(np.concatenate([values, beside[(beside >= low) & (beside <= high)]]))
+    return np.asarray(values[chances.allowed(name, values)])
+
+
+def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Window:
+    """All windows of one parameter."""
+    low, high = _limits(chances, name, one)
+    values = _scan(chances, name, (low, high))
+    role, area = chances.rig.parameters()[name].role, chances.rig.area_of(name)
+    if not values.size:
+        return Window(name, role.unit, chances.own(name), (), (low, high), math.inf, area)
+
+    def reached(at: Array) -> Array:
+        return np.asarray(chances.few({name: at}) >= sure)
+
+    inside = reached(values)
+    at = np.flatnonzero(inside[1:] != inside[:-1])
+    edges = _narrowed(reached, values[at], values[at + 1], inside[at], HALVINGS if chances.single else FEW_HALVINGS)
+    edges = edges if chances.single else np.array([_settled(chances, name, edge, sure) for edge in edges])
+    ends = [values[0], *edges, values[-1]]
+    windows = tuple(
+        (float(first), float(last))
+        for i, (first, last) in enumerate(itertools.pairwise(ends))
+        if (bool(inside[0]) ^ bool(i % 2)) and first <= last
+    )
+    found = Window(name, role.unit, chances.own(name), windows, (float(values[0]), float(values[-1])), 0.0, area)
+    if not windows:
+        return replace(found, cost=math.inf)
+    return found if found.nearest is None else replace(found, cost=one.cost * distance(found.value, found.nearest))
+
+
+def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first: Array, halvings: int) -> Array:
+    """Values inside of edges between `low` and `high`, on the side that is reached; `first`: whether `low` is it."""
+    if not low.size:
+        return low
+    low, high = low.copy(), high.copy()
+    for _ in range(halvings):
+        both = low * high > 0
+        middle = np.where(both, np.sign(low) * np.sqrt(np.abs(low * high)), 0.5 * (low + high))
+        same = reached(middle) == first
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return np.where(first, low, high)
+
+
+def _settled(chances: Chances, name: str, edge: float, sure: float, others: Mapping[str, float] | None = None) -> float:
+    """The edge by the whole sample, from chances at places about it; the edge itself where they do not straddle it.
+
+    `others` are changed values of other parameters.
+    """
+    places = edge * (1 + NEAR)
+    places = places[chances.allowed(name, places)]
+    above = np.array([chances.whole({**(others or {}), name: place})[0] for place in places]) - sure
+    at = np.flatnonzero(np.sign(above[1:]) != np.sign(above[:-1]))
+    if not at.size:
+        return float(edge)
+    i = at[np.argmin(np.abs(places[at] - edge))]
+    return float(places[i] + (places[i + 1] - places[i]) * above[i] / (above[i] - above[i + 1]))
+
+
+def _fails(chances: Chances, windows: Sequence[Window], sure: float) -> tuple[Window, ...]:
+    """Windows of all parameters whose change would lose the chance, the smallest change first."""
+    known = {one.parameter: one for one in windows}
+    names = [
+        name
+        for name, one in chances.rig.parameters().items()
+        if one.value and not one.role.gauge and name not in chances.rig.not_in_model
+    ]
+    every = [known.get(name) or _windows(chances, name, Adjustment(), sure) for name in names]
+    lost = [(one, one.leaves) for one in every]
+    return tuple(
+        one for one, _ in sorted(
+            ((one, end) for one, end in lost if end is not None), key=lambda both: distance(both[0].value, both[1])
+        )
+    )  # fmt: skip
+
+
+def _cheapest_pair(
+    chances: Chances, windows: Sequence[Window], adjust: Mapping[str, Adjustment], sure: float, least: float
+) -> tuple[dict[str, float], float]:
+    """Values of the two parameters that reach the chance at the least cost, if that is below `least`; and the cost."""
+    found: list[tuple[float, str, str, float, float]] = []
+    for first, second in itertools.combinations(windows, 2):
+        found += _coarse(chances, first, second, adjust, sure, least)
+    best: dict[str, float] = {}
+    limits = {one.parameter: one.limits for one in windows}
+    for _, one, two, x, y in sorted(found)[:PAIRS]:
+        for values, cost in _refined(chances, (one, two), (x, y), limits[two], adjust, sure):
+            if cost < least:
+                best, least = values, cost
+    return best, least if best else math.inf
+
+
+def _cost(chances: Chances, adjust: Mapping[str, Adjustment], name: str, to: Array) -> Array:
+    far = [distance(chances.own(name), float(one)) for one in np.atleast_1d(to)]
+    return np.asarray(adjust[name].cost * np.array(far))
+
+
+def _coarse(
+    chances: Chances, first: Window, second: Window, adjust: Mapping[str, Adjustment], sure: float, least: float
+) -> Iterator[tuple[float, str, str, float, float]]:
+    """The cheapest pair on a coarse grid: cost, names, values."""
+    grids = []
+    for one in (first, second):
+        low, high = one.limits
+        values = np.geomspace(low, high, COARSE) if low * high > 0 else np.linspace(low, high, COARSE)
+        values = np.clip(values, low, high)
+        grids.append(values[chances.allowed(one.parameter, values)])
+    x, y = (part.ravel() for part in np.meshgrid(*grids, indexing="ij"))
+    cost = _cost(chances, adjust, first.parameter, x) + _cost(chances, adjust, second.parameter, y)
+    cheap = cost < least
+    if not np.any(cheap):
+        return
+    x, y, cost = x[cheap], y[cheap], cost[cheap]
+    good = chances.fewest({first.parameter: x, second.parameter: y}) >= sure
+    if np.any(good):
+        i = int(np.argmin(np.where(good, cost, math.inf)))
+        yield float(cost[i]), first.parameter, second.parameter, float(x[i]), float(y[i])
+
+
+def _refined(
+    chances: Chances,
+    names: tuple[str, str],
+    to: tuple[float, float],
+    limits: tuple[float, float],
+    adjust: Mapping[str, Adjustment],
+    sure: float,
+) -> Iterator[tuple[dict[str, float], float]]:
+    """Pairs on the edge between the rig and a pair that reaches the chance, with their costs."""
+    one, two = names
+    own, own_two = chances.own(one), chances.own(two)
+    values = np.geomspace(own, to[0], COARSE) if own * to[0] > 0 else np.linspace(own, to[0], COARSE)
+    values = values[chances.allowed(one, values)]
+    low = np.full(values.size, own_two)
+    step = math.sqrt(to[1] / own_two) if own_two * to[1] > 0 else 1.0  # beyond what few rigs said was enough
+    high = np.full(values.size, min(max(to[1] * step, limits[0]), limits[1]))
+
+    def reached(at: Array) -> Array:
+        return np.asarray(chances.few({one: values, two: at}) >= sure)
+
+    ends, starts = reached(high), reached(low)
+    edges = _narrowed(reached, low, high, np.zeros(values.size, dtype=bool), FEW_HALVINGS)
+    edges = np.where(starts, low, edges)
+    cost = _cost(chances, adjust, one, values) + _cost(chances, adjust, two, edges)
+    good = ends & (values != own) & (edges != own_two)
+    if not np.any(good):
+        return
+    i = int(np.argmin(np.where(good, cost, math.inf)))
+    x, y = float(values[i]), float(edges[i])
+    if not chances.single:
+        y = _settled(chances, two, y, sure, {one: x})
+    yield {one: x, two: y}, float(cost[i])

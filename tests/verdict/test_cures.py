@@ -1,0 +1,136 @@
+"""Cures: windows hold on their inner side and not on their outer one, by verdicts of their own."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from command import run
+from dimensionless import unit_rig
+from rigs_of_theory import CONTACTS, rate_state, rig
+from steadyslip.files.specifications.tolerances import rig_and_tolerances
+from steadyslip.verdict import Adjustment
+from toleranced import AXIS
+
+BESIDE = 1e-6  # relative distance from an edge at which both sides are judged
+
+
+@pytest.fixture
+def axis(tmp_path):
+    """Path of the file of a feed axis whose numbers are known to ± 20 %."""
+    path = tmp_path / "axis.toml"
+    path.write_text(AXIS)
+    return path
+
+
+def random_rig(seed):
+    """A slider with random numbers, of any contact and either of two laws."""
+    chance = np.random.default_rng(seed)
+    contact = CONTACTS[seed % len(CONTACTS)]
+    law = rate_state() if seed % 2 else rate_state(evolution=ss.laws.Aging())
+    found = rig(friction=law, contact=contact, mass=1e3, damping=1e5)
+    names = [n for n in ("friction.a", "friction.b", "slider.stiffness", "slider.mass", "slider.damping",
+                         "drive.velocity") if found.value(n)]  # fmt: skip
+    scatter = {"friction.a": 0.1, "friction.b": 0.1}
+    return found.with_values({n: found.value(n) * math.exp(scatter.get(n, 2) * chance.normal()) for n in names})
+
+
+def judge_windows(rig):
+    """Every end of every window of a rig without tolerances is judged on both sides by `analyze`."""
+    for one in ss.cure(rig).windows:
+        for window in one.windows:
+            for end, inner in zip(window, (1, -1), strict=True):
+                if end in one.limits or not end:
+                    continue
+                for side in (inner, -inner):
+                    value = end * (1 + side * BESIDE * math.copysign(1, end))
+                    word = ss.stability(rig.with_values({one.parameter: value}))
+                    assert (word == "stable") == (side == inner), (one, end, word)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_windows_of_random_rigs_hold_on_one_side_alone(seed):
+    judge_windows(random_rig(seed))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("first", range(0, 500, 25))
+def test_windows_of_500_random_rigs_hold_on_one_side_alone(first):
+    for seed in range(first, first + 25):
+        judge_windows(random_rig(seed))
+
+
+def test_the_edge_of_a_rig_without_tolerances_is_its_critical_stiffness():
+    block = unit_rig("aging", 0.5, 0.6)
+    (window,) = ss.cure(block, adjust={"stiffness": Adjustment()}).windows
+    edges = [edge.value for edge in ss.boundary(block, "stiffness")]
+    assert [end for pair in window.windows for end in pair if end not in window.limits] == pytest.approx(edges)
+
+
+def test_an_axis_is_cured_as_often_as_is_asked_for(axis):
+    """Of the issue: 94.94 % at 25.3 N/um."""
+    block, within = rig_and_tolerances(axis)
+    found = ss.cure(block, within, sure="95 %")
+    assert [one.parameter for one in found.windows] == [
+        "drive.velocity", "slider.stiffness", "slider.damping", "slider.mass", "contact.preload", "friction.viscous",
+    ]  # fmt: skip
+    best = found.best
+    assert best.parameter == "slider.stiffness"
+    assert best.nearest * block.area == pytest.approx(25.33e6, rel=5e-3)
+    assert best.cost == pytest.approx(math.log2(best.nearest / block.stiffness))
+    for one in found.windows:
+        for end in (end for pair in one.windows for end in pair if end not in one.limits):
+            judged = ss.tolerate(block.with_values({one.parameter: end}), within)
+            assert judged.share == pytest.approx(0.95, abs=max(3 * judged.error, 0.004)), one
+    assert next(one for one in found.windows if one.parameter == "slider.mass").windows == ()
+
+
+def test_costs_and_limits_decide_and_a_pair_is_found_where_no_change_alone_does(axis):
+    block, within = rig_and_tolerances(axis)
+    limits = {"slider.stiffness": Adjustment(high=20e6 / block.area), "drive.velocity": Adjustment(low=5e-6, high=9e-6)}
+    found = ss.cure(block, within, sure=0.95, adjust=limits)
+    assert found.best is None
+    assert set(found.pair) == set(limits)
+    judged = ss.tolerate(block.with_values(found.pair), within)
+    assert judged.share == pytest.approx(0.95, abs=0.01)
+    assert "no single change reaches it\ncheapest pair: slider.stiffness from" in str(found)
+    dear = {"slider.stiffness": Adjustment(cost=100.0), "drive.velocity": Adjustment()}
+    assert ss.cure(block, within, adjust=dear).best.parameter == "drive.velocity"
+
+
+def test_a_stable_rig_is_told_what_makes_it_fail_first(axis):
+    block, _ = rig_and_tolerances(axis, ["stiffness=30 N/um"])
+    found = ss.cure(block)
+    assert found.chance == 1.0
+    assert found.best is None
+    nearest = [m.parameter for m in ss.margins(block) if m.edge is not None and m.value]
+    assert {one.parameter for one in found.fails} <= set(nearest)
+    assert "What would lose it first:\nfriction.bristle_stiffness" in str(found)
+    assert "friction.mu_static" in str(found)
+
+
+def test_the_command_reads_what_may_be_adjusted(axis, tmp_path):
+    axis.write_text(f'{AXIS}[adjust]\nvelocity = {{ to = "200 mm/min" }}\nstiffness = {{ cost = 9 }}\n')
+    page = tmp_path / "cures.html"
+    done = run("cure", axis, "--sure", "90 %", "-o", page)
+    assert "cheapest single change: drive.velocity from 0.5 mm/min to" in done.stdout
+    assert "drive.velocity" in page.read_text()
+    data = json.loads(run("cure", axis, "--json").stdout)
+    assert [one["parameter"] for one in data["windows"]] == ["drive.velocity", "slider.stiffness"]
+    assert data["sure"] == 0.95
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"sure": "much"}, "sure: 'much' is not a number"),
+        ({"sure": 2.0}, "sure: got 2.0; allowed: a chance between 0 and 1"),
+        ({"sure": "120 %"}, "sure: got '120 %'; allowed: a number from 0 to 1"),
+        ({"adjust": {"stifness": Adjustment()}}, "did you mean 'slider.stiffness'"),
+    ],
+)
+def test_mistakes_are_told_in_one_sentence(options, words):
+    with pytest.raises((ss.ParameterError, ss.UnknownNameError), match=words):
+        ss.cure(rig(), **options)

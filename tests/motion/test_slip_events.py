@@ -273,3 +273,60 @@ def test_steps_of_the_drive_while_a_block_sticks_are_no_extremes_of_its_velocity
         run = ss.simulate(STICKING, plan, until=0.3, rtol=1e-8)
         assert min(event.velocity for event in extremes(run, "velocity peak")) > 1e-3
         assert len(extremes(run, "velocity trough")) <= len(extremes(run, "arrest"))
+
+
+def plain_guide(**changes):
+    """Axis of 240 kg on a dry guide, forces on 200 cm²: sticks and slips at .5 mm/min, and rings after each slip."""
+    friction = ss.laws.LuGre(
+        mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, bristle_stiffness=125000, viscous=1.25,
+        **{"stribeck_exponent": 0.8, "bristle_damping": 0.0} | changes,
+    )  # fmt: skip
+    return ss.Slider(
+        friction=friction, contact=ss.laws.ConstantNormalStress(preload=3200 / 0.02), stiffness=12e6 / 0.02,
+        mass=240 / 0.02, damping=5e3 / 0.02, area=0.02, drive=ss.machine.SteadyDrive(0.5e-3 / 60),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "slip", "drop", "recurrence", "rings"),
+    [
+        ({}, 3.3218e-5, 393.5467, 4.9244285, 21),
+        ({"bristle_damping": 193.649167}, 3.4627e-5, 411.8503, 4.7844029, 0),
+        ({"stribeck_exponent": 0.5}, 2.8045e-5, 332.9671, 4.1930098, 20),
+    ],
+    ids=["undamped bristles", "critically damped bristles", "exponent .5"],
+)
+def test_ringing_is_told_beside_a_slip_event(changes, slip, drop, recurrence, rings):
+    """Numbers from SciPy's Radau at rtol 1e-9, which knows nothing of events but the drive's speed."""
+    a_rig = plain_guide(**changes)
+    kick = {"v": 1.1 * a_rig.drive.velocity}
+    run = ss.simulate(a_rig, until=20.0, initial=kick)
+    last = run.slip_events[-2]  # the last whose ringing is over
+    assert (last.slip, last.stress_drop * 0.02) == pytest.approx((slip, drop), rel=1e-4)
+    assert run.slip_events[-1].recurrence == pytest.approx(recurrence, rel=1e-5)
+    assert last.rings == rings
+    assert last.ring_frequency == pytest.approx(197, rel=0.03) if rings else np.isnan(last.ring_frequency)
+    assert run.sentence.startswith(
+        f"judders: every {recurrence:.2f} s it sticks, then slips {1e6 * slip:.3g} um within "
+    )
+    many = ss.simulate_many(a_rig, {}, until=run.slip_events[-1].begin - 1.0, initial=kick).events
+    assert many["events"] == len(run.slip_events) - 1
+    assert many["event_rings"] == rings
+    assert many["event_slip"] == pytest.approx(last.slip, rel=1e-5)
+    assert many["event_ring_frequency"] == pytest.approx(last.ring_frequency, rel=1e-4, nan_ok=True)
+
+
+def test_backward_strokes_mirror_forward_ones():
+    """A drive that goes back makes the same events with slip and velocity reversed, and no negative drop."""
+    a_rig, v = plain_guide(bristle_damping=193.649167), 0.5e-3 / 60
+    ahead, back = (
+        ss.simulate(a_rig, ss.protocol.VelocityStep(at=0.1, to=to), until=60.0).slip_events
+        for to in (1.01 * v, -1.01 * v)
+    )
+    assert back[-1].slip == pytest.approx(-ahead[-1].slip, rel=1e-5)
+    assert back[-1].peak_velocity == pytest.approx(-ahead[-1].peak_velocity, rel=1e-5)
+    assert back[-1].stress_drop == pytest.approx(ahead[-1].stress_drop, rel=1e-5)
+    assert back[-1].recurrence == pytest.approx(ahead[-1].recurrence, rel=1e-5)
+    many = ss.simulate_many(a_rig, {}, ss.protocol.VelocityStep(at=0.1, to=-1.01 * v), until=60.0).events
+    assert many["events"] == len(back)
+    assert many["event_slip"] == pytest.approx(back[-1].slip, rel=1e-5)

@@ -36,6 +36,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.sliding import ABSENT
+from steadyslip.motion.sentence import JUDDERS
 from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
@@ -174,6 +175,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "absent": ABSENT,
         "remote": REMOTE,
         "beyond": BEYOND,
+        "judders": JUDDERS,
         "checks": _checks(rig, names, branch),
     }
 

@@ -15,7 +15,7 @@ from steadyslip.explorer.programs import program
 from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
-from steadyslip.kernels.layout import LOG_COLUMNS, SETTINGS, Cursor, Final, Kind, Out, Recorded, Setting
+from steadyslip.kernels.layout import LOG_COLUMNS, NUMBER, SETTINGS, Cursor, Final, Kind, Out, Recorded, Setting
 from steadyslip.kernels.nodes import Program, as_node
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
@@ -146,6 +146,7 @@ def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str,
         "segment": pack(Protocol.of(()), 1.0, 1.0).rows(0, 1).shape[-1],
         "tally": len(TALLY),
         "logged": LOG_COLUMNS,
+        "number": NUMBER,
         "statuses": list(STATUSES),
     }
 

@@ -93,8 +93,8 @@ class Watched:
 
 
 def faster(at: Observed) -> Any:
-    """Velocity above which the block slips, m/s."""
-    return larger(FASTER * at.v_lp, at.v_low)
+    """Speed above which the block slips, forward or backward, m/s."""
+    return larger(FASTER * abs(at.v_lp), at.v_low)
 
 
 EVENTS = (
@@ -103,13 +103,17 @@ EVENTS = (
     Watched("turn", lambda at: at.acceleration, falls="velocity peak", rises="velocity trough",
             falls_counted="velocity_peaks", uncertain=lambda at: at.error / at.h + at.rounding),
     Watched("contact", lambda at: at.sigma - at.sigma_low, falls="contact lost"),
+    Watched("backward", lambda at: -at.v - faster(at), falls="backward slip ends", rises="backward slip begins",
+            uncertain=lambda at: at.error),
     Watched("motion", lambda at: abs(at.v) - at.v_low, falls="arrest", rises="restart", falls_counted="arrests",
             uncertain=lambda at: at.error),
 )  # fmt: skip
-"""All events; the driver uses the first three by index (`steadyslip.kernels.layout.Kind`)."""
+"""All events; the driver uses the first four by index (`steadyslip.kernels.layout.Kind`)."""
 LOG_KINDS = ("", *(word for event in EVENTS for word in (event.falls, event.rises)), "blow-up")
 """Names of the kinds in a log: 2 e + 1 where event function e falls, 2 e + 2 where it rises."""
 COUNTED = tuple(word for event in EVENTS for word in (event.falls_counted, event.rises_counted))
 """Columns of event counts after those of `Row`, by kind; columns without a name are not reported."""
+RING = "ring"
+"""Name of forward slip after a slip event that is told beside it; in a log a begin of slip with number 0."""
 TALLY = (*(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH), *COUNTED)
 """Columns of the event statistics in results."""

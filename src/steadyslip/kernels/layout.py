@@ -47,19 +47,21 @@ class Row(IntEnum):
     """Number of events in the last step."""
     W_LIMIT, W_LP = 34, 35
     """Velocity variable at the slip limit and at the load-point velocity, valid while inputs are constant."""
-    # statistics of slip events (s, m, Pa, m/s); those up to PEAK_GROWTH are results, of the last complete event
+    # statistics of slip events (s, m, Pa, m/s, Hz); those up to PEAK_GROWTH are results, of the last complete event
     EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 36, 37, 38
     EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 39, 40, 41, 42, 43, 44
-    LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47
-    PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 48, 49, 50
-    # slip in progress that may become a slip event: state at its lowest velocity
-    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 51, 52, 53, 54
-    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 55, 56, 57, 58, 59, 60
-    Z_OLD = 61
+    EVENT_RINGS, EVENT_RING_FREQUENCY, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47, 48, 49
+    # largest drop; begins of the last events in each direction; T and slip at the begin of the last, and its last ring
+    PEAK_SIZE, LOAD_MOVED, LARGEST_DROP, FORWARD_BEGIN, BACKWARD_BEGIN = 50, 51, 52, 53, 54
+    EVENT_STRESS, EVENT_X, LAST_RING = 55, 56, 57
+    # slip in progress that may become a slip event, with its sign: state at its lowest speed
+    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN, NOW_SIGN = 58, 59, 60, 61, 62
+    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 63, 64, 65, 66, 67, 68
+    Z_OLD = 69
     """First unknown of the balances at the start of the last step."""
-    H_OLD = 62
+    H_OLD = 70
     """Size of the last accepted step."""
-    PULL, STRETCH = 63, 64
+    PULL, STRETCH = 71, 72
     """Force (less that of steady sliding) of a drive that is let go and moves on, at the end of the last segment, and
     the part of it that the drive's own motion would cause with the load point at rest."""
 
@@ -71,6 +73,10 @@ TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
 MOST_FAILURES = 400.0
 """Rejected steps in a row after which a job stops. A stopping block with mass slows down by hundreds of decades in a
 moment, and steps have to shrink as much."""
+EVENT_SHARE = 0.1
+"""Least drop of a slip event, as a share of the largest so far, and least reload between two events: what changes the
+force by less is ringing. Any share between the largest ring of a damped block (some hundredths) and the drop of a full
+event tells the two apart; a tenth is far from both."""
 SLIP_EVENT = 2.0  # least ratio of peak velocity to load-point velocity of a slip event: stick-slip of a block on a
 # spring with constant friction exceeds 2 (see docs/explanation/motion.md)
 
@@ -113,7 +119,7 @@ class Status(IntEnum):
 class EventPlace(IntEnum):
     """Indices in `steadyslip.kernels.events.EVENTS` of the events that the driver treats specially."""
 
-    SLIP, TURN, CONTACT = 0, 1, 2
+    SLIP, TURN, CONTACT, BACKWARD = 0, 1, 2, 3
 
 
 class Kind(IntEnum):
@@ -122,11 +128,14 @@ class Kind(IntEnum):
     Events of further contacts have higher numbers, in the same order.
     """
 
-    SLIP_ENDS, SLIP_BEGINS, PEAK, TROUGH, LOST = 1, 2, 3, 4, 5
+    SLIP_ENDS, SLIP_BEGINS, PEAK, TROUGH, LOST, BACKWARD_ENDS, BACKWARD_BEGINS, ARREST = 1, 2, 3, 4, 5, 7, 8, 9
 
 
-LOG_COLUMNS = 8
-"""Columns of the log: kind, time, v, sigma, tau, T, slip, segment."""
+LOG_COLUMNS = 9
+"""Columns of the log: kind, time, v, sigma, tau, T, slip, segment, number of the slip event (0 for ringing)."""
+NUMBER = 8
+"""Column of the number. An end with a number that has had one before continues that event; a number begins anew at 1
+where all slip before was small."""
 
 
 # A *point* is the full state at a moment: first unknown of the balances, state, further unknowns. Unknowns are stored

@@ -1,13 +1,11 @@
 """Program that finds frequent events in a group of lanes at once, and updates the statistics where there is no log.
 
 Extremes of velocity and begin and end of slip are roots of the velocity variable's dense output or of its derivative.
-Lanes with other cases keep their flag and are left to the driver: lost contact, several events within a step, begin or
-end of slip while inputs change, a root that is not found at once.
+Lanes with other cases keep their flag and are left to the driver: lost contact, several events within a step, the end
+of fast slip, slip backward, begin or end of slip while inputs change, a root that is not found at once.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import SLIP_EVENT, EventPlace, Out, Row
@@ -41,6 +39,9 @@ class Watch(Evaluator):
         left = (
             (load(layout.sign_change + EventPlace.CONTACT) < 0.0)
             | (self.turns & (self.begins | self.ends))
+            | (self.ends & (self.now_event > 0.0))
+            | (abs(load(layout.sign_change + EventPlace.BACKWARD)) > 0.0)
+            | ((load(Row.NOW_SIGN) < 0.0) & (self.now_from < float("inf")))
             | ~self.found
         )
         if self.kernel.choice.level != "constant":
@@ -113,38 +114,19 @@ class Watch(Evaluator):
         return found
 
     def _slip(self) -> None:
-        """Update begin of slip, its becoming a slip event at a peak, and its end."""
+        """Update begin of slip, its mark as fast at a peak, and its end where it was slow."""
         load, here = self.program.load, self.here
         anew = self.trough & (self.now_event <= 0.0) & (as_node(self.v) < self.now_from)
         anew = here & (self.begins | (anew & (self.now_from < float("inf"))))
         over = here & self.ends
         self._kept(Row.NOW_FROM, anew | over, select(anew, self.v, float("inf")))
-        v_lp, least = as_node(self.v_lp), load(Row.V_LOW)
+        v_lp, least = abs(as_node(self.v_lp)), load(Row.V_LOW)
         asked = select(v_lp > least, v_lp, load(Row.V_DRIVE))
         quick = here & self.peak & (as_node(self.v) >= SLIP_EVENT * larger(asked, self.now_from))
         event = select(quick, 1.0, self.now_event)
         self.program.store(Row.NOW_EVENT, select(anew | over, 0.0, event))
         highest = select(here & self.peak, larger(load(Row.NOW_PEAK), self.v), load(Row.NOW_PEAK))
         self.program.store(Row.NOW_PEAK, select(anew, self.v, highest))
-        self._complete(over & (self.now_event > 0.0))
+        self._kept(Row.NOW_SIGN, anew, 1.0)
         for row, value in ((Row.NOW_BEGIN, self.time), (Row.NOW_STRESS, self.stress), (Row.NOW_X, self.place)):
             self._kept(row, anew, value)
-
-    def _complete(self, complete: Node) -> None:
-        """Update the statistics at the end of a slip event."""
-        load, begin = self.program.load, self.program.load(Row.NOW_BEGIN)
-        self._kept(Row.RECURRENCE, complete & (load(Row.ANY_BEGIN) > 0.0), begin - load(Row.EVENT_BEGIN))
-        found: Sequence[tuple[int, Value]] = (
-            (
-                Row.ANY_BEGIN,
-                select(begin > 0.0, 1.0, 0.0),
-            ),  # slip that went on at the start of the run has no known begin
-            (Row.EVENTS, load(Row.EVENTS) + 1.0),
-            (Row.EVENT_BEGIN, begin),
-            (Row.EVENT_DURATION, self.time - begin),
-            (Row.EVENT_SLIP, self.place - load(Row.NOW_X)),
-            (Row.EVENT_STRESS_DROP, load(Row.NOW_STRESS) - self.stress),
-            (Row.EVENT_PEAK_VELOCITY, load(Row.NOW_PEAK)),
-        )
-        for row, value in found:
-            self._kept(row, complete, value)

@@ -9,7 +9,12 @@ import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.pages import Displayed
+from steadyslip.kernels.events import RING
+from steadyslip.kernels.layout import NUMBER, Kind
 from steadyslip.kernels.runner import LOG_KINDS
+
+BEGINS = {"slip begins": 1.0, "backward slip begins": -1.0}
+ENDS = ("slip ends", "backward slip ends")
 
 
 @dataclass(frozen=True)
@@ -19,8 +24,9 @@ class Event(Displayed):
     Attributes
     ----------
     kind : str
-        ``slip begins`` and ``slip ends`` (of a `SlipEvent`), ``velocity peak``, ``velocity trough``, ``arrest``,
-        ``restart``, ``contact lost`` or ``blow-up``.
+        ``slip begins`` and ``slip ends`` (of a `SlipEvent`), ``backward slip begins`` and ``backward slip ends``,
+        ``ring`` (begin of forward slip after an event that sheds too little for one), ``velocity peak``, ``velocity
+        trough``, ``arrest``, ``restart``, ``contact lost`` or ``blow-up``.
     time : float
         s, located on the dense output.
     velocity : float
@@ -44,23 +50,30 @@ class Event(Displayed):
 class SlipEvent(Displayed):
     """Slip ahead of the load point, which unloads the spring, with a peak of at least twice the load point's velocity.
 
-    The block is faster than the load point (and not arrested) throughout. Its peak velocity is at least twice that of
-    the load point (of the rig's drive while the load point rests) and twice its own at the beginning. The event begins
-    where the block becomes faster than the load point, or at its lowest velocity if it was faster before.
+    The event begins where the block becomes faster than the load point, or at its lowest speed if it was faster before,
+    and ends where it is slower again and rests: the spring is loaded by more than a tenth of the largest drop before
+    it slips again. Its peak speed is at least twice that of the load point (of the rig's drive while the load point
+    rests) and twice its own at the beginning; it sheds at least a tenth of the largest drop so far, and an event after
+    it at most ten times as much as all before. Fast slip that sheds less rings. A backward stroke is an event of its
+    own, by the same definition with the speed.
 
     Attributes
     ----------
     begin, end, duration : float
         s.
     slip : float
-        m.
+        m; negative of a backward stroke.
     stress_drop : float
-        Fall of the spring stress, Pa.
+        Fall of the spring stress, Pa, of a backward stroke its rise; never negative.
     peak_velocity, peak_time : float
-        m/s and s.
+        m/s (negative of a backward stroke) and s.
     recurrence : float
-        Time since the beginning of the event before, s; NaN for the first, and if the event before began before the
-        run.
+        Time since the beginning of the event before in the same direction, s; NaN for the first, and if that event
+        began before the run.
+    rings : int
+        How often the block is faster than the load point again, by the same factor of two, before the next event.
+    ring_frequency : float
+        One over the time between the last two of these, Hz; NaN for less than two.
     """
 
     begin: float
@@ -71,6 +84,8 @@ class SlipEvent(Displayed):
     peak_velocity: float
     peak_time: float
     recurrence: float
+    rings: int
+    ring_frequency: float
 
 
 @dataclass(frozen=True)
@@ -114,12 +129,9 @@ class ContactSlip(Displayed):
     slip : float
         m.
     force_drop : float
-        Fall of the pull during the event, N.
-    peak_velocity, peak_time : float
-        m/s and s.
-    recurrence : float
-        Time since the beginning of the event before, s; NaN for the first, and if the event before began before the
-        run.
+        Fall of the pull during the event, N; of a backward stroke its rise.
+    peak_velocity, peak_time, recurrence, rings, ring_frequency : float
+        As in `SlipEvent`.
     """
 
     contact: str
@@ -131,6 +143,8 @@ class ContactSlip(Displayed):
     peak_velocity: float
     peak_time: float
     recurrence: float
+    rings: int
+    ring_frequency: float
 
 
 AnyEvent = Event | ContactEvent
@@ -140,14 +154,32 @@ AnySlip = SlipEvent | ContactSlip
 def events_of(
     log: np.ndarray, contacts: Sequence[str] = ("",), areas: Sequence[float] = (1.0,)
 ) -> tuple[AnyEvent, ...]:
-    """Events of a kernel's log, in order of time (begins of slip are logged only when it becomes a slip event)."""
-    log = log[np.argsort(log[:, 1], kind="stable")]
+    """Events of a kernel's log, in order of time."""
     each = len(LOG_KINDS) - 2
     found: list[AnyEvent] = []
-    for number, time, v, sigma, tau, pull, slip in log[:, :7].tolist():
+    for number, *numbers in valid_rows(log)[:, [*range(7), NUMBER]].tolist():
         index, kind = divmod(int(number) - 1, each)
-        found.append(event_of(LOG_KINDS[kind + 1], contacts[index], areas[index], (time, v, sigma, tau, pull, slip)))
+        word = RING if kind + 1 == Kind.SLIP_BEGINS and not numbers.pop() else LOG_KINDS[kind + 1]
+        found.append(event_of(word, contacts[index], areas[index], numbers[:6]))
     return tuple(found)
+
+
+def valid_rows(log: np.ndarray) -> np.ndarray:
+    """Rows of a log in order of time, without begins and ends of slip events that later rows replace."""
+    each = len(LOG_KINDS) - 2
+    keep = np.ones(len(log), dtype=bool)
+    counted: dict[int, list[list[int]]] = {}  # rows of each event of a contact
+    for i in np.flatnonzero(log[:, NUMBER] > 0).tolist():
+        index, kind = divmod(int(log[i, 0]) - 1, each)
+        events, number = counted.setdefault(index, []), int(log[i, NUMBER])
+        if kind + 1 in (Kind.SLIP_BEGINS, Kind.BACKWARD_BEGINS):
+            keep[[row for event in events[number - 1 :] for row in event]] = False
+            events[number - 1 :] = [[i]]
+        else:
+            keep[events[number - 1][1:]] = False
+            events[number - 1][1:] = [i]
+    log = log[keep]
+    return np.asarray(log[np.argsort(log[:, 1], kind="stable")])
 
 
 def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> AnyEvent:
@@ -170,26 +202,40 @@ def slip_events(events: Sequence[AnyEvent]) -> tuple[AnySlip, ...]:
 
 def _slips(events: Sequence[AnyEvent]) -> list[AnySlip]:
     """Complete slip events of one contact."""
-    found: list[AnySlip] = []
+    found: list[tuple[AnyEvent, AnyEvent, AnyEvent]] = []
+    rings: list[list[float]] = []
     begin: AnyEvent | None = None
     peak: AnyEvent | None = None
     for event in events:
-        if event.kind == "slip begins":
+        if event.kind in BEGINS:
             begin, peak = event, event
-        elif begin is not None and event.kind == "velocity peak":
-            peak = event if peak is None or event.velocity > peak.velocity else peak
-        elif begin is not None and peak is not None and event.kind == "slip ends":
-            recurrence = begin.time - found[-1].begin if found and found[-1].begin > 0 else float("nan")
-            found.append(_slip(begin, peak, event, recurrence))
+        elif event.kind == RING and rings and begin is None:
+            rings[-1].append(event.time)
+        elif begin is not None and peak is not None and event.kind.startswith("velocity"):
+            faster = BEGINS[begin.kind] * (event.velocity - peak.velocity) > 0
+            peak = event if faster else peak
+        elif begin is not None and peak is not None and event.kind in ENDS:
+            found.append((begin, peak, event))
+            rings.append([])
             begin = None
-    return found
+    return [_slip(*one, _recurrence([each[0] for each in found[: i + 1]]), rings[i]) for i, one in enumerate(found)]
 
 
-def _slip(begin: AnyEvent, peak: AnyEvent, end: AnyEvent, recurrence: float) -> AnySlip:
+def _recurrence(begins: Sequence[AnyEvent]) -> float:
+    """Time from the begin before in the direction of the last one to the last one, s; NaN if that is not known."""
+    before = next((one.time for one in begins[-2::-1] if one.kind == begins[-1].kind), 0.0)
+    return begins[-1].time - before if before > 0 else float("nan")
+
+
+def _slip(begin: AnyEvent, peak: AnyEvent, end: AnyEvent, recurrence: float, rings: Sequence[float]) -> AnySlip:
+    sign = BEGINS[begin.kind]
+    often = 1 / (rings[-1] - rings[-2]) if len(rings) > 1 else float("nan")
     times = {"begin": begin.time, "end": end.time, "duration": end.time - begin.time, "slip": end.slip - begin.slip}
-    top = {"peak_velocity": peak.velocity, "peak_time": peak.time, "recurrence": recurrence}
+    top = {"peak_velocity": peak.velocity, "peak_time": peak.time, "recurrence": recurrence, "ring_frequency": often}
     if isinstance(begin, ContactEvent) and isinstance(end, ContactEvent):
-        return ContactSlip(contact=begin.contact, force_drop=begin.pull - end.pull, **times, **top)
+        drop = sign * (begin.pull - end.pull)
+        return ContactSlip(contact=begin.contact, force_drop=drop, rings=len(rings), **times, **top)
     if isinstance(begin, Event) and isinstance(end, Event):
-        return SlipEvent(stress_drop=begin.spring_stress - end.spring_stress, **times, **top)
+        drop = sign * (begin.spring_stress - end.spring_stress)
+        return SlipEvent(stress_drop=drop, rings=len(rings), **times, **top)
     raise InternalError("events of one kind in a run")

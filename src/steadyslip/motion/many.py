@@ -42,7 +42,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
 DONE = STATUSES.index("done")
-_UNITS = ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "s", "s", "1")
+_UNITS = ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "Hz", "s", "s", "1")
 EVENT_UNITS = {name: unit for name, unit in zip_longest(TALLY, _UNITS, fillvalue="1") if name}
 R = TypeVar("R", bound=Rig)
 
@@ -82,10 +82,11 @@ class Ensemble(ReadOnly):
         Observables at the end, SI units.
     events : dict of str to ndarray
         Per run: number of complete slip events (see `SlipEvent`), highest and lowest velocity; begin, duration, slip,
-        stress drop, peak velocity and recurrence of the last complete event; number of arrests and velocity peaks, time
-        of the last peak, period between the last two, growth of |ln(peak velocity/drive)| between them. Without events,
-        duration, slip and stress drop are 0, times and velocities NaN. Empty unless asked for. For a machine, these for
-        each contact, prefixed with its name, and force drop (N) in place of stress drop.
+        stress drop, peak velocity, recurrence, rings and ring frequency of the last complete event; number of arrests
+        and velocity peaks, time of the last peak, period between the last two, growth of |ln(peak velocity/drive)|
+        between them. Without events, duration, slip, stress drop and rings are 0, times and velocities NaN. Empty
+        unless asked for. For a machine, these for each contact, prefixed with its name, and force drop (N) in place of
+        stress drop.
     samples : dict of str to ndarray
         Observables at `times`, which is the last axis; NaN after the end of a run.
     times : ndarray

@@ -20,6 +20,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
 from steadyslip.motion.events import AnySlip, ContactEvent, ContactSlip, Event, SlipEvent, slip_events
 from steadyslip.motion.history import HistoryData
+from steadyslip.motion.sentence import sentences
 from steadyslip.motion.status import remedy
 
 STEADY_SPREAD = 1e-6  # relative spread of velocity up to which a run counts as steady: ten times the default rtol
@@ -53,6 +54,16 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def slip_events(self) -> tuple[AnySlip, ...]:
         """Complete slip events; see `SlipEvent` and, for machines, `ContactSlip`."""
         return slip_events(self.events)
+
+    @cached_property
+    def sentence(self) -> str:
+        """What the rig does, by its slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ..."."""
+        return "; ".join(f"{name} {words}" if name else words for name, words in self._sentences.items())
+
+    @cached_property
+    def _sentences(self) -> dict[str, str]:
+        """Sentence of each contact, by name."""
+        return sentences(self.events, self.slip_events, self.rig.area if isinstance(self.rig, Slider) else None)
 
     def summary(self) -> str:
         """Summary in a few lines."""
@@ -105,6 +116,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             slips = [one for one in self.slip_events if isinstance(one, ContactSlip) and one.contact == name]
             if slips:
                 last = slips[-1]
+                lines.append(f"{'':<15} {self._sentences[name]}")
                 again = (
                     f", {format_quantity(last.recurrence, 's')} after the one before"
                     if np.isfinite(last.recurrence)
@@ -136,6 +148,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         slips = [one for one in self.slip_events if isinstance(one, SlipEvent)]
         if slips:
             last = slips[-1]
+            lines.append(self.sentence)
             lines.append(
                 f"slip events     {len(slips)}; the last: peak {format_quantity(last.peak_velocity, 'm/s')}, "
                 f"{stress_name('stress drop', area)} {format_quantity(last.stress_drop, 'Pa', area=area)}, "
@@ -157,6 +170,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             **({"contact": self.contact or None} if isinstance(self.rig, Machine) else {}),
             "end": self.end,
             "message": self.message,
+            "sentence": self.sentence,
             "method": self.method,
             "rtol": self.rtol,
             "steps": self.steps,

@@ -48,6 +48,7 @@ _BY_UNIT = {
     "kg/m^2": "m",
     "rad/s": "angular_frequency critical_angular_frequency",
     "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r",
+    "Hz": "ring_frequency",
     "m^2": "area",
     "N": "load normal_force friction_force force_drop pull",
 }

@@ -205,7 +205,8 @@ def _history(result: History) -> Parts:
         f"What does this rig do in {format_quantity(result.protocol.until or result.end, 's')} "
         "under the protocol below?"
     )
-    return Parts(head, sentence(result.message), question, body, rig, result.protocol)
+    told = " ".join(sentence(words) for words in (result.message, result.sentence) if words)
+    return Parts(head, told, question, body, rig, result.protocol)
 
 
 def _load_name(rig: Slider | Machine) -> str:

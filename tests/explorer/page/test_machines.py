@@ -45,7 +45,7 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
 def test_a_machine_is_disturbed_where_one_says_and_shown_by_name(browser, page_of_servo):
     _, path = page_of_servo
     with Visit(browser, path) as visit:
-        visit.told("slip events .*of mesh.*of guide")
+        visit.told(r"slip events? \(guide\)")
         visit.page.get_by_label("disturbance", exact=True).select_option("pull")
         visit.page.get_by_label("where it acts").select_option("load")
         visit.page.locator(".motion .hint", has_text="pull on load").wait_for()

@@ -235,3 +235,17 @@ def test_a_run_that_leads_nowhere_does_not_change_those_after_it():
     assert not flow.led
     for now, own in zip(flow.run(setting, start, time), before, strict=True):
         np.testing.assert_array_equal(now, own)
+
+
+def test_the_cycle_of_a_block_that_rings_after_each_slip_is_found():
+    """An axis on undamped bristles returns to its place once in 4.92 s, and passes the drive's velocity 29 times."""
+    friction = ss.laws.LuGre(
+        mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, stribeck_exponent=0.8, viscous=1.25,
+        bristle_stiffness=125000, bristle_damping=0.0,
+    )  # fmt: skip
+    axis = ss.Slider(
+        friction=friction, contact=ss.laws.ConstantNormalStress(preload=3200 / 0.02), stiffness=12e6 / 0.02,
+        mass=240 / 0.02, damping=5e3 / 0.02, drive=ss.machine.SteadyDrive(0.5e-3 / 60),
+    )  # fmt: skip
+    found = ss.cycles(axis, between=(11e6 / 0.02, 16e6 / 0.02), doublings=0).at(axis.stiffness)
+    assert [one.period for one in found if one.stable] == pytest.approx([4.924428], rel=1e-6)

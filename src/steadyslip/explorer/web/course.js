@@ -6,7 +6,7 @@ import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
 import { shown, unitIn } from "./quantities.js";
 import { MachineSketch, Sketch } from "./sketch.js";
-import { dropped, outcome, slow } from "./words.js";
+import { outcome, quantity, slow } from "./words.js";
 
 /** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; indices of those of the phase plane */
 
@@ -238,9 +238,9 @@ export class Course {
     const { events } = this.course, { area, phrases } = this.page.rig.data, from = Math.max(0, events.length - LISTED);
     this.list.style.display = events.length ? "" : "none";
     this.list.firstChild.textContent = `${events.length} slip event${events.length === 1 ? "" : "s"}${from ? `, the last ${LISTED} of them` : ""}`;
-    this.events.replaceChildren(...events.slice(from).map((one, n) => {
-      const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show(one.begin / this.course.until)), before = events.slice(0, from + n).findLast((other) => other.contact === one.contact);
-      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? dropped(one.drop, "N") : dropped(one.drop, "Pa", area), before ? shown(one.begin - before.begin, "s", 3) : ""];
+    this.events.replaceChildren(...events.slice(from).map((one) => {
+      const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show(one.begin / this.course.until));
+      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? shown(one.drop, "N") : quantity(one.drop, "Pa", area), one.every !== null ? shown(one.every, "s", 3) : ""];
       return make("tr", {}, ...cells.map((cell) => make("td", {}, cell)));
     }));
   }

@@ -137,16 +137,7 @@ export class Motion {
     /** @type {any} */ (points).shape = [many, facts.point];
     const [constants, , settings, segments] = tables;
     this.driver.observe(machine.layout, machine.routines, constants, settings, segments, points, own, segment, times, values);
-    const events = /** @type {any[]} */ ([]), { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind, open = /** @type {any[]} */ (facts.contacts.map(() => null));
-    for (const [number, time, v, , , stress] of Array.from(log).sort((a, b) => a[1] - b[1])) {
-      const c = Math.floor((number - 1) / facts.kinds), kind = ((number - 1) % facts.kinds) + 1, { name: contact, area } = this.sliding[c];
-      if (kind === SLIP_BEGINS) open[c] = { contact, begin: time, peak: v, stress };
-      else if (open[c] && kind === PEAK) open[c].peak = Math.max(open[c].peak, v);
-      else if (open[c] && kind === SLIP_ENDS) {
-        events.push({ contact, begin: open[c].begin, end: time, peak: open[c].peak, drop: area * (open[c].stress - stress) });
-        open[c] = null;
-      }
-    }
+    const events = this.slipEvents(log);
     const contacts = this.sliding.map(({ name, area }, c) => {
       const own = (place) => values[each * c + place];
       return { name, v: own(o.V), sigma: scaled(area, own(o.SIGMA)), tau: scaled(area, own(o.TAU)), way: own(o.ADVANCE) };
@@ -154,6 +145,51 @@ export class Motion {
     const bodies = facts.bodies.map(([name, unit, x, v]) => ({ name, unit, x: values[x], v: values[v] })), [{ v, sigma, tau, way }] = contacts;
     const x = values[each * contacts.length]; // displacement of a slider: first value after the outputs
     return { times, v, sigma, tau, x, load: way, contacts, bodies, ratio: this.sliding[0].rate / this.drive, events, status, end };
+  }
+
+  /** Slip events of a log, in order of their ends, as in Python. */
+  slipEvents(log) {
+    const { SLIP_BEGINS, SLIP_ENDS, PEAK, TROUGH, ARREST, BACKWARD_BEGINS, BACKWARD_ENDS } = this.facts.kind, events = /** @type {any[]} */ ([]);
+    const open = /** @type {any[]} */ (this.sliding.map(() => null)), last = /** @type {any[]} */ (this.sliding.map(() => null)), arrest = this.sliding.map(() => -1);
+    for (const [number, time, v, , , stress, slip, , count] of this.valid(log)) {
+      const [c, kind] = this.kindOf(number), { name: contact, area } = this.sliding[c], one = open[c];
+      if (kind === ARREST) arrest[c] = time;
+      else if (kind === SLIP_BEGINS && !count) {
+        if (last[c] && !one) last[c].rings.push(time);
+      } else if (kind === SLIP_BEGINS || kind === BACKWARD_BEGINS) {
+        const sign = kind === SLIP_BEGINS ? 1 : -1, before = /** @type {any} */ (events).findLast((other) => other.contact === contact && other.sign === sign && other.begin > 0);
+        open[c] = { contact, sign, begin: time, peak: v, stress, slip, rings: [], every: before ? time - before.begin : null, sticks: before && arrest[c] > before.begin };
+      } else if (one && (kind === PEAK || kind === TROUGH)) one.peak = one.sign * Math.max(one.sign * one.peak, one.sign * v);
+      else if (one && (kind === SLIP_ENDS || kind === BACKWARD_ENDS)) {
+        events.push((last[c] = { ...one, end: time, slip: slip - one.slip, drop: one.sign * area * (one.stress - stress) }));
+        open[c] = null;
+      }
+    }
+    return events;
+  }
+
+  /** Contact and kind of a row of the log. */
+  kindOf(number) {
+    const { kinds } = this.facts;
+    return [Math.floor((number - 1) / kinds), ((number - 1) % kinds) + 1];
+  }
+
+  /** Rows of a log in order of time, without begins and ends of slip events that later rows replace. */
+  valid(log) {
+    const { number, kind: { SLIP_BEGINS, BACKWARD_BEGINS } } = this.facts, over = new Set(), counted = /** @type {any[][][]} */ (this.sliding.map(() => []));
+    for (const row of log) {
+      if (!row[number]) continue;
+      const [c, kind] = this.kindOf(row[0]), own = counted[c];
+      if (kind === SLIP_BEGINS || kind === BACKWARD_BEGINS) {
+        own.splice(row[number] - 1).flat().forEach((old) => over.add(old));
+        own.push([row]);
+      } else {
+        const one = own[row[number] - 1];
+        one.splice(1).forEach((old) => over.add(old));
+        one.push(row);
+      }
+    }
+    return Array.from(log).filter((row) => !over.has(row)).sort((a, b) => a[1] - b[1]);
   }
 }
 

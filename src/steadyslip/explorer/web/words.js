@@ -13,9 +13,6 @@ export function quantity(value, unit, area, many = 4) {
 /** Name or meaning with "force" for "stress" if the unit is one of force. @param {string} text @param {string} unit */
 export const named = (text, unit) => (unit[0] === "N" ? text.replace(/stress(es)?/g, (_, many) => (many ? "forces" : "force")) : text);
 
-/** Text of the drop of stress or force in a slip event; "(rises)" for a negative drop. */
-export const dropped = (value, unit, area = /** @type {number | null} */ (null)) => (value < 0 ? `${quantity(-value, unit, area)} (rises)` : quantity(value, unit, area));
-
 /** Parameter data with which a stiffness along the slide is shown: in the unit of the user's file if it has one. @param {any} data */
 export function asStiffness({ parameters, stiffness, area }) {
   const unit = area === null ? "Pa/m" : "N/m", given = parameters.find((one) => one.name === stiffness);
@@ -111,7 +108,7 @@ const ENDED = {
 export const slow = (v, floor) => (Math.abs(v) < floor ? "0 (stuck)" : shown(v, "m/s", 3));
 
 /** Sentence on the result of a motion. @param {any} course @param {any} data */
-export function outcome({ events, status, end, contacts, at }, { area, phrases }) {
+export function outcome({ events, status, end, contacts, at }, { area, phrases, judders }) {
   if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: neither mass nor damping limits the velocity.`;
   const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;
   if (!events.length) {
@@ -121,10 +118,22 @@ export function outcome({ events, status, end, contacts, at }, { area, phrases }
     });
     return `No slip event; ${phrases ? "slip rate of " : "velocity "}${ranges.join(", of ")}.${ended}`;
   }
-  const last = events[events.length - 1], before = events.slice(0, -1).findLast((one) => one.contact === last.contact);
-  const every = before ? `, the last two${phrases ? ` of ${last.contact}` : ""} ${shown(last.begin - before.begin, "s", 3)} apart` : "";
+  const last = events[events.length - 1], before = `, the last two${phrases ? ` of ${last.contact}` : ""} ${shown(last.every, "s", 3)} apart`;
+  const every = last.every !== null ? before : "";
   const counts = contacts.map(({ name }) => [events.filter((one) => one.contact === name).length, name]).filter(([many]) => many);
   const where = phrases ? ` (${counts.map(([many, name]) => (counts.length > 1 ? `${many} of ${name}` : name)).join(", ")})` : "";
-  const what = `${phrases || area !== null ? "force" : "stress"} ${last.drop < 0 ? "rise" : "drop"}`, drop = `${what} ${phrases ? shown(Math.abs(last.drop), "N") : quantity(Math.abs(last.drop), "Pa", area)}`;
-  return `${events.length} slip event${events.length > 1 ? "s" : ""}${where}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, ${drop}.${ended}`;
+  const drop = `${phrases || area !== null ? "force" : "stress"} drop ${phrases ? shown(last.drop, "N") : quantity(last.drop, "Pa", area)}`;
+  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => (phrases ? shown(value, "N", 3) : quantity(value, "Pa", area, 3)))).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
+  return `${events.length} slip event${events.length > 1 ? "s" : ""}${where}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, ${drop}; ${told.join("; ")}.${ended}`;
+}
+
+/** Sentence on the slip events of one contact, as in Python (steadyslip.motion.sentence). @param {any} slips @param {Record<string, string>} words @param {(value: number) => string} force */
+function sentence(slips, words, force) {
+  const back = slips.filter((one) => one.slip < 0), last = slips.findLast((one) => one.slip > 0) ?? back[back.length - 1], { rings } = last, hindmost = back[back.length - 1];
+  const text = words[last.every !== null ? "again" : "alone"] + (rings.length > 1 ? words.rings : "") + (hindmost ? words.backward : "");
+  return fill(text, {
+    every: shown(last.every, "s", 3), waits: words[last.sticks ? "sticks" : "lags"], slip: shown(Math.abs(last.slip), "m", 3), within: shown(last.end - last.begin, "s", 3),
+    drop: force(last.drop), rings: `${rings.length}`, often: rings.length > 1 ? shown(1 / (rings[rings.length - 1] - rings[rings.length - 2]), "Hz", 3) : "",
+    backward: `${back.length}`, back: hindmost ? shown(Math.abs(hindmost.slip), "m", 3) : "", during: hindmost ? shown(hindmost.end - hindmost.begin, "s", 3) : "",
+  });
 }

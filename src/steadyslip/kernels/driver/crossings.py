@@ -8,11 +8,12 @@ from steadyslip.kernels.driver.places import (
     events_per_contact,
     guess_at,
     outputs_at,
+    slip_sense,
     tally_at,
     unknown_at,
     velocity_at,
 )
-from steadyslip.kernels.driver.slip import begin_slip_event, record_event, track_slowest
+from steadyslip.kernels.driver.slip import mark_fast, record_event, track_slowest
 from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
 
 MOST_BISECTIONS = 100  # of regula falsi, which needs about ten; halving alone would need 44
@@ -64,7 +65,7 @@ def process_events(
     each, count = events_per_contact(layout), 0
     for e in range(layout.events if R[Row.EVENT_COUNT] > 0.0 else 0):
         change = R[layout.sign_change + e]
-        if change != 0.0 and (e % each <= EventPlace.CONTACT or log.shape[0] > 0):
+        if change != 0.0 and (e % each <= EventPlace.BACKWARD or log.shape[0] > 0):
             kind = 2 * e + (2 if change > 0.0 else 1)
             order[count, 0], order[count, 1] = located(R, layout, routines, kind, y), kind
             count += 1
@@ -93,10 +94,11 @@ def process_events(
         own, v = tally_at(layout, c), velocity_at(R, layout, c)
         R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)
-        R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], v)
-        if R[own + Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.LENGTH] and v >= SLIP_EVENT * R[own + Row.NOW_FROM]:
+        speed = R[own + Row.NOW_SIGN] * v
+        R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], speed)
+        if R[Row.TAU] >= R[Row.LENGTH] and speed >= SLIP_EVENT * R[own + Row.NOW_FROM]:
             state_now(R, layout, routines, R[Row.TAU], y)
-            begin_slip_event(R, layout, c, y, log, cursor)
+            mark_fast(R, layout, c, y)
     return False
 
 
@@ -104,7 +106,7 @@ def save_before_jump(R: Array, layout: Layout) -> None:
     """Store velocity and slip state of each contact before a jump, for `events_of_jump`."""
     for c in range(layout.contacts if layout.events > 0 else 0):
         R[layout.before_jump + 2 * c] = velocity_at(R, layout, c)
-        R[layout.before_jump + 2 * c + 1] = R[layout.event_value + events_per_contact(layout) * c + EventPlace.SLIP]
+        R[layout.before_jump + 2 * c + 1] = slip_sense(R, layout, c)
 
 
 def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
@@ -112,13 +114,16 @@ def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, 
     state_now(R, layout, routines, 0.0, y)
     for c in range(layout.contacts):
         own, each, v = tally_at(layout, c), events_per_contact(layout), y[outputs_at(layout, c) + Out.V]
-        before, was_slipping = R[layout.before_jump + 2 * c], R[layout.before_jump + 2 * c + 1] > 0.0
-        slipping = R[layout.event_value + each * c + EventPlace.SLIP] > 0.0
-        if slipping != was_slipping:
-            kind = Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS
+        before, sense = R[layout.before_jump + 2 * c + 1], slip_sense(R, layout, c)
+        if sense != before and before != 0.0:
+            kind = Kind.SLIP_ENDS if before > 0.0 else Kind.BACKWARD_ENDS
             record_event(R, layout, kind + 2 * each * c, 0.0, y, log, cursor)
-        if slipping and R[own + Row.NOW_EVENT] == 0.0 and before < min(v, R[own + Row.NOW_FROM]):
-            track_slowest(R, layout, c, before, 0.0, y)
-            begin_slip_event(R, layout, c, y, log, cursor)
+        if sense != before and sense != 0.0:
+            kind = Kind.SLIP_BEGINS if sense > 0.0 else Kind.BACKWARD_BEGINS
+            record_event(R, layout, kind + 2 * each * c, 0.0, y, log, cursor)
+        speed = sense * R[layout.before_jump + 2 * c]
+        if sense != 0.0 and R[own + Row.NOW_EVENT] == 0.0 and speed < min(sense * v, R[own + Row.NOW_FROM]):
+            track_slowest(R, layout, c, speed, 0.0, y)
+            mark_fast(R, layout, c, y)
         R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)

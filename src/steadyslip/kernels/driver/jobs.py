@@ -12,6 +12,7 @@ from steadyslip.kernels.driver.places import (
     guess_count,
     point_at,
     scale_at,
+    slip_sense,
     tally_at,
     velocity_at,
 )
@@ -22,7 +23,6 @@ from steadyslip.kernels.layout import (
     MOST_FAILURES,
     Array,
     Cursor,
-    EventPlace,
     Final,
     Kind,
     Layout,
@@ -114,15 +114,19 @@ def start_tally(
     own, v = tally_at(layout, contact), velocity_at(R, layout, contact)
     R[own + Row.PEAK_VELOCITY] = v
     R[own + Row.LOWEST_VELOCITY] = v
-    for i in (Row.EVENT_BEGIN, Row.EVENT_PEAK_VELOCITY, Row.RECURRENCE, Row.LAST_PEAK_TIME):
+    for i in (Row.EVENT_BEGIN, Row.EVENT_PEAK_VELOCITY, Row.RECURRENCE, Row.EVENT_RING_FREQUENCY, Row.LAST_PEAK_TIME):
         R[own + i] = math.nan
     R[own + Row.PEAK_PERIOD] = math.nan
     R[own + Row.PEAK_GROWTH] = math.nan
-    R[own + Row.NOW_BEGIN] = math.nan
+    for i in (Row.FORWARD_BEGIN, Row.BACKWARD_BEGIN, Row.NOW_BEGIN):
+        R[own + i] = math.nan
+    R[own + Row.NOW_SIGN] = 1.0
     R[own + Row.NOW_FROM] = math.inf
-    if R[Row.WATCH] > 0.0 and R[layout.event_value + events_per_contact(layout) * contact + EventPlace.SLIP] > 0.0:
+    sense = slip_sense(R, layout, contact) if R[Row.WATCH] > 0.0 else 0.0
+    if sense != 0.0:
         state_now(R, layout, routines, 0.0, y)
-        record_event(R, layout, Kind.SLIP_BEGINS + 2 * events_per_contact(layout) * contact, 0.0, y, log, cursor)
+        kind = Kind.SLIP_BEGINS if sense > 0.0 else Kind.BACKWARD_BEGINS
+        record_event(R, layout, kind + 2 * events_per_contact(layout) * contact, 0.0, y, log, cursor)
 
 
 def highest_velocity(R: Array, layout: Layout) -> float:

@@ -9,7 +9,7 @@ from steadyslip.kernels.driver.places import output_size
 from steadyslip.kernels.driver.samples import BETWEEN
 from steadyslip.kernels.layout import GROUP, Array, Cursor, Layout, Routines, Row, Setting, call
 
-LOGGED_AT_ONCE = 16  # rows of the log per lane and contact that one service may need: two for each kind of event
+LOGGED_AT_ONCE = 20  # rows of the log per lane and contact that one service may need: two for each kind of event
 
 
 def flagged(S: Array, lanes: int) -> int:

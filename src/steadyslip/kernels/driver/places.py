@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steadyslip.kernels.layout import TALLIED, Array, Layout, Out, Row, Sampled
+from steadyslip.kernels.layout import TALLIED, Array, EventPlace, Layout, Out, Row, Sampled
 
 
 def outputs_at(layout: Layout, contact: int) -> int:
@@ -51,6 +51,14 @@ def events_per_contact(layout: Layout) -> int:
 def tally_at(layout: Layout, contact: int) -> int:
     """Offset that turns a row between `Row.EVENTS` and `Row.NOW_SEGMENT` into that of a contact."""
     return layout.further_statistics + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
+
+
+def slip_sense(R: Array, layout: Layout, contact: int) -> float:
+    """Direction in which a contact slips ahead of the load point at the end of the step: 1, -1, or 0 for neither."""
+    first = layout.event_value + events_per_contact(layout) * contact
+    if R[first + EventPlace.SLIP] > 0.0:
+        return 1.0
+    return -1.0 if R[first + EventPlace.BACKWARD] > 0.0 else 0.0
 
 
 def guess_count(layout: Layout) -> int:

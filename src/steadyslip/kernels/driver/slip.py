@@ -1,4 +1,4 @@
-"""Log and statistics of events per contact, and the distinction of slip events from slow slip."""
+"""Log and statistics of events per contact, and the distinction of slip events from slow slip and ringing."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import math
 
 from steadyslip.kernels.driver.places import events_per_contact, outputs_at, tally_at
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import SLIP_EVENT, Array, Cursor, Kind, Layout, Out, Row
+from steadyslip.kernels.layout import EVENT_SHARE, NUMBER, SLIP_EVENT, Array, Cursor, Kind, Layout, Out, Row
 
 
 def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y: Array) -> None:
-    """Store the state at the lowest velocity of a block ahead of the load point: a slip event counts from there."""
+    """Store the state at the lowest speed of a block ahead of the load point: a slip event counts from there."""
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     R[own + Row.NOW_FROM] = slowest
     R[own + Row.NOW_EVENT] = 0.0
     R[own + Row.NOW_BEGIN] = R[Row.START] + tau
-    R[own + Row.NOW_PEAK] = y[n + Out.V]
+    R[own + Row.NOW_PEAK] = R[own + Row.NOW_SIGN] * y[n + Out.V]
     R[own + Row.NOW_V] = y[n + Out.V]
     R[own + Row.NOW_SIGMA] = y[n + Out.SIGMA]
     R[own + Row.NOW_TAU] = y[n + Out.TAU]
@@ -24,24 +24,106 @@ def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: f
     R[own + Row.NOW_SEGMENT] = R[Row.SEGMENT]
 
 
-def begin_slip_event(R: Array, layout: Layout, contact: int, y: Array, log: Array, cursor: Array) -> None:
-    """Mark slip as a slip event if its velocity reaches SLIP_EVENT times both that of the load point and its lowest.
+def mark_fast(R: Array, layout: Layout, contact: int, y: Array) -> None:
+    """Mark slip as fast if its speed reaches SLIP_EVENT times both that of the load point and its lowest.
 
     While the load point rests, the velocity of the drive replaces its own.
     """
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
-    v, v_lp, share = y[n + Out.V], y[n + Out.V_LP], y[n + Out.SHARE]
+    speed, v_lp, share = R[own + Row.NOW_SIGN] * y[n + Out.V], abs(y[n + Out.V_LP]), y[n + Out.SHARE]
     asked = v_lp if v_lp > R[Row.V_LOW] * share else R[Row.V_DRIVE] * share
-    if R[own + Row.NOW_EVENT] > 0.0 or not v >= SLIP_EVENT * max(asked, R[own + Row.NOW_FROM]):
-        return
-    R[own + Row.NOW_EVENT] = 1.0
+    if speed >= SLIP_EVENT * max(asked, R[own + Row.NOW_FROM]):
+        R[own + Row.NOW_EVENT] = 1.0
+
+
+def log_begin(R: Array, layout: Layout, contact: int, kind: int, number: float, log: Array, cursor: Array) -> None:
+    """Add the begin of the slip in progress to the log, if there is one."""
     if log.shape[0] > 0:
-        i = cursor[Cursor.LOGGED]
-        log[i, 0] = Kind.SLIP_BEGINS + 2 * events_per_contact(layout) * contact
+        own, i = tally_at(layout, contact), cursor[Cursor.LOGGED]
+        log[i, 0] = kind + 2 * events_per_contact(layout) * contact
         log[i, 1], log[i, 2] = R[own + Row.NOW_BEGIN], R[own + Row.NOW_V]
         log[i, 3], log[i, 4], log[i, 5] = R[own + Row.NOW_SIGMA], R[own + Row.NOW_TAU], R[own + Row.NOW_STRESS]
-        log[i, 6], log[i, 7] = R[own + Row.NOW_X], R[own + Row.NOW_SEGMENT]
+        log[i, 6], log[i, 7], log[i, NUMBER] = R[own + Row.NOW_X], R[own + Row.NOW_SEGMENT], number
         cursor[Cursor.LOGGED] = i + 1
+
+
+def log_event(
+    R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array, cursor: Array, count: float
+) -> None:  # fmt: skip
+    """Add an event to the log, if there is one."""
+    if log.shape[0] > 0:
+        n, i = outputs_at(layout, (number - 1) // (2 * events_per_contact(layout))), cursor[Cursor.LOGGED]
+        log[i, 0], log[i, 1], log[i, 2], log[i, 3] = number, clock(R, tau), y[n + Out.V], y[n + Out.SIGMA]
+        log[i, 4], log[i, 5], log[i, 6] = y[n + Out.TAU], y[n + Out.T], y[n + Out.PLACE]
+        log[i, 7], log[i, NUMBER] = R[Row.SEGMENT], count
+        cursor[Cursor.LOGGED] = i + 1
+
+
+def count_ring(R: Array, layout: Layout, contact: int, log: Array, cursor: Array) -> None:
+    """Count forward slip that sheds little as a ring of the slip event before it."""
+    own = tally_at(layout, contact)
+    if R[own + Row.EVENT_RINGS] > 0.0:
+        R[own + Row.EVENT_RING_FREQUENCY] = 1.0 / (R[own + Row.NOW_BEGIN] - R[own + Row.LAST_RING])
+    R[own + Row.EVENT_RINGS] += 1.0
+    R[own + Row.LAST_RING] = R[own + Row.NOW_BEGIN]
+    log_begin(R, layout, contact, Kind.SLIP_BEGINS, 0.0, log, cursor)
+
+
+def begin_event(R: Array, layout: Layout, contact: int, log: Array, cursor: Array) -> None:
+    """Count the slip in progress as a slip event of its own."""
+    own = tally_at(layout, contact)
+    sign, begin = R[own + Row.NOW_SIGN], R[own + Row.NOW_BEGIN]
+    last = Row.FORWARD_BEGIN if sign > 0.0 else Row.BACKWARD_BEGIN
+    R[own + Row.RECURRENCE] = begin - R[own + last]
+    R[own + last] = begin if begin > 0.0 else math.nan  # slip that went on at the start has no known begin
+    R[own + Row.EVENTS] += 1.0
+    R[own + Row.EVENT_BEGIN] = begin
+    R[own + Row.EVENT_STRESS] = R[own + Row.NOW_STRESS]
+    R[own + Row.EVENT_X] = R[own + Row.NOW_X]
+    R[own + Row.EVENT_PEAK_VELOCITY] = sign * R[own + Row.NOW_PEAK]
+    kind = Kind.SLIP_BEGINS if sign > 0.0 else Kind.BACKWARD_BEGINS
+    log_begin(R, layout, contact, kind, R[own + Row.EVENTS], log, cursor)
+
+
+def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
+    """Tell at the end of slip what it was: a slip event, more of the one before, a ring, or too slow for any.
+
+    A slip event sheds at least EVENT_SHARE of the largest drop so far. It is more of the one before (in the same
+    direction) if the block did not rest between: the force rose by less than that share. If all that was counted before
+    shed less than EVENT_SHARE of its drop, that was ringing too, and the count begins anew.
+    """
+    n, own = outputs_at(layout, contact), tally_at(layout, contact)
+    sign, fast = R[own + Row.NOW_SIGN], R[own + Row.NOW_EVENT]
+    R[own + Row.NOW_FROM] = math.inf
+    R[own + Row.NOW_EVENT] = 0.0
+    stress, largest = y[n + Out.T], R[own + Row.LARGEST_DROP]
+    drop = sign * (R[own + Row.NOW_STRESS] - stress)
+    if not (fast > 0.0 and drop > 0.0):
+        return
+    if drop < EVENT_SHARE * largest:
+        if sign > 0.0:
+            count_ring(R, layout, contact, log, cursor)
+        return
+    if largest < EVENT_SHARE * drop:
+        R[own + Row.EVENTS] = 0.0
+        R[own + Row.FORWARD_BEGIN] = math.nan
+        R[own + Row.BACKWARD_BEGIN] = math.nan
+    lowest = R[own + Row.EVENT_STRESS] - sign * R[own + Row.EVENT_STRESS_DROP]
+    reload = sign * (R[own + Row.NOW_STRESS] - lowest)
+    again = R[own + Row.EVENTS] > 0.0 and sign * R[own + Row.EVENT_SLIP] > 0.0
+    if not (again and reload < EVENT_SHARE * max(drop, largest)):
+        begin_event(R, layout, contact, log, cursor)
+    if R[own + Row.NOW_PEAK] > sign * R[own + Row.EVENT_PEAK_VELOCITY]:
+        R[own + Row.EVENT_PEAK_VELOCITY] = sign * R[own + Row.NOW_PEAK]
+    R[own + Row.EVENT_DURATION] = clock(R, tau) - R[own + Row.EVENT_BEGIN]
+    R[own + Row.EVENT_SLIP] = y[n + Out.PLACE] - R[own + Row.EVENT_X]
+    R[own + Row.EVENT_STRESS_DROP] = sign * (R[own + Row.EVENT_STRESS] - stress)
+    R[own + Row.LARGEST_DROP] = max(largest, R[own + Row.EVENT_STRESS_DROP])
+    R[own + Row.EVENT_RINGS] = 0.0
+    R[own + Row.EVENT_RING_FREQUENCY] = math.nan
+    kind = Kind.SLIP_ENDS if sign > 0.0 else Kind.BACKWARD_ENDS
+    place = kind + 2 * events_per_contact(layout) * contact
+    log_event(R, layout, place, tau, y, log, cursor, R[own + Row.EVENTS])
 
 
 def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
@@ -49,45 +131,37 @@ def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, lo
     contact = (number - 1) // (2 * events_per_contact(layout))
     kind = number - 2 * events_per_contact(layout) * contact
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
-    time = clock(R, tau)
-    place = y[n + Out.PLACE]
-    v, stress = y[n + Out.V], y[n + Out.T]
-    if kind == Kind.SLIP_BEGINS:  # logged once it is fast enough for a slip event: see begin_slip_event
-        track_slowest(R, layout, contact, v, tau, y)
-        return
-    is_event = R[own + Row.NOW_EVENT] > 0.0
-    if kind == Kind.SLIP_ENDS:
-        R[own + Row.NOW_FROM] = math.inf
-        R[own + Row.NOW_EVENT] = 0.0
-        if not is_event:
-            return
-    if log.shape[0] > 0:
-        i = cursor[Cursor.LOGGED]
-        log[i, 0], log[i, 1], log[i, 2], log[i, 3] = number, time, v, y[n + Out.SIGMA]
-        log[i, 4], log[i, 5], log[i, 6], log[i, 7] = y[n + Out.TAU], stress, place, R[Row.SEGMENT]
-        cursor[Cursor.LOGGED] = i + 1
-    if kind == Kind.SLIP_ENDS:
-        begin = R[own + Row.NOW_BEGIN]
-        if R[own + Row.ANY_BEGIN] > 0.0:  # slip that went on at the start of the run has no known begin
-            R[own + Row.RECURRENCE] = begin - R[own + Row.EVENT_BEGIN]
-        R[own + Row.ANY_BEGIN] = 1.0 if begin > 0.0 else 0.0
-        R[own + Row.EVENTS] += 1.0
-        R[own + Row.EVENT_BEGIN] = begin
-        R[own + Row.EVENT_DURATION] = time - begin
-        R[own + Row.EVENT_SLIP] = place - R[own + Row.NOW_X]
-        R[own + Row.EVENT_STRESS_DROP] = R[own + Row.NOW_STRESS] - stress
-        R[own + Row.EVENT_PEAK_VELOCITY] = R[own + Row.NOW_PEAK]
-    elif kind == Kind.PEAK:
-        size = math.log(abs(v / y[n + Out.V_LP])) if y[n + Out.V_LP] != 0.0 else math.inf
-        if R[own + Row.LAST_PEAK_TIME] >= 0.0:
-            R[own + Row.PEAK_PERIOD] = time - R[own + Row.LAST_PEAK_TIME]
-            R[own + Row.PEAK_GROWTH] = abs(size) - abs(R[own + Row.PEAK_SIZE])
-        R[own + Row.PEAK_SIZE] = size
-        R[own + Row.LAST_PEAK_TIME] = time
-        R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
-        R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], v)
-        begin_slip_event(R, layout, contact, y, log, cursor)
+    v, sign = y[n + Out.V], R[own + Row.NOW_SIGN]
+    if kind == Kind.SLIP_BEGINS or kind == Kind.BACKWARD_BEGINS:  # logged at the end, if it is a slip event
+        R[own + Row.NOW_SIGN] = 1.0 if kind == Kind.SLIP_BEGINS else -1.0
+        track_slowest(R, layout, contact, abs(v), tau, y)
+    elif kind == Kind.SLIP_ENDS or kind == Kind.BACKWARD_ENDS:
+        if sign == (1.0 if kind == Kind.SLIP_ENDS else -1.0):
+            end_slip(R, layout, contact, tau, y, log, cursor)
+    else:
+        log_event(R, layout, number, tau, y, log, cursor, 0.0)
+    if kind == Kind.PEAK:
+        record_peak(R, layout, contact, clock(R, tau), y)
     elif kind == Kind.TROUGH:
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)
-        if not is_event and v < R[own + Row.NOW_FROM] < math.inf:  # slip before this trough was too slow for an event
-            track_slowest(R, layout, contact, v, tau, y)
+    if kind == Kind.PEAK or kind == Kind.TROUGH:
+        speed = sign * v
+        R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], speed)
+        fastest = Kind.PEAK if sign > 0.0 else Kind.TROUGH
+        if kind == fastest:
+            mark_fast(R, layout, contact, y)
+        elif R[own + Row.NOW_EVENT] == 0.0 and speed < R[own + Row.NOW_FROM] < math.inf:
+            track_slowest(R, layout, contact, speed, tau, y)  # slip before was too slow for an event
+
+
+def record_peak(R: Array, layout: Layout, contact: int, time: float, y: Array) -> None:
+    """Update the statistics of velocity peaks."""
+    n, own = outputs_at(layout, contact), tally_at(layout, contact)
+    v, v_lp = y[n + Out.V], y[n + Out.V_LP]
+    size = math.log(abs(v / v_lp)) if v_lp != 0.0 else math.inf
+    if R[own + Row.LAST_PEAK_TIME] >= 0.0:
+        R[own + Row.PEAK_PERIOD] = time - R[own + Row.LAST_PEAK_TIME]
+        R[own + Row.PEAK_GROWTH] = abs(size) - abs(R[own + Row.PEAK_SIZE])
+    R[own + Row.PEAK_SIZE] = size
+    R[own + Row.LAST_PEAK_TIME] = time
+    R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.core.format import format_quantity
-from steadyslip.kernels.layout import Recorded
+from steadyslip.kernels.layout import NUMBER, Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle
@@ -23,7 +23,7 @@ from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
 BEGINS = LOG_KINDS.index("slip begins")  # of a slip event: the block, speeding up, is as fast as the load point
-RINGS = 8  # passages per slip event, ringing included, beyond which no more events are waited for
+RINGS = 8  # passages per slip event, ringing included, for which further slip events are waited for
 RETURNS = 17  # returns that are compared: cycles with up to 16 returns per period are found
 NEAR = 0.1  # largest distance from the motion to the solution, as a share of the cycle's size
 CLOSE = 0.05  # distance below which two returns may be at one place of a cycle
@@ -115,16 +115,16 @@ def _stretches(
     runs: FlowRunner, setting: FlowSetting, state: Array, unknowns: Array | None, patience: int
 ) -> Iterator[_Stretch]:
     """Yield the motion in parts of some returns each."""
-    span, spent = FIRST_SPAN * runs.time, 0
+    span, spent, sticks = FIRST_SPAN * runs.time, 0, False
     for _ in range(patience):
         slips, passes = _Returns(), _Returns()
         low, high, speeds = [], [], []
         now = 0.0
-        while not _enough(slips, passes) and spent < MOST_STEPS * patience:
+        while not _enough(slips, passes, sticks) and spent < MOST_STEPS * patience:
             outcome = runs.watched(setting, state, span, unknowns=unknowns)
             record, log = outcome.recorded, outcome.log
             visited = record[:, Recorded.STATE : Recorded.STATE + runs.size]
-            begun = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0), 1]
+            begun = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0) & (log[:, NUMBER] > 0), 1]
             for returns, at in ((slips, begun), (passes, passages(runs, setting, record)[0])):
                 returns.add(now + at, states_between(runs, setting, record, at))
             low.append(np.arcsinh(visited.min(axis=0) / runs.scales))
@@ -133,10 +133,11 @@ def _stretches(
             if np.max(high[-1] - low[-1]) < SMALLEST:
                 yield _Stretch(np.array(slips.times), np.array(slips.states), 0.0, 0.0, _ends(speeds[-1:]))
                 return
+            sticks = sticks or len(slips.times) > 0
             state, unknowns = outcome.state[0], outcome.unknowns[0]
             now, spent = now + span, spent + len(record)
             span *= 2.0 if max(len(slips.times), len(passes.times)) < RETURNS // 2 else 1.0
-        seen = slips if len(slips.times) >= RETURNS // 2 else passes
+        seen = slips if len(slips.times) > 1 and _since(slips, passes) < RINGS * RETURNS else passes
         times, states = seen.times[-RETURNS:], seen.states[-RETURNS:]
         if len(times) < 2:
             return
@@ -157,10 +158,20 @@ class _Returns:
         self.states += list(states)
 
 
-def _enough(slips: _Returns, passes: _Returns) -> bool:
-    """True if there are enough returns to compare: starts of slip events, or all passages if events are few."""
-    few = len(passes.times) >= RETURNS and len(slips.times) < 2
-    return len(slips.times) >= RETURNS or few or len(passes.times) >= RINGS * RETURNS
+def _enough(slips: _Returns, passes: _Returns, sticks: bool) -> bool:
+    """True if there are enough returns to compare: starts of slip events, or all passages if there are none.
+
+    Ringing after a slip event passes the same place, but returns only with the next event: once a motion had one
+    (`sticks`), passages count alone only where far more of them follow than a slip rings.
+    """
+    several = len(slips.times) > 2 and len(passes.times) >= RINGS * RETURNS
+    return len(slips.times) >= RETURNS or several or _since(slips, passes) >= (RINGS if sticks else 1) * RETURNS
+
+
+def _since(slips: _Returns, passes: _Returns) -> int:
+    """Number of passages after the last slip event."""
+    last = slips.times[-1] if slips.times else -np.inf
+    return int(np.sum(np.array(passes.times) > last))
 
 
 def _ends(speeds: list[Array]) -> tuple[float, float]:
@@ -191,4 +202,15 @@ def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle 
         return None
     cycle = seen_once.cycle
     shrunk = cycle.amplitude < 0.5 * seen.amplitude
-    return None if seen_once.turns > 1 or shrunk or abs(cycle.trivial - 1) > IMPRECISE else cycle
+    sure = abs(cycle.trivial - 1) <= IMPRECISE or _closes(runs, seen, back)
+    return cycle if sure and not shrunk and seen_once.turns == 1 else None
+
+
+def _closes(runs: FlowRunner, seen: _Stretch, back: int) -> bool:
+    """True if the motion itself came back each time, several times over, whatever the precision of the multipliers.
+
+    Where a bristle rings between long rests, deviations grow and shrink by many decades within a period, and the
+    multipliers lose their digits; the motion does not.
+    """
+    places = np.arcsinh(seen.states / runs.scales)
+    return len(places) > 2 * back and bool(np.abs(places[back:] - places[:-back]).max() < SMALLEST)

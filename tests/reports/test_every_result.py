@@ -30,7 +30,7 @@ QUICK = {
     "Mode": lambda: made("MachineAnalysis").mode, "SteadyContact": lambda: made("SteadyMachine").contacts["guide"],
     "Map": lambda: ss.Map(RIG, OVER, samples=made("Samples")), "Grid": lambda: OVER["stiffness"],
     "StableWithin": lambda: ss.verdict.stable_within(RIG, {"stiffness": (1e9, 5e10)}),
-    "StableValues": lambda: made("StableWithin").each[0],
+    "ValuesWithin": lambda: made("StableWithin").each[0],
     "Samples": lambda: ss.maps.Samples({"friction.a": (0.01, 0.02)}, 2), "Explorer": lambda: ss.explore(RIG),
 }  # fmt: skip
 LONG = {

@@ -21,7 +21,6 @@ from steadyslip.experiments.fitting.speed_result import SpeedFit
 from steadyslip.experiments.measured.speeds import SpeedTable, is_loop, read_loop, read_speed_table, table_from_arrays
 from steadyslip.files.specifications.changes import named_value
 from steadyslip.files.specifications.layout import find_law
-from steadyslip.laws.friction import LuGre
 from steadyslip.laws.friction.law import FrictionLaw
 
 ERRORS = ("relative", "absolute")
@@ -30,7 +29,7 @@ ERRORS = ("relative", "absolute")
 @checked()
 def fit_friction_table(
     table: str | PathLike[str] | Mapping[str, Any] | SpeedTable,
-    law: str = LuGre.name,
+    law: str,
     *,
     load: Any = None,
     loop: str | PathLike[str] | None = None,
@@ -85,7 +84,7 @@ def fit_friction_table(
     >>> import steadyslip as ss
     >>> speed = [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2]  # m/s
     >>> table = {"speed": speed, "force": [91.2, 82.4, 64.9, 53.1, 53.3, 59.6]}
-    >>> found = ss.experiments.fit_friction_table(table, load="500 N",
+    >>> found = ss.experiments.fit_friction_table(table, "lugre", load="500 N",
     ...                                           hold={"stribeck_exponent": 1.0})
     >>> print(found["mu_coulomb"])
     mu_coulomb = 0.1012 ± 0.00092

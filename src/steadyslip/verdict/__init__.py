@@ -8,17 +8,17 @@ from steadyslip.verdict.analyze import Analysis, analyze
 from steadyslip.verdict.cures import Cures, Window, cure
 from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
-from steadyslip.verdict.unknown import StableValues, StableWithin, stable_within
+from steadyslip.verdict.unknown import StableWithin, ValuesWithin, stable_within
 
 __all__ = [
     "Adjustment",
     "Analysis",
     "Cures",
     "MachineAnalysis",
-    "StableValues",
     "StableWithin",
     "Tolerances",
     "Tolerated",
+    "ValuesWithin",
     "Window",
     "analyze",
     "cure",

@@ -29,7 +29,7 @@ LOG2_RIGS = 10  # 2**10 rigs with all of several unknown parameters varied at on
 
 
 @dataclass(frozen=True)
-class StableValues(Displayed):
+class ValuesWithin(Displayed):
     """Values of one unknown parameter at which sliding is stable, the others unchanged.
 
     Attributes
@@ -87,14 +87,14 @@ class StableWithin(ReadOnly):
     Attributes
     ----------
     rig : Slider or Machine
-    each : tuple of StableValues
+    each : tuple of ValuesWithin
         Every parameter by itself.
     stable : ndarray of bool (m,)
         Verdicts on rigs spread evenly over all intervals at once, on a log scale where both ends are above 0.
     """
 
     rig: Slider | Machine = field(repr=False)
-    each: tuple[StableValues, ...]
+    each: tuple[ValuesWithin, ...]
     stable: Array = field(repr=False)
 
     @property
@@ -164,7 +164,7 @@ def _is_stable(rig: Slider | Machine, varied: Mapping[str, Array]) -> Array:
     return np.asarray(status(operating_point(rig, varied, present_zeros(rig))) == STABLE)
 
 
-def _values(rig: Slider | Machine, name: str, low: float, high: float) -> StableValues:
+def _values(rig: Slider | Machine, name: str, low: float, high: float) -> ValuesWithin:
     share = np.linspace(0.0, 1.0, VALUES)
     found = _is_stable(rig, {name: _spread(low, high, share)})
     at = np.flatnonzero(found[1:] != found[:-1])
@@ -175,7 +175,7 @@ def _values(rig: Slider | Machine, name: str, low: float, high: float) -> Stable
         left, right = np.where(same, middle, left), np.where(same, right, middle)
     ends = [low, *_spread(low, high, (left + right) / 2).tolist(), high]
     parts = tuple((a, b) for i, (a, b) in enumerate(pairwise(ends)) if bool(found[0]) != bool(i % 2))
-    return StableValues(name, rig.parameters()[name].role.unit, low, high, parts, _load(rig))
+    return ValuesWithin(name, rig.parameters()[name].role.unit, low, high, parts, _load(rig))
 
 
 def _load(rig: Slider | Machine) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.speeds import Loop
+from steadyslip.experiments.measured.speeds import PreslidingLoop
 from steadyslip.experiments.numerics.profiled import intervals, least
 
 LEVELS = (0.6827, 0.95)
@@ -57,7 +57,7 @@ def loop_forces(displacement: Array, stiffness: float, breakaway: float, first: 
     return force, slopes
 
 
-def fit_loop(loop: Loop) -> BristleStiffness:
+def fit_loop(loop: PreslidingLoop) -> BristleStiffness:
     """Stiffness of bristles from a loop, with errors from the scatter of its forces.
 
     Raises

@@ -16,14 +16,13 @@ from steadyslip.experiments.fitting.estimate import Estimate
 from steadyslip.experiments.fitting.presliding import BristleStiffness
 from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, SteadyCurve, steady_curve
 from steadyslip.experiments.measured.speeds import SpeedTable
-from steadyslip.experiments.numerics.profiled import Minimum, intervals, least
+from steadyslip.experiments.numerics.profiled import ProfiledMinimum, intervals, least
 from steadyslip.laws.friction.law import FrictionLaw
 
 LEVELS = (0.6827, 0.95)
 """Probabilities of the intervals: one standard deviation of a normal error, and the usual one."""
-VISCOUS, EXPONENT = "viscous", "stribeck_exponent"
-HELD = {EXPONENT: 2.0, VISCOUS: 0.0}
-"""Parameters that are held, in this order, where rows are few: Gauss's exponent, no viscosity."""
+HELD = ("exponent", "viscosity")
+"""Kinds of parameters that are held, in this order, where rows are few: at their standing value, or at 0."""
 SAME = 1e-6  # relative difference of speeds or loads that count as one
 
 
@@ -146,10 +145,11 @@ def _chosen(
     if unknown := [name for name in held if name not in curve.roles]:
         raise ParameterError([Problem(unknown[0], unknown_name("parameter", unknown[0], curve.roles))])
     more = [OFFSET] if _distinct(load) > 1 else []
-    more += [DAMPING] if more and VISCOUS in curve.free else []
-    for name, value in HELD.items():
-        if name in curve.free and (len(curve.free) > speeds or len(curve.free) + len(more) >= len(speed)):
-            fixed[name] = value
+    more += [DAMPING] if more and any(curve.roles[name].kind == HELD[1] for name in curve.free) else []
+    droppable = [name for kind in HELD for name in curve.free if curve.roles[name].kind == kind]
+    for name in droppable:
+        if len(curve.free) > speeds or len(curve.free) + len(more) >= len(speed):
+            value = fixed[name] = curve.roles[name].standing or 0.0
             notes.append(f"{name} is held at {value:g}: {len(speed)} rows at {speeds} speeds do not tell it as well")
             curve = steady_curve(law, reference, fixed, ())
     while more and len(curve.free) + len(more) >= len(speed):
@@ -163,7 +163,7 @@ def _chosen(
     return (steady_curve(law, reference, fixed, more) if more else curve), notes
 
 
-def _correlation(found: Minimum) -> Array:
+def _correlation(found: ProfiledMinimum) -> Array:
     covariance = found.covariance()
     with np.errstate(all="ignore"):
         size = np.sqrt(np.diag(covariance))

@@ -12,7 +12,7 @@ from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedFindings
 from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, UNTOLD
 from steadyslip.files.specifications.layout import UNKNOWN
 
-BRISTLES, BRISTLE_DAMPING, SLIP = "bristle_stiffness", "bristle_damping", "slip distance"
+BRISTLES, BRISTLE_DAMPING, SLIP = "bristle stiffness", "bristle damping", "slip distance"
 DEFLECTION = (1e-6, 1e-5, 1e-4)
 """Least, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals give way by
 1 to 50 um (Armstrong-Helouvry 1991). Of joints, some 10 cm from their axis, ten times as many rad."""
@@ -38,13 +38,15 @@ def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
     for name, address in known.items():
         if address.role.kind == SLIP and address.value is not None:
             ranges[name] = (short, usual, long)
-    if BRISTLES in known:
-        ranges[BRISTLES] = (level / long, level / usual, level / short)
+    of_kind = {address.role.kind: name for name, address in known.items()}
+    if BRISTLES in of_kind:
+        own = (level / long, level / usual, level / short)
         if found.bristles is not None:
-            ranges[BRISTLES] = (found.bristles.low / load, found.bristles.value / load, found.bristles.high / load)
-        if BRISTLE_DAMPING in known:
-            critical = 2 * math.sqrt(ranges[BRISTLES][1] * (INERTIA if turns else MASS) / load)
-            ranges[BRISTLE_DAMPING] = (0.0, 0.0, critical)
+            own = (found.bristles.low / load, found.bristles.value / load, found.bristles.high / load)
+        ranges[of_kind[BRISTLES]] = own
+        if BRISTLE_DAMPING in of_kind:
+            critical = 2 * math.sqrt(own[1] * (INERTIA if turns else MASS) / load)
+            ranges[of_kind[BRISTLE_DAMPING]] = (0.0, 0.0, critical)
     return ranges
 
 
@@ -137,7 +139,9 @@ def _friction(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]
             lines.append(f"{name} = {_written(found, name, told[name].value)}  # {_interval(found.main, name)}")
         elif name in ranges:
             source = (
-                "from the loop" if name == BRISTLES and found.bristles is not None else f"{CHANGE}, see [{UNKNOWN}]"
+                "from the loop"
+                if address.role.kind == BRISTLES and found.bristles is not None
+                else f"{CHANGE}, see [{UNKNOWN}]"
             )
             lines.append(f"{name} = {_written(found, name, ranges[name][1])}  # {source}")
         elif address.value is not None and address.value != _default(found.main.law, name):
@@ -168,12 +172,12 @@ def _interval(one: DirectionFit, name: str) -> str:
 def _written(found: SpeedFindings, name: str, value: float) -> str:
     """TOML value of a parameter, in the units of the table; stiffness and damping of bristles at the rig's load."""
     known = parameters(found.main.law)
-    own = known[name].role.unit if name in known else "1"
+    own, kind = (known[name].role.unit, known[name].role.kind) if name in known else ("1", "")
     load = rig_load(found)
     if own == "1":
         return f"{value:.8g}"
-    if name in (BRISTLES, BRISTLE_DAMPING) and not found.table.turns:
-        scale, size = (1e-6, "N/um") if name == BRISTLES else (1e-3, "N s/mm")
+    if kind in (BRISTLES, BRISTLE_DAMPING) and not found.table.turns:
+        scale, size = (1e-6, "N/um") if kind == BRISTLES else (1e-3, "N s/mm")
         return f'"{value * load * scale:.6g} {size} at {load:.6g} N"'
     if own == "m/s" and not found.table.turns:
         return f'"{value / unit(found.table.speed_unit)[0]:.8g} {found.table.speed_unit}"'

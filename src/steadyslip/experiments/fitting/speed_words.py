@@ -11,7 +11,7 @@ from steadyslip.core.format import display_units, format_quantity, format_with_e
 from steadyslip.core.records import parameters
 from steadyslip.core.version import stamped
 from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedEstimate, SpeedFindings
-from steadyslip.experiments.fitting.speed_rig import untold
+from steadyslip.experiments.fitting.speed_rig import BRISTLES, untold
 
 CLOSE = 0.95  # correlation from which two parameters are told to stand for each other
 
@@ -30,7 +30,8 @@ def words(found: SpeedFindings) -> str:
         low, high = (format_quantity(end, size) for end in (found.bristles.low, found.bristles.high))
         value = format_quantity(found.bristles.value, size)
         lines.append(f"bristle stiffness {value}{at}, from the loop (95 %: {low} to {high})")
-    names = [name for name in untold(found) if found.bristles is None or name != "bristle_stiffness"]
+    known = parameters(found.main.law)
+    names = [name for name in untold(found) if found.bristles is None or known[name].role.kind != BRISTLES]
     if names:
         told = f"The table does not tell {' and '.join(names)}"
         lines.append(f"{told}: the rig file carries intervals, which analyze answers for.")

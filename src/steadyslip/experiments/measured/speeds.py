@@ -78,7 +78,7 @@ class SpeedTable:
 
 
 @dataclass(frozen=True)
-class Loop:
+class PreslidingLoop:
     """Force over displacement before sliding, in the order of measurement.
 
     Attributes
@@ -193,7 +193,7 @@ def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:
     )  # fmt: skip
 
 
-def read_loop(path: str | PathLike[str], **columns: Any) -> Loop:
+def read_loop(path: str | PathLike[str], **columns: Any) -> PreslidingLoop:
     """Read a table of displacement and force (or angle and torque) before sliding.
 
     Raises
@@ -207,7 +207,7 @@ def read_loop(path: str | PathLike[str], **columns: Any) -> Loop:
         raise _fault(str(path), "displacement", "a loop before sliding has columns of displacement and force")
     x, f = found["displacement"][0], found[kind][0].values
     keep = np.isfinite(x.values) & np.isfinite(f)
-    return Loop(str(path), x.values[keep], f[keep], unit(x.unit)[1].angle == 1, tuple(notes))
+    return PreslidingLoop(str(path), x.values[keep], f[keep], unit(x.unit)[1].angle == 1, tuple(notes))
 
 
 def is_loop(path: str | PathLike[str]) -> bool:

@@ -26,7 +26,7 @@ EXACT = 1e-20  # mean square residual below which there is no noise to estimate,
 
 
 @dataclass(frozen=True)
-class Minimum:
+class ProfiledMinimum:
     """Least squares within bounds.
 
     Attributes
@@ -66,7 +66,7 @@ class Minimum:
         return np.asarray((vectors / values) @ vectors.T * self.variance / np.outer(size, size))
 
 
-def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) -> Minimum:
+def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) -> ProfiledMinimum:
     """Least sum of squares within bounds, the best of searches from several starts."""
     from scipy.optimize import least_squares
 
@@ -76,7 +76,7 @@ def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) ->
         lambda at: residuals(at)[0], np.clip(start, low, high), lambda at: residuals(at)[1], bounds=(low, high),
         x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return Minimum(residuals, found.x, float(2 * found.cost), low, high)
+    return ProfiledMinimum(residuals, found.x, float(2 * found.cost), low, high)
 
 
 def _descended(residuals: Residuals, start: Array, low: Array, high: Array, free: Array) -> tuple[Array, float]:
@@ -117,18 +117,18 @@ class _Improved(Exception):
         self.at = at
 
 
-def intervals(minimum: Minimum, levels: tuple[float, ...]) -> tuple[Minimum, Array]:
+def intervals(minimum: ProfiledMinimum, levels: tuple[float, ...]) -> tuple[ProfiledMinimum, Array]:
     """Intervals of every parameter from its profile and Student's t, the noise estimated.
 
     Parameters
     ----------
-    minimum : Minimum
+    minimum : ProfiledMinimum
     levels : tuple of float
         Probabilities, such as 0.6827 and 0.95.
 
     Returns
     -------
-    minimum : Minimum
+    minimum : ProfiledMinimum
         That given, or a better one that was found on the way.
     ends : ndarray (p, levels, 2)
         Infinite where a bound is reached before the sum of squares tells against the value.
@@ -145,7 +145,7 @@ def intervals(minimum: Minimum, levels: tuple[float, ...]) -> tuple[Minimum, Arr
     return minimum, np.full((len(minimum.at), len(levels), 2), (-np.inf, np.inf))
 
 
-def _ends(minimum: Minimum, i: int, limits: list[float]) -> Array:
+def _ends(minimum: ProfiledMinimum, i: int, limits: list[float]) -> Array:
     """Ends of the intervals of one parameter (levels, 2) at limits of t."""
     error = float(np.sqrt(minimum.covariance()[i, i]))
     own = float(minimum.at[i])
@@ -156,7 +156,7 @@ def _ends(minimum: Minimum, i: int, limits: list[float]) -> Array:
     return np.array([[_end(minimum, i, t, side * step) for side in (-1.0, 1.0)] for t in limits])
 
 
-def _end(minimum: Minimum, i: int, limit: float, step: float) -> float:
+def _end(minimum: ProfiledMinimum, i: int, limit: float, step: float) -> float:
     """Value beyond which the sum of squares exceeds its least by t² times the variance; infinite without one."""
     from scipy.optimize import brentq
 

@@ -28,7 +28,9 @@ class Coulomb(FrictionLaw, name="coulomb"):
     mu_static: float | None = parameter(
         "1", positive, "friction coefficient at rest μ_S; μ_C unless given", default=None
     )
-    viscous: float = parameter("s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0)
+    viscous: float = parameter(
+        "s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0, kind="viscosity"
+    )
 
     def conditions(self) -> Iterator[Condition]:
         if self.mu_static is not None:
@@ -59,9 +61,11 @@ class StribeckCurve(FrictionLaw):
     mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
     mu_static: float = parameter("1", positive, "static friction coefficient μ_S")
     v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S", kind="velocity scale")
-    viscous: float = parameter("s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0)
+    viscous: float = parameter(
+        "s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0, kind="viscosity"
+    )
     stribeck_exponent: float | None = parameter(
-        "1", positive, "Stribeck exponent δ_S; 2 unless given", default=None, standing=2.0
+        "1", positive, "Stribeck exponent δ_S; 2 unless given", default=None, standing=2.0, kind="exponent"
     )
 
     def _curve(self, v: Expression) -> Expression:
@@ -104,8 +108,12 @@ class LuGre(StribeckCurve, name="lugre"):
     τ = σ[σ0 z + σ1 ż + σ2 v], ż = v − σ0 |v| z/g(v), with the mean bristle deflection z (m) as memory.
     """
 
-    bristle_stiffness: float = parameter("1/m", positive, "bristle stiffness σ0, per unit normal stress")
-    bristle_damping: float = parameter("s/m", nonnegative, "bristle damping σ1, per unit normal stress", default=0.0)
+    bristle_stiffness: float = parameter(
+        "1/m", positive, "bristle stiffness σ0, per unit normal stress", kind="bristle stiffness"
+    )
+    bristle_damping: float = parameter(
+        "s/m", nonnegative, "bristle damping σ1, per unit normal stress", default=0.0, kind="bristle damping"
+    )
 
     def memory(self) -> tuple[str, ...]:
         return ("z",)

@@ -7,6 +7,7 @@ evenly between the ends unless ``(normal)`` is written: then the half-width is o
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -104,6 +105,8 @@ def _width(number: str, share: str | None, found: re.Match[str]) -> tuple[str, s
 
 def _range(found: re.Match[str], text: str, normal: bool) -> tuple[str, Tolerance]:
     low, high, unit = Fraction(found["low"]), Fraction(found["high"]), found["last"].strip()
+    if max(abs(low), abs(high)) > sys.float_info.max:
+        raise QuantityError(f"{repr_short(text)} is no range: its ends must be finite; write for example '10..14 N/um'")
     if normal or not low < high:
         why = "a range has no standard deviation" if normal else "its first end must be the lower one"
         raise QuantityError(f"{repr_short(text)} is no range: {why}; write for example '10..14 N/um'")

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array, valid_together
-from steadyslip.core.domains import nonnegative, positive
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, QuantityError
 from steadyslip.core.names import resolve
 from steadyslip.core.records import Address
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance, read_tolerance
+from steadyslip.files.specifications.deviations import ends_of
 from steadyslip.files.specifications.tolerances import Tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -166,29 +167,16 @@ def spreads_of(rig: Slider | Machine, tolerances: Tolerances | Mapping[str, Any]
 
 
 def _spread(rig: Slider | Machine, name: str, one: Address, tolerance: Any) -> Spread:
-    value, area = float(one.value or 0.0), rig.area_of(name)
+    value, domain = float(one.value or 0.0), one.role.domain
     if isinstance(tolerance, str):
         tolerance = read_tolerance(tolerance)
     if not isinstance(tolerance, Tolerance):
         half = Parameter(one.role.unit, positive, "tolerance").checked(tolerance)
-        low, high, normal, relative = value - half, value + half, False, False
-    else:
-        low = value - _half_width(one, tolerance.below, area)
-        high = value + _half_width(one, tolerance.above, area)
-        normal, relative = tolerance.normal, tolerance.above.endswith("%")
-    if not low < high:
-        raise ParameterError([Problem(name, "got a tolerance of zero; leave it out")])
-    for end in () if normal else (low, high):
-        one.role.checked(end)
-    domain = one.role.domain
-    return Spread(value, float(low), float(high), normal, domain.low, domain.high, relative)
-
-
-def _half_width(one: Address, text: str, area: float | None) -> float:
-    """Largest deviation of a parameter to one side, SI units, from a percentage or text with a unit."""
-    if text.endswith("%"):
-        return 0.01 * float(text[:-1]) * abs(float(one.value or 0.0))
-    return Parameter(one.role.unit, nonnegative, "tolerance").read(text, area)
+        width = f"{half!r} {one.role.unit}".removesuffix(" 1")
+        tolerance = Tolerance(width, width)
+    low, high = ends_of(rig, name, tolerance)
+    relative = tolerance.above.endswith("%")
+    return Spread(value, low, high, tolerance.normal, domain.low, domain.high, relative)
 
 
 def _mixing(of: Mapping[str, Spread], pairs: Sequence[tuple[str, str, float]]) -> Array:

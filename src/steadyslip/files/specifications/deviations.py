@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
-from steadyslip.core.errors import Problem, QuantityError
-from steadyslip.core.roles import Schema
+from steadyslip.core.domains import nonnegative
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError
+from steadyslip.core.roles import Parameter, Schema
 from steadyslip.core.tolerances import Tolerance, split_tolerance
 from steadyslip.files.specifications.layout import machine_sections, sections
 from steadyslip.files.specifications.toml import Table
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 
 _PAIR = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
 SCHEMA: Schema = {
@@ -49,6 +53,49 @@ def taken_out(tables: Table) -> tuple[dict[str, Tolerance], list[Problem]]:
         if parts is not None:
             owner[key], found[path] = parts
     return found, problems
+
+
+def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[float, float]:
+    """Values at the largest deviations of a parameter to either side, SI units.
+
+    Raises
+    ------
+    ParameterError
+        Naming no field, if a deviation is of another dimension, both are zero, or a value that is not normally
+        distributed could leave its domain.
+    """
+    one = rig.parameters()[name]
+    value = float(one.value or 0.0)
+
+    def half_width(text: str) -> float:
+        if text.endswith("%"):
+            return 0.01 * float(text[:-1]) * abs(value)
+        return Parameter(one.role.unit, nonnegative, "tolerance").read(text, rig.area_of(name))
+
+    low, high = value - half_width(tolerance.below), value + half_width(tolerance.above)
+    if not low < high:
+        raise ParameterError([Problem("", "got a tolerance of zero; leave it out")])
+    for end in () if tolerance.normal else (low, high):
+        try:
+            one.role.checked(end)
+        except ParameterError as error:
+            raise ParameterError([Problem("", f"a tolerance too wide: {error.problems[0].message}")]) from error
+    return low, high
+
+
+def wrong_ends(rig: Slider | Machine, written: Mapping[str, Tolerance]) -> list[Problem]:
+    """Problems of tolerances that were written in values, by the keys that lead to them."""
+    problems: list[Problem] = []
+    for path, tolerance in written.items():
+        with suppress(UnknownNameError):  # reported where tolerances are used
+            name = rig.resolve(path)
+            if rig.parameters()[name].value is None:
+                continue
+            try:
+                ends_of(rig, name, tolerance)
+            except ParameterError as error:
+                problems += [Problem(path, one.message) for one in error.problems]
+    return problems
 
 
 def _texts(table: Any, path: str) -> Iterator[tuple[str, Any, Any, str]]:

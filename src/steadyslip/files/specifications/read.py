@@ -27,7 +27,7 @@ from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.files.specifications.changes import apply, full_name, split
-from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, taken_out
+from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, taken_out, wrong_ends
 from steadyslip.files.specifications.layout import (
     MAP,
     PROTOCOL,
@@ -254,6 +254,8 @@ def read_tables(
     said = {name: one for name, one in found.items() if one is not None}
     rig = found_rig if isinstance(found_rig, Slider) else None
     machine = found_rig if isinstance(found_rig, Machine) else None
+    if found_rig is not None:
+        faults += wrong_ends(found_rig, tolerances)
     wrong = {one.name for one in faults}  # told once, as a tolerance
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
     return RigFileContents(source, rig, machine, protocol, said, problems, changed, lines, tables, tolerances)

@@ -65,7 +65,7 @@ class Problem:
         return Problem(name, self.message, self.line)
 
 
-SHOWN = 40
+SHOWN = 30
 """Number of problems listed in a message (chosen by trial); `ParameterError.problems` has all of them."""
 
 

@@ -338,7 +338,8 @@ class _ContentsReader(TableReader):
     def _drive(self, table: Table, bodies: Mapping[str, Any] | None) -> FrozenRecord | None:
         """Read the drive of a machine, its velocity in the unit of the body named by ``velocity_of``."""
         control = str(table.get(*MachineDrive.chosen_by))
-        driven, feed = ((bodies or {}).get(str(table.get(key))) for key in ("body", "velocity_of"))
+        named = (table.get(key) for key in ("body", "velocity_of"))
+        driven, feed = (bodies.get(name) if bodies and isinstance(name, str) else None for name in named)
         kinds: Mapping[str, Any] = MachineDrive.registry
         law = kinds.get(control)
         if driven is not None and law is not None and driven.turns != law.turns:

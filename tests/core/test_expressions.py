@@ -100,6 +100,14 @@ def test_what_leaves_floating_point_is_no_traceback():
     assert [str(float(one)) for one in found] == ["inf", "-inf", "inf", "nan", "nan", "nan", "inf"]
 
 
+@pytest.mark.parametrize("size", [sp.pi**700, sp.Integer(10) ** 400, sp.Pow(sp.pi, -700) ** -1])
+def test_constants_beyond_floating_point_are_infinite(size):
+    x = sp.Symbol("x", real=True)
+    several = ArrayFunction([x], [size * x])
+    assert several(2.0) == [np.inf]
+    assert several.rows(np.array([[-1.0]])) == -np.inf
+
+
 def test_functions_that_arrays_do_not_have_are_named():
     with pytest.raises(ss.NotAvailable, match=r"zeta\(\.\.\.\)"):
         ArrayFunction([X], [sp.zeta(X)])

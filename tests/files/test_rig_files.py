@@ -16,6 +16,7 @@ import steadyslip as ss
 from command import run
 from file_schema import file_schema
 from steadyslip.core.entries import Option
+from steadyslip.core.errors import SHOWN
 from steadyslip.core.roles import Parameter, Role
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import own_fields, sections
@@ -363,4 +364,4 @@ def test_a_message_has_an_end():
     assert len(caught.value.problems) > 500
     assert len(shown) < 20_000
     assert f"{len(caught.value.problems)} problems" in shown
-    assert f"... and {len(caught.value.problems) - 40} more" in shown
+    assert f"... and {len(caught.value.problems) - SHOWN} more" in shown

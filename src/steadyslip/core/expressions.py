@@ -233,7 +233,7 @@ class _Text:
             return f"sqrt({self._of(base)})"
         if exponent == 2:
             return f"square({self._of(base)})"
-        if exponent.is_Integer:
+        if exponent.is_Integer and not base.is_number:  # ** of two Python floats raises where NumPy's is inf
             return f"({self._of(base)}**{exponent})"
         return f"power({self._of(base)}, {self._of(exponent)})"  # ** of Python floats is complex where NumPy's is NaN
 

@@ -4,6 +4,7 @@
     python3 run.py analyze examples/inclined-spring.toml   any steadyslip command
     python3 run.py test                                    the tests
     python3 run.py test --oldest                           a fast part of them with the oldest supported versions
+    python3 run.py build                                   source distribution and wheel, into dist
     python3 run.py check                                   lint, format, types, import layers
 
 The first call makes a virtual environment in .venv beside this file and installs the pinned versions
@@ -72,6 +73,9 @@ def main(arguments):
     if command == "test":
         install(NEWEST, "test")
         return call(NEWEST.python, "-m", "pytest", *rest, folder=HERE)
+    if command == "build":
+        install(NEWEST, "test")
+        return call(NEWEST.python, "-m", "hatchling", "build", *rest, folder=HERE)
     if command == "check":
         install(NEWEST, "test")
         return max([call(os.path.join(NEWEST.bin, name), *options, folder=HERE) for name, *options in CHECKS])

@@ -1,14 +1,17 @@
 """What is shipped: the source distribution holds every file that its own README names."""
 
+import os
 import re
 import shutil
 import subprocess
+import sys
 import tarfile
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from command import run
 from steadyslip.core.version import RELEASE, digest
 
 ROOT = Path(__file__).parents[2]
@@ -54,6 +57,39 @@ def test_wheel_and_source_distribution_are_the_program_of_the_checkout(tmp_path)
     assert digest(unpacked / "src" / "steadyslip") == own
     assert digest(tmp_path / "wheel" / "steadyslip") == own
     assert Path(wheel).name.startswith(f"steadyslip-{RELEASE}-")
+
+
+def test_the_wheel_brings_the_examples(tmp_path):
+    """And copies them, outside a checkout: README's first command works on a copy."""
+    from hatchling.builders.wheel import WheelBuilder
+
+    (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+    shutil.unpack_archive(wheel, tmp_path / "wheel", "zip")
+    apart = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path / "wheel")}, "check": True}
+    program = [sys.executable, "-m", "steadyslip"]
+    subprocess.run([*program, "examples", "-o", "examples"], **apart, stdout=subprocess.DEVNULL)
+    command = [*program, "analyze", "examples/inclined-spring.toml"]
+    assert b"29.07 GPa/m" in subprocess.run(command, **apart, stdout=subprocess.PIPE).stdout
+    listed = [path.relative_to(ROOT) for path in (ROOT / "examples").rglob("*") if path.is_file()]
+    assert len(listed) > 15
+    for path in listed:
+        assert (tmp_path / path).read_bytes() == (ROOT / path).read_bytes()
+
+
+def test_examples_are_listed_and_no_file_of_a_user_is_replaced(tmp_path):
+    listed = run("examples").stdout
+    for path in (ROOT / "examples").rglob("*.toml"):
+        assert re.search(rf"(?m)^{path.relative_to(ROOT / 'examples').as_posix()} +\w[\w ]", listed), path
+    assert run("examples", "-o", "mine", folder=tmp_path).returncode == 0
+    assert run("examples", "-o", "mine", folder=tmp_path).returncode == 0  # the same again changes nothing
+    (tmp_path / "mine/triaxial.toml").write_text("mine")
+    (tmp_path / "mine/stick-slip.toml").unlink()
+    refused = run("examples", "-o", "mine", folder=tmp_path)
+    assert (refused.returncode, refused.stderr.count("triaxial.toml")) == (2, 1)
+    assert (tmp_path / "mine/triaxial.toml").read_text() == "mine"
+    assert not (tmp_path / "mine/stick-slip.toml").exists()
+    (tmp_path / "file").touch()
+    assert "Traceback" not in run("examples", "-o", "file", folder=tmp_path).stderr
 
 
 def test_oldest_pins_are_the_declared_floors():

@@ -567,6 +567,23 @@ def reproduce(
 
 
 @app.command()
+def examples(
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="folder to copy them to")] = None,
+) -> None:
+    """The example files that come with the package: a list, or copies to work on."""
+    from steadyslip.files.examples import copy_examples, example_files
+
+    if output is None:
+        listed = {name: about for name, about in example_files().items() if about}
+        width = max(map(len, listed))
+        print_text("\n".join(f"{name:{width}}  {about}" for name, about in listed.items()))
+        print_text("\n'steadyslip examples -o examples' copies them to the folder examples")
+        return
+    for path in copy_examples(output):
+        print_text(f"wrote {path}")
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of the files that are read: rigs, protocols, maps and fits."""
     from steadyslip.schemas import json_schema

@@ -1,0 +1,74 @@
+"""Example files that come with the package: a list of them, and copies to work on."""
+
+from __future__ import annotations
+
+import re
+from os import PathLike
+from pathlib import Path
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.files.output import whole_file
+
+_PACKAGE = Path(__file__).parents[1]
+_PLACES = (_PACKAGE / "examples", _PACKAGE.parents[1] / "examples")
+"""Folder of the examples in an installed package, and in a checkout, which holds the only copy."""
+_HEADLINE = re.compile(r"(?s)# (.*?)(?:[.](?=\s+[A-Z])|[:;]\s|\?|\s\(|[.]?\s*\Z)")
+"""First statement of the comment at the head of a file, without what stands in brackets."""
+
+
+def example_files() -> dict[str, str]:
+    """First statement of each example file by its name, such as ``machines/feed-axis.toml``; data without any.
+
+    Raises
+    ------
+    NotAvailable
+        If the package was installed without them.
+    """
+    folder = _folder()
+    found = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+    return {name: _headline(folder / name) for name in sorted(found, key=lambda name: (name.count("/"), name))}
+
+
+def copy_examples(folder: str | PathLike[str]) -> list[Path]:
+    """Paths of the example files, all of them copied into a folder, which is made if missing.
+
+    Files that are there already with the same content are left; nothing is written if one has other content.
+
+    Raises
+    ------
+    NotAvailable
+        If a file of the folder differs from the example of that name, or cannot be written.
+    """
+    source, goal = _folder(), Path(folder)
+    contents = {goal / name: (source / name).read_bytes() for name in example_files()}
+    try:
+        changed = [str(path) for path, content in contents.items() if path.exists() and path.read_bytes() != content]
+        if changed:
+            raise NotAvailable(
+                f"cannot copy the examples to {str(goal)!r}: {', '.join(changed)} differ from the examples;"
+                " name another folder, or move them"
+            )
+        for path, content in contents.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with whole_file(path) as temporary:
+                Path(temporary).write_bytes(content)
+    except OSError as error:
+        raise NotAvailable(f"cannot copy the examples to {str(goal)!r}: {error.strerror or error}") from error
+    return list(contents)
+
+
+def _folder() -> Path:
+    for place in _PLACES:
+        if (place / "inclined-spring.toml").is_file():
+            return place
+    raise NotAvailable("this installation has no examples; install the wheel or work in a checkout")
+
+
+def _headline(path: Path) -> str:
+    """First statement of the comment at the head of a TOML file, on one line; empty for other files."""
+    if path.suffix != ".toml":
+        return ""
+    head = re.match(r"(?:#.*\n)*", path.read_text(encoding="utf-8"))
+    words = " ".join(line.removeprefix("#").strip() for line in (head[0] if head else "").splitlines())
+    found = _HEADLINE.match(f"# {words}")
+    return found[1] if found else ""

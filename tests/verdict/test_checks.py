@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import steadyslip as ss
 from edges_at_random import drawn
+from machines import at_random
 from rigs_of_theory import LAWS, rig
 from steadyslip.core.checks import in_words
 from steadyslip.core.errors import SteadyslipError
@@ -100,6 +101,19 @@ def test_an_edge_that_is_none_is_left_out():
     assert [one.passed for one in found if "friction.b" in one.what] == [False]
     assert all(one.passed for one in found if "friction.b" not in one.what)
     assert in_words(found).startswith(f"not decided: edge of friction.b at {wrong.value:.6g}; checked: ")
+
+
+def test_an_edge_of_a_parameter_that_hardly_moves_the_root_is_kept():
+    """A dashpot at a post that hardly moves, just beside the edge of the gain: within 1e-5 of it rounding decides."""
+    values = {"links.l4.damping": 0.04557352634950696, "contacts.c0.friction.b": 0.581503327157371}
+    values |= {"contacts.c1.friction.mu_ref": 0.81207, "drive.kp": 169.11}
+    machine, name = at_random(100)[0].with_values(values), "links.l4.damping"
+    (margin,) = [one for one in margins(machine) if one.parameter == name]
+    kept, found = edge_checks(machine, [margin], 0)
+    assert kept == (margin,)
+    assert all(one.passed for one in found)
+    sides = [ss.stability(machine.with_values({name: factor * margin.edge.value})) for factor in (0.99, 1.01)]
+    assert sides == ["stable", "unstable"]
 
 
 def test_where_the_growth_rate_touches_zero_it_is_said_to_touch():

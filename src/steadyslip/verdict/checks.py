@@ -42,8 +42,8 @@ SIDE_OFFSETS = (1e-7, 1e-5, 1e-9)
 """Distances from an edge, relative to its value, at which both sides are checked, in this order, until they agree with
 the edge. Chosen by trial: too near, rounding decides; too far, another edge lies between."""
 FURTHER_OFFSETS = (1e-3, 1e-2)
-"""Distances tried then, where the equations become ill-posed: roots under several delays are too many to be counted
-nearer to that."""
+"""Distances tried then, where the equations become ill-posed, as roots under several delays are too many to be counted
+nearer to that, and where a root lies on the axis that the parameter hardly moves."""
 AXIS_TOLERANCE = 1e-6
 """Allowed distance of a root from the imaginary axis at the critical stiffness, relative to the size of the root.
 Chosen by trial, as `GOOD` is."""
@@ -206,26 +206,48 @@ def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple
         checks.append(Check("edges of other parameters", "counts of roots under several delays", np.inf, 0.0, False))
     if not edges:
         return tuple(margins), tuple(checks)
-    shares = np.full(len(edges), np.inf)
-    for share in (*SIDE_OFFSETS, *FURTHER_OFFSETS):
-        among = [share in SIDE_OFFSETS or edge.kind == "ill-posed" for _, edge in edges]
-        rest = np.flatnonzero(np.isinf(shares) & among)
-        if rest.size:
+    shares, touching = np.full(len(edges), np.inf), np.full(len(edges), np.inf)
+    _find_sides(rig, edges, shares, SIDE_OFFSETS, branch)
+    lost = np.flatnonzero(np.isinf(shares))
+    touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
+    alone = [_room(*one) > max(FURTHER_OFFSETS) for one in edges]
+    slow = [edge.kind == "ill-posed" for _, edge in edges] | ((touching <= AXIS_TOLERANCE) & alone)
+    _find_sides(rig, edges, shares, FURTHER_OFFSETS, branch, slow)
+    lost = np.flatnonzero(np.isinf(shares))
+    for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
+        where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
+        if math.isinf(share) and touching[i] <= AXIS_TOLERANCE:
+            what, how = f"{edge.parameter} touches an edge at {where}", "a root on the imaginary axis, sides alike"
+            checks.append(check(what, how, touching[i], AXIS_TOLERANCE))
+        else:
+            most = max(SIDE_OFFSETS if math.isinf(share) else (*SIDE_OFFSETS, share))
+            checks.append(check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, most))
+    return without_edges(margins, [edges[i][1] for i in lost]), tuple(checks)
+
+
+def _find_sides(
+    rig: Rig,
+    edges: Sequence[tuple[Margin, Boundary]],
+    shares: Array,
+    offsets: Sequence[float],
+    branch: int,
+    among: NDArray[np.bool_] | bool = True,
+) -> None:
+    """Write into `shares` the first offset at which both sides of an edge agree with it, where none is known."""
+    for share in offsets:
+        rest = np.flatnonzero(np.isinf(shares) & among).tolist()
+        if rest:
             sides = _sides(rig, [edges[i] for i in rest], share, branch)
             shares[rest] = [
                 share if _sides_agree(edges[i][1], *pair) else np.inf for i, pair in zip(rest, sides, strict=True)
             ]
-    lost = np.flatnonzero(np.isinf(shares))
-    touching = dict(zip(lost.tolist(), _touching(rig, [edges[i] for i in lost], branch), strict=True))
-    for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
-        where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
-        if touching.get(i, np.inf) <= AXIS_TOLERANCE:
-            what, how = f"{edge.parameter} touches an edge at {where}", "a root on the imaginary axis, sides alike"
-            checks.append(check(what, how, touching[i], AXIS_TOLERANCE))
-        else:
-            most = max(FURTHER_OFFSETS if edge.kind == "ill-posed" else SIDE_OFFSETS)
-            checks.append(check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, most))
-    return without_edges(margins, [edges[i][1] for i in lost]), tuple(checks)
+
+
+def _room(margin: Margin, edge: Boundary) -> float:
+    """Half the distance of an edge to the next of its parameter, relative to its value; inf for the only edge."""
+    others = [abs(one.value - edge.value) for one in margin.edges if one is not edge]
+    size = abs(edge.value) or abs(margin.value) or margin.searched[1]
+    return 0.5 * min(others, default=math.inf) / size
 
 
 def _touching(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], branch: int) -> Array:

@@ -4,6 +4,7 @@
     python3 run.py analyze examples/inclined-spring.toml   any steadyslip command
     python3 run.py test                                    the tests
     python3 run.py test --oldest                           a fast part of them with the oldest supported versions
+    python3 run.py docs                                    the site, into build/site
     python3 run.py build                                   source distribution and wheel, into dist
     python3 run.py check                                   lint, format, types, import layers
 
@@ -73,6 +74,9 @@ def main(arguments):
     if command == "test":
         install(NEWEST, "test")
         return call(NEWEST.python, "-m", "pytest", *rest, folder=HERE)
+    if command == "docs":
+        install(NEWEST, "docs")
+        return call(NEWEST.python, os.path.join(HERE, "docs", "site", "build.py"), *rest)
     if command == "build":
         install(NEWEST, "test")
         return call(NEWEST.python, "-m", "hatchling", "build", *rest, folder=HERE)
@@ -89,8 +93,8 @@ def install(home, extra=""):
     for name in (home.pins, os.path.join(HERE, "pyproject.toml")):
         with open(name, "rb") as file:
             state.update(file.read())
-    for wanted in {extra, "test"}:  # an environment for tests serves for use too
-        stamp = os.path.join(home.path, "installed-%s" % (wanted or "use"))
+    for wanted in (extra,) if extra else ("use", "test"):  # an environment for tests serves for use too
+        stamp = os.path.join(home.path, "installed-%s" % wanted)
         if os.path.exists(stamp) and open(stamp).read() == state.hexdigest():
             return
     print("setting up %s (once) ..." % os.path.basename(home.path), file=sys.stderr, flush=True)

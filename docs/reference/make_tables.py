@@ -401,17 +401,19 @@ def python_page() -> str:
     top = {name for found in names.values() for name in found}
     for part in names[""]:
         module = getattr(steadyslip, part)
-        named = MODULES[part] if part in MODULES else module_names(module)
-        own = [name for name in named if name not in top]
+        own = [name for name in names_of(part) if name not in top]
         if own:
             lines += listed(f"### `steadyslip.{part}`", {f"{part}.{name}": getattr(module, name) for name in own})
     return "\n".join(lines).rstrip() + "\n"
 
 
-def module_names(module) -> list[str]:
+def names_of(part: str) -> tuple[str, ...]:
     """Classes and functions of a module's ``__all__``; values such as `laws.positive` are left out."""
+    if part in MODULES:
+        return MODULES[part]
+    module = getattr(steadyslip, part)
     kinds = inspect.isclass, inspect.isfunction
-    return [name for name in module.__all__ if any(is_kind(getattr(module, name)) for is_kind in kinds)]
+    return tuple(name for name in module.__all__ if any(is_kind(getattr(module, name)) for is_kind in kinds))
 
 
 PAGES = {"rig-file.md": rig_page, "fit-file.md": fit_page, "map-file.md": map_page, "python.md": python_page}

@@ -50,24 +50,24 @@ class Spec(Displayed):
     rig : Slider
     protocol : Protocol or None
     record : RecordSettings
-            Format of the records.
-        options : dict
-            Arguments of `fit`.
-        laws : tuple of str
-            Labels of laws to compare; empty unless the file lists some.
-        undecided : tuple of str
-            Labels of laws to compare if the normal stress changes in a record and the file names no memory of it: all
-            memories, and unless the file names an evolution law the slip and the aging law with each.
-        windows : bool
-            True if every step of a record is a record of its own.
-        v_ref_given : bool
-            True if the file gives the velocity at which mu_ref holds; otherwise that at the start of the first record.
-        contact_given : bool
-            True if the file has a table ``[contact]`` with a value.
-        drive_given : bool
-            True if the file gives the initial velocity of the drive; otherwise it is that of the records.
-        population : PopulationSettings or None
-            Settings of a population, if every record is an experiment of its own.
+        Format of the records.
+    options : dict
+        Arguments of `fit`.
+    laws : tuple of str
+        Labels of laws to compare; empty unless the file lists some.
+    undecided : tuple of str
+        Labels of laws to compare if the normal stress changes in a record and the file names no memory of it: all
+        memories, and unless the file names an evolution law the slip and the aging law with each.
+    windows : bool
+        True if every step of a record is a record of its own.
+    v_ref_given : bool
+        True if the file gives the velocity at which mu_ref holds; otherwise that at the start of the first record.
+    contact_given : bool
+        True if the file has a table ``[contact]`` with a value.
+    drive_given : bool
+        True if the file gives the initial velocity of the drive; otherwise it is that of the records.
+    population : PopulationSettings or None
+        Settings of a population, if every record is an experiment of its own.
     """
 
     rig: Slider

@@ -42,17 +42,17 @@ class Precision(ReadOnly):
     errors : dict of str to float
         Standard deviations, SI units; inf where the experiment does not determine a parameter.
     relative : dict of str to float
-            Standard deviations as shares of the parameters.
-        correlation : ndarray (p, p)
-            Correlation of the estimates; NaN where one is not determined.
-        unidentified : tuple of Combination
-            Combinations of parameters that the experiment does not determine.
-        noise : float
-            Standard deviation of friction in each sample.
-        samples : int
-            Number of samples.
-        area : float or None
-            Contact area of the rig, m²; if given, text shows totals for the whole contact.
+        Standard deviations as shares of the parameters.
+    correlation : ndarray (p, p)
+        Correlation of the estimates; NaN where one is not determined.
+    unidentified : tuple of Combination
+        Combinations of parameters that the experiment does not determine.
+    noise : float
+        Standard deviation of friction in each sample.
+    samples : int
+        Number of samples.
+    area : float or None
+        Contact area of the rig, m²; if given, text shows totals for the whole contact.
     """
 
     protocol: Protocol
@@ -95,11 +95,11 @@ def precision(
     noise : float
         Standard deviation of friction, sample by sample, independent.
     until : float, optional
-            End of the experiment, s; the protocol's own unless given.
-        samples : int
-            Number of evenly spaced samples.
-        trend : int
-            Order of the polynomial trend that is fitted too.
+        End of the experiment, s; the protocol's own unless given.
+    samples : int
+        Number of evenly spaced samples.
+    trend : int
+        Order of the polynomial trend that is fitted too.
 
     Raises
     ------
@@ -199,10 +199,10 @@ def best_protocol(
     ----------
     rig : Slider
     candidates : mapping of str to Protocol, optional
-            Experiments by label; unless given, changes of the normal stress of several shapes, with and without a
-            velocity step.
-        parameter : str, optional
-            Name of the parameter; unless given, the law's stress share, by which friction responds to normal stress.
+        Experiments by label; unless given, changes of the normal stress of several shapes, with and without a
+        velocity step.
+    parameter : str, optional
+        Name of the parameter; unless given, the law's stress share, by which friction responds to normal stress.
     **options
         As for `precision`.
 

@@ -114,11 +114,11 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     fit : Fit
     name : str
     reach : float
-            Range on both sides, in standard deviations; if the parameter is not determined, 2 e-folds or natural sizes.
-        count : int
-            Number of values.
-        threads : int, optional
-            Number of threads; all cores unless given.
+        Range on both sides, in standard deviations; if the parameter is not determined, 2 e-folds or natural sizes.
+    count : int
+        Number of values.
+    threads : int, optional
+        Number of threads; all cores unless given.
     """
     i = fit.index(name)
     variance = float(fit.covariance[i, i])

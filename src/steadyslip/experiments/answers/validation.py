@@ -23,13 +23,13 @@ class CrossValidation(ReadOnly):
     Attributes
     ----------
     residuals : ndarray (n,)
-            Data less prediction, each sample predicted by the fit that left it out; weighted as the fit is.
-        fold : ndarray of int (n,)
-            Index of the fold of each sample; samples of one fold are left out together.
-        block : int
-            Number of successive samples in a fold.
-        seen : float
-            Root mean square of the residuals of the fit to all samples.
+        Data less prediction, each sample predicted by the fit that left it out; weighted as the fit is.
+    fold : ndarray of int (n,)
+        Index of the fold of each sample; samples of one fold are left out together.
+    block : int
+        Number of successive samples in a fold.
+    seen : float
+        Root mean square of the residuals of the fit to all samples.
     """
 
     residuals: Array = field(repr=False)

@@ -23,8 +23,8 @@ from steadyslip.files.specifications.layout import (
     selector,
 )
 from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan.map_file import GridSettings, MapSettings, RangeSettings, SampleSettings
 from steadyslip.maps.plan.measures import Measure
-from steadyslip.maps.plan.settings import GridSettings, MapSettings, RangeSettings, SampleSettings
 from steadyslip.protocol import Protocol
 
 HERE = Path(__file__).parent

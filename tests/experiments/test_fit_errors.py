@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.fit import fit_with_errors
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe
-from steadyslip.experiments.numerics.sampling import spread_of_chains
+from steadyslip.experiments.numerics.pooling import spread_of_chains
 
 # -- errors
 

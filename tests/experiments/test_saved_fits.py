@@ -9,7 +9,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting import numbers, refit
-from steadyslip.experiments.fitting.identify import Combination
+from steadyslip.experiments.fitting.estimates import Combination
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.remedies import Remedy
 from steadyslip.experiments.fitting.result import Fit

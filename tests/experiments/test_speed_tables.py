@@ -9,7 +9,7 @@ from scipy.stats import binom
 import steadyslip as ss
 from command import run as command
 from steadyslip.core.quantities import parse
-from steadyslip.experiments.fitting.presliding import fit_loop, loop_forces
+from steadyslip.experiments.fitting.speed_fit import fit_loop, loop_forces
 from steadyslip.experiments.measured.speeds import PreslidingLoop, read_speed_table
 from steadyslip.files.specifications.unknowns import read_unknowns
 from steadyslip.verdict import stable_within

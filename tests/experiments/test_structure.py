@@ -11,7 +11,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting import fit as fitting
 from steadyslip.experiments.measured.clipped import clipped
-from steadyslip.experiments.numerics.whiteness import whiteness
+from steadyslip.experiments.numerics.noise import whiteness
 
 TWO_STEPS = ss.Protocol(
     pieces=(ss.protocol.VelocityStep(at=60.13, to=5e-6), ss.protocol.VelocityStep(at=110.37, to=1e-6)), until=180.0

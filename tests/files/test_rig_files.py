@@ -20,7 +20,7 @@ from steadyslip.core.errors import SHOWN
 from steadyslip.core.roles import Parameter, Role
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import own_fields, sections
-from steadyslip.files.specifications.lines import key_lines, line_of
+from steadyslip.files.specifications.toml import key_lines, line_of
 from steadyslip.protocol import Piece
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"

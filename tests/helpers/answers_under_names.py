@@ -6,7 +6,7 @@ import steadyslip as ss
 from renamed_laws import NAMES, PLAIN, machine, renamed
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import motion_part
-from steadyslip.model.names import EVENTS, RESERVED_NAMES
+from steadyslip.model.assembly import EVENTS, RESERVED_NAMES
 
 TIMES = np.linspace(0.0, 20.0, 21)
 PUSH = [ss.protocol.VelocityStep(at=1.0, to=2e-6), ss.protocol.NormalStressHarmonic(amplitude=1e5, period=3.0)]

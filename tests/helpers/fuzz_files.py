@@ -29,7 +29,7 @@ import xarray as xr
 
 import steadyslip as ss
 from steadyslip.experiments.answers.population import POPULATION, Population
-from steadyslip.experiments.fitting.identify import Combination
+from steadyslip.experiments.fitting.estimates import Combination
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import SearchSummary

@@ -13,8 +13,8 @@ from steadyslip.protocol import (
     VelocityRamp,
     VelocityStep,
 )
+from steadyslip.protocol.pieces import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS
-from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 
 # Quarters of a second add without rounding, so that pieces often begin and end at the very same time.
 times = st.integers(0, 160).map(lambda n: n / 4)

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import steadyslip as ss
-from steadyslip.kernels.chains import with_short_chains
+from steadyslip.kernels.formulation import with_short_chains
 from steadyslip.model.build import model_of
 from steadyslip.model.reducing import reduce_model
 

@@ -64,7 +64,7 @@ RTOL = {"Coulomb": 1e-9}  # rounding of time decides about the last steps of a l
 def test_lanes_see_what_single_runs_see(case):
     """The tally that lanes keep within the step is that of the driver's log: all counts, every digit that matters.
 
-    A single run adds up in another order than lanes do (`kernels/chains.py`), and rounding grows along the way.
+    A single run adds up in another order than lanes do (`kernels/formulation.py`), and rounding grows along the way.
     """
     a_rig, protocol, initial, until = WATCHED[case]
     k = float(a_rig.stiffness) * np.random.default_rng(0).uniform(0.75, 1.5, 24)

@@ -26,8 +26,8 @@ from steadyslip.protocol import (
     VelocityStep,
 )
 from steadyslip.protocol.inputs import evaluate
+from steadyslip.protocol.pieces import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 from steadyslip.protocol.segments import pack
-from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 
 UNTIL = 64.0
 

@@ -15,8 +15,7 @@ import pytest
 from steadyslip import Slider, load_history, read_protocol, read_record, read_rig, simulate
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.files.specifications import rig_from_text
-from steadyslip.files.specifications.lines import key_lines
-from steadyslip.files.specifications.toml import MOST_PARTS, NotToml, tables_of
+from steadyslip.files.specifications.toml import MOST_PARTS, NotToml, key_lines, tables_of
 
 RIG = """
 [friction]

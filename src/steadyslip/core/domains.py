@@ -1,4 +1,4 @@
-"""Domains: intervals of allowed parameter values."""
+"""Domains: intervals of allowed parameter values; and conditions between several numbers of a record."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from steadyslip.core.errors import Problem
 
 
 @dataclass(frozen=True)
@@ -43,3 +45,35 @@ line = Domain(
 acute = Domain(0, math.pi / 2, False, False, "an angle between 0 and 90 deg, both excluded")
 turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 360 deg")
 count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)  # bound chosen by trial
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition between several numbers of a record, evaluated.
+
+    Attributes
+    ----------
+    name : str
+        Field named in the message, or a member of one, such as ``contacts.guide``.
+    holds : bool or ndarray of bool
+        One value per rig if the numbers are arrays.
+    message : str
+        Message for a failure: what was given and what is allowed, with a ``{}`` for each of `numbers`.
+    numbers : tuple of float or ndarray
+        Numbers on which the condition depends.
+    """
+
+    name: str
+    holds: Any
+    message: str
+    numbers: tuple[Any, ...] = ()
+
+    def problem(self, name: str = "") -> Problem | None:
+        """The Problem at the first position where the condition fails; None if it holds everywhere."""
+        holds = np.asarray(self.holds)
+        if np.all(holds):
+            return None
+        arrays = np.broadcast_arrays(holds, *self.numbers)
+        where = tuple(int(i) for i in np.argwhere(~arrays[0])[0])
+        place = f" (at position {where})" if arrays[0].size > 1 else ""
+        return Problem(name or self.name, self.message.format(*(f"{float(a[where]):.12g}" for a in arrays[1:])) + place)

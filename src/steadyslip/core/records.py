@@ -17,8 +17,7 @@ from functools import cache
 from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from steadyslip.core.areas import total_unit
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import Domain
+from steadyslip.core.domains import Condition, Domain
 from steadyslip.core.entries import Option
 from steadyslip.core.errors import ParameterError, Problem, one, repr_short
 from steadyslip.core.names import Members, unfit_name

@@ -11,7 +11,7 @@ from .answers.profiles import Profile, profile
 from .answers.step_table import StepTable, step_table
 from .answers.uncertainty import Draws, bootstrap, load_draws, normal_draws, posterior
 from .answers.validation import CrossValidation, cross_validate
-from .fitting.estimate import Estimate
+from .fitting.estimates import Estimate
 from .fitting.fit import fit
 from .fitting.result import Fit, load_fit
 from .from_files import fit_files, population_files

@@ -15,8 +15,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.core.options import checked
 from steadyslip.core.records import role_of
 from steadyslip.core.roles import Parameter
-from steadyslip.experiments.fitting.presliding import fit_loop
-from steadyslip.experiments.fitting.speed_fit import fit_direction
+from steadyslip.experiments.fitting.speed_fit import fit_direction, fit_loop
 from steadyslip.experiments.fitting.speed_result import SpeedFit
 from steadyslip.experiments.measured.speeds import SpeedTable, is_loop, read_loop, read_speed_table, table_from_arrays
 from steadyslip.files.specifications.changes import named_value

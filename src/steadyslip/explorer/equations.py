@@ -29,9 +29,9 @@ from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
 from steadyslip.model.posed import vanishing_terms
+from steadyslip.model.range import highest_coefficients, highest_is_lost
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, ROOT_TOLERANCE, joint_equation
-from steadyslip.model.underflow import highest_coefficients, highest_is_lost
 
 SLIP_RATE = "slip_rate"  # name of the slip velocity of a contact on pages
 

@@ -1,6 +1,6 @@
 """The linearised rig as a state-space system, for SciPy and python-control.
 
-The equations are those of `steadyslip.model.descriptor`.
+The equations are those of `steadyslip.model.eigenvalues`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from steadyslip.linear.spectrum import is_ill_posed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.descriptor import Matrices, blocks_of, descriptor
+from steadyslip.model.eigenvalues import Matrices, blocks_of, descriptor
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import hidden_by_stiffest, out_of_range_error, require_range
 from steadyslip.model.sliding import explain_absence, steady_state

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from steadyslip.core.areas import is_per_area, stress_name, total_unit
-from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import Condition
 from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part

@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import nonnegative, positive
+from steadyslip.core.domains import Condition, nonnegative, positive
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import parameter, part
 from steadyslip.laws.contact import ContactLaw

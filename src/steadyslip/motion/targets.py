@@ -13,8 +13,8 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import EITHER, MOVED, PULLED
 from steadyslip.model.reducing import FREE, PORES, SWITCH
 from steadyslip.protocol import Protocol, protocol as channels
+from steadyslip.protocol.pieces import OnBlock, OnDrive, OnNormalStress, OnPores
 from steadyslip.protocol.protocol import Piece, channel_of
-from steadyslip.protocol.stress import OnBlock, OnDrive, OnNormalStress, OnPores
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,12 @@ How a cycle is found, and gets its period (`cycles`, one file per step):
 4. `orbits/shooting.py`: `Shooting.equations`. ln(period) is an unknown beside the starting state and the parameter; one
    more equation, that slip passes the load point's velocity at the start, determines it. `Shooting.orbit` reads it off.
    `orbits/flow.py` integrates the motion and its derivatives for these equations.
-5. `orbits/cycle_properties.py`: `cycle_data` integrates the solved cycle once more, for velocities, stresses and
+5. `orbits/cycle_from_motion.py`: `cycle_data` integrates the solved cycle once more, for velocities, stresses and
    stability (Floquet multipliers), into a `Cycle` (`orbits/cycle.py`).
 
-Besides in `orbits/`: `special.py` locates bifurcations, `end_reasons.py` decides where a piece ends, `doublings.py`
-follows cycles of twice the period, `cut_segments.py` divides unstable cycles, `search.py` and `cycle_from_motion.py`
-find cycles by simulation, `at_value.py` computes those at one value of the parameter, `ranges.py` the stable ranges;
-`branch.py` is the result.
+Besides in `orbits/`: `special.py` locates bifurcations, `end_reasons.py` decides where a piece ends, `cut_segments.py`
+divides unstable cycles, `search.py` and `cycle_from_motion.py` find cycles by simulation, `at_value.py` computes those
+at one value of the parameter, `ranges.py` the stable ranges; `branch.py` is the result.
 
 How the smallest kick not survived is found (`threshold`): `kicks/threshold.py` searches over sizes, `kicks/kicks.py`
 makes a motion of each, `kicks/settled.py` solves for the steady sliding it may return to, `kicks/outcomes.py` decides

@@ -21,7 +21,7 @@ from steadyslip.model import Model, build_model
 from steadyslip.motion import simulate
 from steadyslip.nonlinear.frequency_response import IRREGULAR, NOT_SETTLED, PERIODIC, TOO_MANY_STEPS, FrequencyResponse
 from steadyslip.protocol import DisturbanceHarmonic, InjectionHarmonic, NormalStressHarmonic, VelocityHarmonic
-from steadyslip.protocol.shapes import Harmonic
+from steadyslip.protocol.pieces import Harmonic
 
 Array = np.ndarray
 

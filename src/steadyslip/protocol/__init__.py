@@ -4,37 +4,35 @@ pieces -> Protocol -> segments (one lane or many) -> kernels. A protocol drives 
 on laws or rigs.
 """
 
-from steadyslip.protocol.load_point import (
+from steadyslip.protocol.pieces import (
     Creep,
+    CreepRamp,
+    CreepStep,
+    CreepTable,
     DisplacementStep,
+    DisturbanceHarmonic,
+    DisturbancePulse,
+    DisturbanceRamp,
+    DisturbanceStep,
+    DisturbanceTable,
     Hold,
+    InjectionHarmonic,
+    InjectionPulse,
+    InjectionRamp,
+    InjectionStep,
+    InjectionTable,
     LoadPointTable,
+    NormalStressHarmonic,
+    NormalStressPulse,
+    NormalStressRamp,
+    NormalStressStep,
+    NormalStressTable,
     SlideHoldSlide,
     VelocityHarmonic,
     VelocityRamp,
     VelocityStep,
 )
 from steadyslip.protocol.protocol import Piece, Protocol
-from steadyslip.protocol.stress import (
-    CreepRamp,
-    CreepStep,
-    CreepTable,
-    DisturbanceHarmonic,
-    DisturbancePulse,
-    DisturbanceRamp,
-    DisturbanceStep,
-    DisturbanceTable,
-    InjectionHarmonic,
-    InjectionPulse,
-    InjectionRamp,
-    InjectionStep,
-    InjectionTable,
-    NormalStressHarmonic,
-    NormalStressPulse,
-    NormalStressRamp,
-    NormalStressStep,
-    NormalStressTable,
-)
 
 __all__ = [
     "Creep", "CreepRamp", "CreepStep", "CreepTable", "DisplacementStep", "DisturbanceHarmonic", "DisturbancePulse",

@@ -11,9 +11,8 @@ from pathlib import Path
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.progress import progress_bar
 from steadyslip.figures import style
-from steadyslip.reproduce.drawings import FIGURES, PaperFigure
+from steadyslip.reproduce.drawings import D_C, FIGURES, V0, PaperFigure, paper_rig
 from steadyslip.reproduce.numbers import PaperNumber, PaperTable, paper_table
-from steadyslip.reproduce.rig import D_C, V0, paper_rig
 
 __all__ = [
     "D_C",

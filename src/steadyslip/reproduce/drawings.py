@@ -1,4 +1,4 @@
-"""Figures of Dupont & Bapna (1994): simulated motion (1, 2, 5, 6) and critical stiffness (7).
+"""Rig and figures of Dupont & Bapna (1994): simulated motion (1, 2, 5, 6) and critical stiffness (7).
 
 The paper does not print the stiffnesses and starting points of its Figs 5 and 6; those used here are named in
 the figures. Its "closed" trajectory at k = k_cr is closed to linear order only: it is a very weak inward spiral
@@ -15,13 +15,30 @@ import numpy as np
 
 from steadyslip import figures
 from steadyslip.figures import style
-from steadyslip.laws.contact import ConstantNormalStress
+from steadyslip.laws.contact import ConstantNormalStress, InclinedSpring
+from steadyslip.laws.friction import LinkerDieterich, RateState, Slip
 from steadyslip.linear import critical_stiffness
+from steadyslip.machine.drive import SteadyDrive
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
 from steadyslip.protocol import NormalStressStep, VelocityStep
-from steadyslip.reproduce.rig import D_C, V0, paper_rig
-from steadyslip.units import MPa, deg
+from steadyslip.units import GPa, MPa, deg, m, s, um
+
+D_C = 1 * um
+V0 = 1 * um / s
+
+
+def paper_rig(angle: float = -45 * deg) -> Slider:
+    """Inclined spring of the paper (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
+
+    The paper gives neither v0 nor a stiffness; both are round numbers without effect on dimensionless results.
+    """
+    rock = RateState(
+        a=0.0145, b=0.0160, d_c=D_C, mu_ref=0.7, v_ref=V0, evolution=Slip(), normal_memory=LinkerDieterich(alpha=0.56)
+    )
+    contact = InclinedSpring(preload=5 * MPa, angle=angle)
+    return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=SteadyDrive(V0))
+
 
 SIGMA = 5 * MPa  # normal stress of Figs 1 and 2: the preload of `paper_rig`
 STEP_TIME = 1.0  # time of the step in Figs 1 and 2, s

@@ -18,8 +18,16 @@ from steadyslip import figures
 from steadyslip.figures import mass
 from steadyslip.linear import boundary, critical_stiffness, eigenvalues
 from steadyslip.protocol import NormalStressStep, VelocityStep
-from steadyslip.reproduce.drawings import DIRECT_TIME, SIGMA, STEP_TIME, simulate_orbit, simulate_shear
-from steadyslip.reproduce.rig import D_C, V0, paper_rig
+from steadyslip.reproduce.drawings import (
+    D_C,
+    DIRECT_TIME,
+    SIGMA,
+    STEP_TIME,
+    V0,
+    paper_rig,
+    simulate_orbit,
+    simulate_shear,
+)
 from steadyslip.units import deg
 
 

@@ -28,13 +28,13 @@ from steadyslip.testing.contact import (
 from steadyslip.testing.contact_states import check_contact_routes, check_contact_senses, check_contact_states
 from steadyslip.testing.friction import (
     check_derivatives,
+    check_jumps,
     check_names,
     check_numbers,
     check_signs,
     check_steady_state,
     check_symbols,
 )
-from steadyslip.testing.jumps import check_jumps
 from steadyslip.testing.precise import ContractViolation
 from steadyslip.testing.renaming import check_contact_renaming, check_renaming, under_random_names
 from steadyslip.testing.routes import check_friction_round_trip, check_two_routes

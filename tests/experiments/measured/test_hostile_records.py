@@ -7,7 +7,7 @@ from scipy.io import savemat
 import steadyslip as ss
 from hostile_records import BYTES, CASES, SECONDS, is_sentence, outcome
 from records_in_bytes import ROWS, columns, honest_workbook, in_workbook
-from steadyslip.experiments.measured.formats import excel, table
+from steadyslip.experiments.measured.formats import table, workbook
 from steadyslip.files import apart
 
 pytest.importorskip("h5py")
@@ -63,7 +63,7 @@ def test_a_cell_far_away_is_no_flood(tmp_path, monkeypatch):
     """Every row was counted as a thousand cells, so that 67109 rows were too many."""
     monkeypatch.setattr(table, "MOST_VALUES", 2000)
     CASES["far-cell.xlsx"][0](tmp_path / "r.xlsx")
-    found = excel.read(tmp_path / "r.xlsx", None)
+    found = workbook.read(tmp_path / "r.xlsx", None)
     assert found.names == list(columns())
     assert found.values.shape == (4, ROWS)
 

@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from measured_columns import HEAD, ROWS, check, columns, plain, read_as, rows
-from steadyslip.experiments.measured.formats.moments import moment, seconds_since_first
+from steadyslip.experiments.measured.formats.cells import moment, seconds_since_first
 
 
 @pytest.mark.parametrize(

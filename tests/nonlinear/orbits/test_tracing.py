@@ -14,8 +14,7 @@ from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.kicks.spans import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_module
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
-from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
-from steadyslip.nonlinear.orbits.cycle_properties import cycle_data
+from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_data, cycle_near
 from steadyslip.nonlinear.orbits.end_reasons import STANDING, retraces, stands, winds
 from steadyslip.nonlinear.orbits.flow import Flow, FlowRunner
 from steadyslip.nonlinear.orbits.shooting import Shooting

@@ -23,7 +23,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.inference import inference_data
 from steadyslip.experiments.fitting import store
-from steadyslip.experiments.fitting.estimate import Estimate
+from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import DRAWS, STRESS
 from steadyslip.experiments.fitting.unknowns import Unknown

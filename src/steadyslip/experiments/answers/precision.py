@@ -15,7 +15,7 @@ from steadyslip.core.names import resolve
 from steadyslip.core.options import NAMES, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.experiments.fitting.identify import Combination, combinations
+from steadyslip.experiments.fitting.estimates import Combination, combinations
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.measured.read import record_from_arrays
 from steadyslip.machine.slider import Slider

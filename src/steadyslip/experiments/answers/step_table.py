@@ -14,13 +14,13 @@ from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
-from steadyslip.experiments.fitting.estimate import Estimate
+from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.words import short_names
+from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
-from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.files.output import write_columns, write_text
 from steadyslip.machine.slider import Slider
 

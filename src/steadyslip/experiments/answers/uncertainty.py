@@ -21,7 +21,7 @@ from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
-from steadyslip.experiments.numerics.sampling import run_walkers, spread_of_chains
+from steadyslip.experiments.numerics.pooling import run_walkers, spread_of_chains
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 

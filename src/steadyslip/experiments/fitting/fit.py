@@ -10,12 +10,11 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.options import checked
-from steadyslip.experiments.fitting.checks import check_friction
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.effort import Budget, Effort
-from steadyslip.experiments.fitting.identify import combinations, prior_information
+from steadyslip.experiments.fitting.estimates import combinations, prior_information
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.planning import make_plan, with_width
+from steadyslip.experiments.fitting.planning import check_friction, make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import (
     MAX_ITERATIONS,

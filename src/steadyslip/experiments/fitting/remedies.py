@@ -16,8 +16,7 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
 from steadyslip.experiments.numerics.least_squares import minimise
-from steadyslip.experiments.numerics.noise import describe
-from steadyslip.experiments.numerics.whiteness import whiteness
+from steadyslip.experiments.numerics.noise import describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
 
 STRUCTURE = 1e-3  # probability of the whiteness test below which residuals have structure

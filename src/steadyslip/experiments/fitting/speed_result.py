@@ -1,13 +1,298 @@
-"""Result of a fit to a table of speeds: numbers, text, and the rig file."""
+"""Result of a fit to a table of speeds: numbers, text, the fitted rig and its file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 from typing import Any
 
-from steadyslip.experiments.fitting.speed_fit import SpeedFindings
-from steadyslip.experiments.fitting.speed_rig import rig_text
-from steadyslip.experiments.fitting.speed_words import as_dict, words
+import numpy as np
+
+from steadyslip.core.dimensions import unit
+from steadyslip.core.format import display_units, format_quantity, format_with_error
+from steadyslip.core.records import FrozenRecord, parameters
+from steadyslip.core.version import stamped
+from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedEstimate, SpeedFindings
+from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, UNTOLD
+from steadyslip.files.specifications.layout import UNKNOWN
+
+BRISTLES, BRISTLE_DAMPING, SLIP = "bristle stiffness", "bristle damping", "slip distance"
+DEFLECTION = (1e-6, 1e-5, 1e-4)
+"""Least, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals give way by
+1 to 50 um (Armstrong-Helouvry 1991). Of joints, some 10 cm from their axis, ten times as many rad."""
+RAD_A_METRE = 10.0
+STIFFNESS, MASS, SHAFT, INERTIA = (
+    "20 N/um",
+    100.0,
+    "1e4 N m/rad",
+    0.1,
+)  # of a common axis, of a common joint; kg, kg m^2
+COEFFICIENT_LOAD = 1000.0  # N, where a table of coefficients has no load
+CHANGE = "CHANGE: a table of speeds does not tell it"
+
+
+def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
+    """Least, usual and largest value of parameters of the law that a table of speeds does not tell, in law units."""
+    one, turns = found.main, found.table.turns
+    load = rig_load(found)
+    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load)
+    short, usual, long = (length * (RAD_A_METRE if turns else 1.0) for length in DEFLECTION)
+    ranges: dict[str, tuple[float, float, float]] = {}
+    known = parameters(one.law)
+    for name, address in known.items():
+        if address.role.kind == SLIP and address.value is not None:
+            ranges[name] = (short, usual, long)
+    of_kind = {address.role.kind: name for name, address in known.items()}
+    if BRISTLES in of_kind:
+        own = (level / long, level / usual, level / short)
+        if found.bristles is not None:
+            own = (found.bristles.low / load, found.bristles.value / load, found.bristles.high / load)
+        ranges[of_kind[BRISTLES]] = own
+        if BRISTLE_DAMPING in of_kind:
+            critical = 2 * math.sqrt(own[1] * (INERTIA if turns else MASS) / load)
+            ranges[of_kind[BRISTLE_DAMPING]] = (0.0, 0.0, critical)
+    return ranges
+
+
+def rig_load(found: SpeedFindings) -> float:
+    """Load (N) of the rig: the table's median, one of many of coefficients, or 1 for forces without a load."""
+    if found.table.load is None and found.table.is_coefficient:
+        return COEFFICIENT_LOAD
+    return found.main.load
+
+
+def rig_text(found: SpeedFindings) -> str:
+    """A complete rig file: a slider, or a machine of one body where the table turns."""
+    with display_units([found.table.speed_unit]):
+        return _text(found, untold(found))
+
+
+def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> str:
+    lines = [f"# Friction of {found.table.source}: steadyslip fit --law {found.law}."]
+    lines += ["# Lines with CHANGE are not told by a table of speeds: give those of your machine."]
+    if found.table.load is None and not found.table.is_coefficient:
+        force = "torque" if found.table.turns else "force"
+        lines += [
+            f"# The table has no load: it is 1 N here, and coefficients are {force}s in N{' m' * found.table.turns}."
+        ]
+    lines += ["", *(_joint if found.table.turns else _axis)(found, ranges)]
+    where = "contacts.bearing.friction" if found.table.turns else "friction"
+    if ranges:
+        lines += ["", f"[{UNKNOWN}]  # analyze says which of these values are stable; delete a line once it is known"]
+        lines += [
+            f"{where}.{name} = [{_written(found, name, low)}, {_written(found, name, high)}]"
+            for name, (low, _, high) in ranges.items()
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _axis(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
+    one = found.main
+    offset, damping = one.beside(OFFSET), one.beside(DAMPING)
+    slowest = one.speed.min() / unit(found.table.speed_unit)[0]
+    drag = [f'radiation_damping = "{damping:.6g} N s/m"  # viscous drag that does not follow the load']
+    return [
+        *_friction(found, ranges, "friction"), "", "[contact]", 'law = "constant"',
+        _preload(found) + (f", with {format_quantity(offset, 'N')} that presses beside the load" if offset else ""), "",
+        "[slider]", 'area = "1 m^2"  # so that forces and stresses have the same numbers',
+        f'stiffness = "{STIFFNESS}"  # {CHANGE}', f'mass = "{MASS:g} kg"  # {CHANGE}',
+        *(drag if damping else []), "", "[drive]",
+        f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
+    ]  # fmt: skip
+
+
+def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
+    one, where = found.main, "contacts.bearing"
+    slowest = one.speed.min() / unit(found.table.speed_unit)[0]
+    damping = one.beside(DAMPING)
+    drag = [
+        "[links.drag]",
+        'kind = "shaft"',
+        'between = ["joint", "ground"]',
+        f'damping = "{damping:.6g} N m s/rad"',
+        "",
+    ]
+    return [
+        "[bodies.joint]", 'motion = "rotation"', f'inertia = "{INERTIA:g} kg m^2"  # {CHANGE}', "",
+        "[links.shaft]", 'kind = "shaft"', 'between = ["drive", "joint"]', f'stiffness = "{SHAFT}"  # {CHANGE}', "",
+        *(drag if damping else []), f"[{where}]", 'body = "joint"',
+        'radius = "1 m"  # so that m/s are rad/s, and N are N m', "",
+        *_friction(found, ranges, f"{where}.friction"), "",
+        f"[{where}.contact]", 'law = "constant"', _preload(found), "", "[drive]",
+        'control = "rotary-steady"',
+        f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
+    ]  # fmt: skip
+
+
+def _preload(found: SpeedFindings) -> str:
+    told = (
+        "the table's"
+        if found.table.load is not None
+        else CHANGE
+        if found.table.is_coefficient
+        else "the table has none"
+    )
+    return f'preload = "{rig_load(found) + found.main.beside(OFFSET):.6g} N"  # {told}'
+
+
+def _friction(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]], where: str) -> list[str]:
+    lines = [f"[{where}]", f'law = "{found.law}"']
+    told = {estimate.name: estimate for estimate in found.main.estimates}
+    for name, address in parameters(found.main.law).items():
+        if name in told:
+            lines.append(f"{name} = {_written(found, name, told[name].value)}  # {_interval(found.main, name)}")
+        elif name in ranges:
+            source = (
+                "from the loop"
+                if address.role.kind == BRISTLES and found.bristles is not None
+                else f"{CHANGE}, see [{UNKNOWN}]"
+            )
+            lines.append(f"{name} = {_written(found, name, ranges[name][1])}  # {source}")
+        elif address.value is not None and address.value != _default(found.main.law, name):
+            said = "held, not fitted" if address.role.kind not in UNTOLD else "only what it makes with others is told"
+            lines.append(f"{name} = {_written(found, name, address.value)}  # {said}")
+    if found.forward is not None and found.backward is not None:
+        lines.append("# backward:")
+        lines += [
+            f"# {one.name} = {_written(found, one.name, one.value)}  # {_interval(found.backward, one.name)}"
+            for one in found.backward.estimates
+        ]
+    return lines
+
+
+def _default(law: FrozenRecord, name: str) -> object:
+    return next(item.default for item in fields(law) if item.name == name)  # type: ignore[arg-type]
+
+
+def _interval(one: DirectionFit, name: str) -> str:
+    estimate = one[name]
+    ends = [
+        "any" if not math.isfinite(end) else format_quantity(end, estimate.unit)
+        for end in (estimate.low, estimate.high)
+    ]
+    return f"95 %: {ends[0]} to {ends[1]}" + (f"; {estimate.remark}" if estimate.remark else "")
+
+
+def _written(found: SpeedFindings, name: str, value: float) -> str:
+    """TOML value of a parameter, in the units of the table; stiffness and damping of bristles at the rig's load."""
+    known = parameters(found.main.law)
+    own, kind = (known[name].role.unit, known[name].role.kind) if name in known else ("1", "")
+    load = rig_load(found)
+    if own == "1":
+        return f"{value:.8g}"
+    if kind in (BRISTLES, BRISTLE_DAMPING) and not found.table.turns:
+        scale, size = (1e-6, "N/um") if kind == BRISTLES else (1e-3, "N s/mm")
+        return f'"{value * load * scale:.6g} {size} at {load:.6g} N"'
+    if own == "m/s" and not found.table.turns:
+        return f'"{value / unit(found.table.speed_unit)[0]:.8g} {found.table.speed_unit}"'
+    return f'"{value:.8g} {own}"'
+
+
+CLOSE = 0.95  # correlation from which two parameters are told to stand for each other
+
+
+def words(found: SpeedFindings) -> str:
+    """Whole text of a fit, about 100 columns wide."""
+    table = found.table
+    lines = [f"Friction of {table.source} as the law {found.law}"]
+    lines += [f"  {note}" for note in table.notes]
+    for one in (found.forward, found.backward):
+        lines += ["", *_direction(found, one)] if one is not None else []
+    lines.append("")
+    if found.bristles is not None:
+        at = "" if table.load is None else f" at {format_quantity(found.main.load, 'N')}"
+        size = "N m/rad" if table.turns else "N/m"
+        low, high = (format_quantity(end, size) for end in (found.bristles.low, found.bristles.high))
+        value = format_quantity(found.bristles.value, size)
+        lines.append(f"bristle stiffness {value}{at}, from the loop (95 %: {low} to {high})")
+    known = parameters(found.main.law)
+    names = [name for name in untold(found) if found.bristles is None or known[name].role.kind != BRISTLES]
+    if names:
+        told = f"The table does not tell {' and '.join(names)}"
+        lines.append(f"{told}: the rig file carries intervals, which analyze answers for.")
+    return "\n".join(lines)
+
+
+def _direction(found: SpeedFindings, one: DirectionFit) -> list[str]:
+    table = found.table
+    size = unit(table.speed_unit)[0]
+    speeds = f"{one.speed.min() / size:.4g} to {one.speed.max() / size:.4g} {table.speed_unit}"
+    if found.relative:
+        scatter = f"{100 * one.scatter:.2g} %"
+    else:
+        scatter = format_quantity(one.scatter, "1" if table.is_coefficient else "N m" if table.turns else "N", 2)
+    way = "forward" if one.forward else "backward"
+    lines = [f"{way}: {len(one.speed)} rows, {speeds}; scatter {scatter}, from {_count(one.freedom, 'row')} to spare"]
+    wide = max(len(estimate.name) for estimate in one.estimates)
+    with display_units([table.speed_unit]):
+        for estimate in one.estimates:
+            text = f"  {estimate.name:<{wide}}  {_shown(estimate)}"
+            lines.append(text + (f" ({estimate.remark})" if estimate.remark else ""))
+    if (derived := _difference(one)) is not None:
+        lines.append(derived)
+    lines += [f"  {note}" for note in one.notes]
+    lines += _together(one)
+    return lines
+
+
+def _difference(one: DirectionFit) -> str | None:
+    """Line on the change of friction with ln v, where the law's direct effect is held."""
+    kinds = {address.role.kind: (name, address.value) for name, address in parameters(one.law).items()}
+    (a, direct), (b, _) = kinds.get("direct effect", ("", None)), kinds.get("evolution effect", ("", None))
+    found = [estimate for estimate in one.estimates if estimate.name == b]
+    if direct is None or not found:
+        return None
+    text = format_with_error(direct - found[0].value, found[0].error, found[0].unit)
+    return f"  {a} - {b} = {text}: the table tells the difference alone; {a} is held at {direct:g}"
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _shown(one: SpeedEstimate) -> str:
+    low, high = (_end(end, one.unit) for end in (one.low, one.high))
+    return f"{one.shown()}, 95 %: {low} to {high}"
+
+
+def _end(value: float, si_unit: str) -> str:
+    return "any" if not np.isfinite(value) else format_quantity(value, si_unit)
+
+
+def _together(one: DirectionFit) -> list[str]:
+    """Lines on pairs of parameters whose errors go together."""
+    names = [estimate.name for estimate in one.estimates]
+    pairs = [
+        f"{names[i]} and {names[j]} ({one.correlation[i, j]:+.3f})"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(one.correlation[i, j]) >= CLOSE
+    ]
+    return [f"  errors go together: {', '.join(pairs)}"] if pairs else []
+
+
+def as_dict(found: SpeedFindings) -> dict[str, Any]:
+    """Plain data of a fit for JSON, SI units; ends that do not exist are None."""
+    data: dict[str, Any] = {"source": found.table.source, "law": found.law, "notes": list(found.table.notes)}
+    for name, one in (("forward", found.forward), ("backward", found.backward)):
+        if one is None:
+            continue
+        data[name] = {
+            "load": one.load, "scatter": one.scatter, "degrees_of_freedom": one.freedom, "notes": list(one.notes),
+            "parameters": {e.name: {"value": e.value, "error": _plain(e.error), "unit": e.unit,
+                                    "interval_68": [_plain(end) for end in e.likely],
+                                    "interval_95": [_plain(e.low), _plain(e.high)], "remark": e.remark}
+                           for e in one.estimates},
+            "correlation": [[_plain(value) for value in row] for row in one.correlation],
+        }  # fmt: skip
+    if found.bristles is not None:
+        loop = found.bristles
+        data["bristles"] = {"stiffness": loop.value, "error": loop.error, "interval_95": [loop.low, loop.high]}
+    return dict(stamped(data))
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

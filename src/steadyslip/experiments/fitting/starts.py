@@ -23,8 +23,8 @@ from steadyslip.experiments.fitting.inputs import ProtocolInputs
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.loading.loading import resting_rate
+from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
-from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA
 from steadyslip.model.sliding import steady_state
 

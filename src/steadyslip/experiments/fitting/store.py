@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.core.results import read_only
-from steadyslip.experiments.fitting.identify import Combination
+from steadyslip.experiments.fitting.estimates import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan

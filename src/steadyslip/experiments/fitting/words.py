@@ -11,7 +11,7 @@ from steadyslip.core.areas import total
 from steadyslip.core.checks import as_data, in_words
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.version import of_another
-from steadyslip.experiments.fitting.estimate import Estimate
+from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.loading_words import enumerated, loading_warnings, own_rate
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp

@@ -1,4 +1,4 @@
-"""Course of the normal stress: constant or smooth, with steps and short straight ramps."""
+"""Course of the normal stress (constant or smooth, with steps and short ramps), and all changes as list of steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.loading.loading import Change, Course
+from steadyslip.core.format import format_quantity
+from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.numerics.smoothing import Smooth, smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
@@ -218,3 +219,57 @@ def oscillation(time: Array, normal: Array) -> StressWave | None:
     first = max(int(np.flatnonzero(np.abs(normal - mean) > band)[0]) - 1, 0)
     inside = normal[turns[0] : turns[-1]]
     return StressWave(float(time[first]), 2 * float(np.mean(gaps[like])), mean, float(np.sqrt(2) * np.std(inside)))
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """One change of the load-point rate or normal stress of an experiment.
+
+    Attributes
+    ----------
+    kind : str
+        ``velocity step``, ``hold``, ``reslide``, ``normal-stress step`` or ``normal-stress oscillation``.
+    time : float
+        Time at which it begins, s.
+    duration : float
+        Duration, s; zero for a sudden change. For an oscillation: its period.
+    before, after : float
+        Load-point rate (m/s) or normal stress (Pa); for an oscillation its mean and amplitude.
+    """
+
+    kind: str
+    time: float
+    duration: float
+    before: float
+    after: float
+
+    @property
+    def unit(self) -> str:
+        return "Pa" if self.kind.startswith(("normal", "pore")) else "m/s"
+
+    def __str__(self) -> str:
+        if self.kind == "normal-stress oscillation":
+            return (
+                f"{self.kind} from {self.time:.6g} s: {format_quantity(self.before, 'Pa')} ± "
+                f"{format_quantity(self.after, 'Pa')}, "
+                f"period {format_quantity(self.duration, 's')}"
+            )
+        lasting = f", in {format_quantity(self.duration, 's')}" if self.duration else ""
+        values = f"{format_quantity(self.before, self.unit)} to {format_quantity(self.after, self.unit)}"
+        return f"{self.kind} at {self.time:.6g} s: {values}{lasting}"
+
+
+def steps_of(loading: Loading, wave: StressWave | None) -> tuple[LoadStep, ...]:
+    """Changes of a loading and its oscillation, in order of time."""
+    found = [_step(channel, change) for channel, _, change in loading.changes]
+    if wave is not None:
+        found.append(LoadStep("normal-stress oscillation", wave.time, wave.period, wave.mean, wave.amplitude))
+    return tuple(sorted(found, key=lambda step: step.time))
+
+
+def _step(channel: str, change: Change) -> LoadStep:
+    if channel in ("stress", "pore"):
+        kind = "normal-stress step" if channel == "stress" else "pore-pressure step"
+    else:
+        kind = "hold" if change.after == 0.0 else "reslide" if change.before == 0.0 else "velocity step"
+    return LoadStep(kind, change.time, change.duration, change.before, change.after)

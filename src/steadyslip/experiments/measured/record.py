@@ -21,8 +21,7 @@ from steadyslip.core.results import read_only
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
-from steadyslip.experiments.loading.pressing import oscillation, stress_course
-from steadyslip.experiments.measured.steps import LoadStep, steps_of
+from steadyslip.experiments.loading.pressing import LoadStep, oscillation, steps_of, stress_course
 from steadyslip.experiments.numerics.noise import lasting
 from steadyslip.files.output import write_columns
 

@@ -2,17 +2,19 @@
 
 Experiment j has true coordinates θ_j = X_j β + N(0, diag τ²) and says of some of them z_j = θ_j + N(0, C_j). The mean β
 is integrated out with a flat prior, the spreads τ have half-normal ones and are sampled; β and θ follow from them
-exactly (Gelman et al. 2013, Bayesian Data Analysis, ch. 5).
+exactly (Gelman et al. 2013, Bayesian Data Analysis, ch. 5). Samples are drawn by emcee, which only this file imports.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.numerics.sampling import run_walkers
+from steadyslip.core.errors import NotAvailable
 
 MIN_LOG_SPREAD = -16.0  # lower bound of ln(spread / prior scale): spreads below 1e-7 of the scale count as none
 WALKERS, BURN = 40, 250  # least number of walkers, and steps discarded at the start; chosen by trial, for time
@@ -173,3 +175,51 @@ def _conditional_draws(
         drawn[:, one.indices] += spread[:, one.indices] ** 2 * weight
         members[:, j] = drawn
     return Pooled(mean, spread, members, time, chains)
+
+
+def run_walkers(
+    log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str
+) -> tuple[Any, float]:
+    """Run the walkers of an affine-invariant MCMC sampler.
+
+    Parameters
+    ----------
+    log_density : callable
+        Points (m, p) to logarithms of the density (m,), up to a constant.
+    begin : ndarray (walkers, p)
+        Starting points.
+    steps : int
+        Steps of every walker.
+    seed : int
+    what : str
+        Name of the task, for the error message where emcee is missing.
+
+    Returns
+    -------
+    emcee.EnsembleSampler, float
+        The sampler with its chains, and the longest autocorrelation time in steps.
+
+    Raises
+    ------
+    NotAvailable
+        If emcee is not installed.
+    """
+    try:
+        import emcee
+    except ImportError as error:
+        raise NotAvailable(f"{what} needs the package emcee; install steadyslip[lab]") from error
+    sampler = emcee.EnsembleSampler(*begin.shape, log_density, vectorize=True)
+    sampler._random = np.random.RandomState(seed % 2**32)
+    sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
+    return sampler, float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+
+
+def spread_of_chains(chains: Array) -> float:
+    """Split R-hat of chains (c, n) of one quantity: 1 where all halves of chains agree, more where they do not."""
+    half = chains.shape[1] // 2
+    if half < 2:
+        return np.inf
+    parts = np.concatenate([chains[:, :half], chains[:, -half:]])
+    within = float(np.mean(np.var(parts, axis=1, ddof=1)))
+    between = float(np.var(np.mean(parts, axis=1), ddof=1))
+    return float(np.sqrt((half - 1) / half + between / within)) if within > 0 else np.inf

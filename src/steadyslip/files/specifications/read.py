@@ -38,9 +38,8 @@ from steadyslip.files.specifications.layout import (
     sections,
     selector,
 )
-from steadyslip.files.specifications.lines import key_lines, line_of
 from steadyslip.files.specifications.tables import TableReader
-from steadyslip.files.specifications.toml import NotToml, Table, tables_of
+from steadyslip.files.specifications.toml import NotToml, Table, key_lines, line_of, tables_of
 from steadyslip.machine.ends import unknown_ends
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine

@@ -16,9 +16,8 @@ from steadyslip.core.errors import ParameterError, Problem, RigFileError, Steady
 from steadyslip.core.options import checked
 from steadyslip.files.specifications.changes import named_value
 from steadyslip.files.specifications.layout import UNKNOWN, nested_keys
-from steadyslip.files.specifications.lines import key_lines, line_of
 from steadyslip.files.specifications.read import read_rig, text_of
-from steadyslip.files.specifications.toml import tables_of
+from steadyslip.files.specifications.toml import key_lines, line_of, tables_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 

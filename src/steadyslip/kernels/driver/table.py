@@ -1,4 +1,4 @@
-"""Loop of fits: all lanes follow one table of inputs together, with sensitivities (`kernels/lockstep.py`).
+"""Loop of fits: all lanes follow one table of inputs together, with sensitivities (`kernels/experiment.py`).
 
 A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs. All jobs are observed
 at the same times. Each lane takes steps of its own size and interpolates at the times within them; where there are

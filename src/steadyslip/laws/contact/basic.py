@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import nonnegative, positive, real
+from steadyslip.core.domains import Condition, nonnegative, positive, real
 from steadyslip.core.records import parameter
 from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, PreloadedContact
 

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import acute, angle, line, nonnegative, positive, real, turn
+from steadyslip.core.domains import Condition, acute, angle, line, nonnegative, positive, real, turn
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import option, parameter
 from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, PreloadedContact, Shape

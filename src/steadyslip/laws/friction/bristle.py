@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import nonnegative, positive
+from steadyslip.core.domains import Condition, nonnegative, positive
 from steadyslip.core.records import parameter
 from steadyslip.laws.friction.law import Expression, Expressions, FrictionLaw
 

@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import nonnegative
+from steadyslip.core.domains import Condition, nonnegative
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter
 from steadyslip.laws.friction.law import Expression, State

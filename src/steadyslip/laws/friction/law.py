@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import nonnegative, positive, real
+from steadyslip.core.domains import Condition, nonnegative, positive, real
 from steadyslip.core.records import FrozenRecord, parameter
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand

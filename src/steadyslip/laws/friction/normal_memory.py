@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import nonnegative, positive, share
+from steadyslip.core.domains import Condition, nonnegative, positive, share
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter
 from steadyslip.laws.friction.law import Expression, Expressions, State

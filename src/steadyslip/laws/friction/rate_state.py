@@ -10,8 +10,7 @@ from typing import ClassVar
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.conditions import Condition
-from steadyslip.core.domains import positive, real
+from steadyslip.core.domains import Condition, positive, real
 from steadyslip.core.errors import InternalError, Problem
 from steadyslip.core.expressions import asinh_exp
 from steadyslip.core.records import option, parameter, part, parts, stand_in

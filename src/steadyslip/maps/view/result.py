@@ -103,7 +103,7 @@ class MapResult(Displayed):
         """
         import xarray as xr
 
-        from steadyslip.maps.view.lazy import lazily
+        from steadyslip.maps.view.export import lazily
 
         try:
             data = xr.open_zarr(

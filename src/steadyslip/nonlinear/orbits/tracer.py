@@ -13,7 +13,7 @@ from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cut_segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
-from steadyslip.nonlinear.orbits.cycle_properties import cycle_data
+from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_data
 from steadyslip.nonlinear.orbits.end_reasons import ENDS, RETRACED, SHRUNK, STANDING, EndRules, retraces, stands, winds
 from steadyslip.nonlinear.orbits.flow import FAR_MORE, MORE, Flow, FlowFailure
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting

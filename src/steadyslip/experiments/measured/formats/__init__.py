@@ -29,7 +29,7 @@ FORMATS = {
     ".nc": ("netCDF", "netcdf"),
     ".mat": ("MATLAB file", "matlab"),
     **dict.fromkeys((".parquet", ".pq"), ("Parquet", "parquet")),
-    **dict.fromkeys((".xlsx", ".xlsm"), ("Excel workbook", "excel")),
+    **dict.fromkeys((".xlsx", ".xlsm"), ("Excel workbook", "workbook")),
     ".tdms": ("TDMS", "tdms"),
 }
 """Name and module of each format; other files are text, or XLOOK's, which are recognised by their content."""

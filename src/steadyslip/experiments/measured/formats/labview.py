@@ -8,7 +8,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.columns import known_unit
-from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, number
+from steadyslip.experiments.measured.formats.cells import COMMA, POINT, number
 from steadyslip.experiments.measured.formats.table import Table, check_size
 
 BEGIN, END = "LabVIEW Measurement", "***End_of_Header***"

@@ -13,7 +13,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.columns import known_unit, listed
-from steadyslip.experiments.measured.formats.moments import seconds_since_first
+from steadyslip.experiments.measured.formats.cells import seconds_since_first
 
 LENGTH_TOLERANCE = (
     0.03  # relative difference in length of columns that an interrupted acquisition leaves; chosen by trial
@@ -22,12 +22,6 @@ MOST_VALUES, MOST_ROWS = 40_000_000, 10_000_000
 """Most numbers of a file and of a column: with the copies that cleaning makes, they fit into a gigabyte."""
 FEW_VALUES, VALUES_A_BYTE = 2**20, 16
 """Numbers that any file may have, plus this many per byte: even noise takes a byte per number, however compressed."""
-MISSING = {
-    "", "nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "nat", "#n/a", "-nan", "missing",
-    "#div/0!", "#value!", "#ref!", "#num!", "#name?", "#null!", "*", "**", "***", "?", ".",
-    "1.#qnan", "1.#inf", "-1.#ind",
-}  # fmt: skip
-"""Texts of cells without a number."""
 
 
 @dataclass

@@ -14,9 +14,16 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
+from steadyslip.experiments.measured.formats.cells import (
+    COMMA,
+    POINT,
+    day,
+    decimal_marks,
+    moment,
+    number,
+    number_with_any_mark,
+)
 from steadyslip.experiments.measured.formats.labview import BEGIN, read_labview
-from steadyslip.experiments.measured.formats.moments import day, moment
-from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, decimal_marks, number, number_with_any_mark
 from steadyslip.experiments.measured.formats.remarks import Line, harmless_lines
 from steadyslip.experiments.measured.formats.table import Table, check_size, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook

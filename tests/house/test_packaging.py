@@ -1,5 +1,6 @@
 """What is shipped: the source distribution holds every file that its own README names."""
 
+import json
 import os
 import re
 import shutil
@@ -90,6 +91,33 @@ def test_examples_are_listed_and_no_file_of_a_user_is_replaced(tmp_path):
     assert not (tmp_path / "mine/stick-slip.toml").exists()
     (tmp_path / "file").touch()
     assert "Traceback" not in run("examples", "-o", "file", folder=tmp_path).stderr
+
+
+def test_one_version_is_written_everywhere():
+    change = re.search(r"(?m)^## \[(\d[\d.]*)\] - (\S+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    recipe = (ROOT / "packaging/conda/recipe.yaml").read_text(encoding="utf-8")
+    archive = json.loads((ROOT / ".zenodo.json").read_text(encoding="utf-8"))
+    cited = re.search(r"(?m)^version: (\S+)\ndate-released: (\S+)$", citation)
+    assert change.groups() == cited.groups()
+    assert {change[1], re.search(r'version: "(.*)"', recipe)[1], archive["version"]} == {RELEASE}
+
+
+def test_the_conda_recipe_asks_for_what_the_package_needs():
+    about = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    recipe = (ROOT / "packaging/conda/recipe.yaml").read_text(encoding="utf-8")
+    asked = re.findall(r"(?m)^    - (.*)$", recipe.partition("  run:\n")[2].partition("\ntests:")[0])
+    wanted = [word.replace(">=", " >=") for word in about["dependencies"]]
+    wanted = [word.replace("matplotlib ", "matplotlib-base ") for word in wanted]
+    assert asked == ["python >=${{ python_min }}", *wanted]
+    assert f'python_min: "{about["requires-python"].removeprefix(">=")}"' in recipe
+
+
+def test_the_paper_cites_what_is_in_its_list():
+    text = (ROOT / "paper/paper.md").read_text(encoding="utf-8")
+    listed = re.findall(r"@\w+\{(\w+),", (ROOT / "paper/paper.bib").read_text(encoding="utf-8"))
+    assert set(re.findall(r"@(\w+\d{4})", text)) == set(listed)
+    assert 750 <= len(text.split("# Summary")[1].split()) <= 1750
 
 
 def test_oldest_pins_are_the_declared_floors():

@@ -69,7 +69,6 @@ from .linear import (
     stable_stiffness as stable_stiffness,
     stable_values as stable_values,
     state_space as state_space,
-    to_control as to_control,
 )
 from .machine.machine import (
     Machine as Machine,
@@ -122,6 +121,7 @@ from .schemas import (
 )
 from .verdict import (
     analyze as analyze,
+    compare_rigs as compare_rigs,
     cure as cure,
     tolerate as tolerate,
 )

@@ -113,5 +113,5 @@ def test_what_is_asked_for_comes_in_that_order():
         ss.state_space(two_mass(), ["tabel.v"])
     with pytest.raises(ss.UnknownNameError, match=r"unknown input 'table'"):
         ss.state_space(two_mass(), inputs=["table"])
-    named = ss.to_control(two_mass(), ["table.v"])
+    named = ss.linear.to_control(two_mass(), ["table.v"])
     assert (named.output_labels, named.input_labels[1]) == (["table_v"], "motor_push")

@@ -87,7 +87,7 @@ def test_small_amplitudes_answer_as_the_transfer_function(swings, answers, ampli
     periods = np.array([2.0, 20.0])
     found = ss.response(rig, periods, input=swings, output=answers, amplitudes=[amplitude], rtol=1e-12)
     name = {"normal-stress": "normal_disturbance", "drive-velocity": "load_velocity", "push": "disturbance"}[swings]
-    exact = ss.to_control(rig, (answers,), (name,))(2j * np.pi / periods)
+    exact = ss.linear.to_control(rig, (answers,), (name,))(2j * np.pi / periods)
     np.testing.assert_allclose(found.gain, np.abs(exact), rtol=1e-10)
     np.testing.assert_allclose(found.gains[0], np.abs(exact), rtol=1e-6)
     np.testing.assert_allclose(found.phases[0], np.degrees(np.angle(exact)), rtol=1e-6)

@@ -25,6 +25,8 @@ QUICK = {
     "Model": lambda: ss.build_model(RIG), "Tolerated": lambda: ss.tolerate(FIRM, {"stiffness": "5 %"}),
     "Tolerances": lambda: ss.verdict.Tolerances(adjust={"stiffness": made("Adjustment")}),
     "Adjustment": lambda: ss.verdict.Adjustment(low=1e9, high=1e10),
+    "RigComparison": lambda: ss.compare_rigs(RIG, RIG.with_values({"friction.a": 0.015})),
+    "Difference": lambda: made("RigComparison").differences[0],
     "Cures": lambda: ss.cure(RIG), "Window": lambda: made("Cures").windows[0],
     "MachineAnalysis": lambda: ss.analyze(two_mass()), "SteadyMachine": lambda: made("MachineAnalysis").steady,
     "Mode": lambda: made("MachineAnalysis").mode, "SteadyContact": lambda: made("SteadyMachine").contacts["guide"],

@@ -14,7 +14,18 @@ from typer.core import TyperGroup
 
 from steadyslip.cli.answers import formula_data, output_result, print_formula, print_json, print_text
 from steadyslip.cli.ending import end, print_message
-from steadyslip.cli.options import AsJson, Branch, Changes, Fitted, Pieces, RigFile, Until, outputs, refuse_branch
+from steadyslip.cli.options import (
+    AsJson,
+    Branch,
+    Changes,
+    Fitted,
+    OtherRigFile,
+    Pieces,
+    RigFile,
+    Until,
+    outputs,
+    refuse_branch,
+)
 
 
 class _Commands(TyperGroup):
@@ -158,6 +169,24 @@ def cure(
     check_output(output or (), (".html",))
     found = run(*rig_and_tolerances(rig, changes or ()), sure=sure)
     output_result(found, output or (), as_json, partial(write_page, kind="Cures"))
+
+
+@app.command()
+def compare(
+    rig: RigFile,
+    other: OtherRigFile,
+    changes: Changes = None,
+    output: Annotated[list[Path] | None, outputs("write .html")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Two rigs beside each other: verdicts, margins, chances, and which of their differences matters."""
+    from steadyslip.files.output import check_output
+    from steadyslip.files.standalone import write_page
+    from steadyslip.verdict.compare import compare_files
+
+    check_output(output or (), (".html",))
+    found = compare_files(rig, other, changes or ())
+    output_result(found, output or (), as_json, partial(write_page, kind="Comparison"))
 
 
 @app.command()

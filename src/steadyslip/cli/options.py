@@ -24,6 +24,7 @@ def _set_units(context: typer.Context, rig: Path) -> Path:
 RigFile = Annotated[
     Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'", callback=_set_units)
 ]
+OtherRigFile = Annotated[Path, typer.Argument(metavar="OTHER", help="rig file to compare it with")]
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),

@@ -292,7 +292,7 @@ def stand_in(law: type[R]) -> R | None:
     return None if lacking else law(**own)
 
 
-def _layout(record: FrozenRecord) -> tuple[tuple[str, str, Declared], ...]:
+def field_layout(record: FrozenRecord) -> tuple[tuple[str, str, Declared], ...]:
     """Attribute name, own dotted name and role of every field of a record."""
     kind: Any = type(record)
     return _layout_of(kind)
@@ -349,7 +349,7 @@ class Address:
 def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
     """Numeric parameters of a record and the records in it, by dotted name, in order of declaration."""
     found: dict[str, Address] = {}
-    for field_name, own_name, role in _layout(record):
+    for field_name, own_name, role in field_layout(record):
         value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Parameter):
             found[name] = Address(name, role, value)
@@ -367,7 +367,7 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
 
 def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Condition]]:
     """Yield the conditions of a record and the records in it, each with the dotted name of its field."""
-    layout = _layout(record)
+    layout = field_layout(record)
     own = {field_name: prefix + own_name for field_name, own_name, _ in layout}
     for condition in record.conditions():
         first, dot, rest = condition.name.partition(".")
@@ -381,7 +381,7 @@ def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Co
 def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
     """Copy of a record with parameters changed by full dotted name; checked by the constructors."""
     own: dict[str, Any] = {}
-    for field_name, own_name, role in _layout(record):
+    for field_name, own_name, role in field_layout(record):
         value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Part):
             own[field_name] = _each(role, value, name, prefix, lambda member, at: replaced(member, changes, at))
@@ -396,7 +396,7 @@ def with_values(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
     Methods of laws read the record's fields, so one method serves numbers, arrays and symbols.
     """
     copy: R = object.__new__(type(record))
-    for field_name, own_name, role in _layout(record):
+    for field_name, own_name, role in field_layout(record):
         value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Part):
             value = _each(role, value, name, prefix, lambda member, at: with_values(member, values, at))
@@ -409,7 +409,7 @@ def with_values(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
 def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
     """Hashable structure of a record without its numbers: types, options, which parameters are given or zero."""
     shape: list[Any] = [type(record)]
-    for field_name, _, role in _layout(record):
+    for field_name, _, role in field_layout(record):
         value = getattr(record, field_name)
         if isinstance(role, Parameter):
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")

@@ -5,6 +5,7 @@ Knows no maps, figures or documents.
 
 from steadyslip.files.specifications.tolerances import Adjustment, Tolerances, read_tolerances
 from steadyslip.verdict.analyze import Analysis, analyze
+from steadyslip.verdict.compare import Difference, RigComparison, compare_rigs
 from steadyslip.verdict.cures import Cures, Window, cure
 from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
@@ -14,13 +15,16 @@ __all__ = [
     "Adjustment",
     "Analysis",
     "Cures",
+    "Difference",
     "MachineAnalysis",
+    "RigComparison",
     "StableWithin",
     "Tolerances",
     "Tolerated",
     "ValuesWithin",
     "Window",
     "analyze",
+    "compare_rigs",
     "cure",
     "read_tolerances",
     "stable_within",

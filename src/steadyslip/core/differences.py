@@ -1,0 +1,96 @@
+"""Differences between two records, and records that have some of their values from one and some from the other."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from steadyslip.core.names import Members
+from steadyslip.core.records import Declared, FrozenRecord, Part, field_layout
+from steadyslip.core.roles import Parameter
+
+R = TypeVar("R", bound=FrozenRecord)
+
+
+@dataclass(frozen=True)
+class Differing:
+    """A place at which two records differ.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name of a parameter, an option, a law or a member.
+    first, second : object
+        What is there: numbers in SI units, words, records; None if nothing is.
+    role : Parameter or None
+        Of a number.
+    """
+
+    name: str
+    first: Any
+    second: Any
+    role: Parameter | None
+
+
+def differing(first: FrozenRecord, second: FrozenRecord, prefix: str = "") -> Iterator[Differing]:
+    """Yield the places at which two records differ; where laws differ, the whole law."""
+    if type(first) is not type(second):
+        yield Differing(prefix.rstrip("."), first, second, None)
+        return
+    for field_name, own_name, role in field_layout(first):
+        one, other, name = getattr(first, field_name), getattr(second, field_name), prefix + own_name
+        pairs = _pairs(role, one, other, name, prefix)
+        if pairs is None:
+            if one != other:
+                yield Differing(name, one, other, role if isinstance(role, Parameter) else None)
+            continue
+        for at, a, b in pairs:
+            if a is None or b is None:
+                yield Differing(at.rstrip("."), a, b, None)
+            else:
+                yield from differing(a, b, at)
+
+
+def mixed(first: R, second: R, taken: Collection[str], prefix: str = "") -> R:
+    """Copy of the first record with what the second has at the places `taken`; checked by the constructors.
+
+    Raises
+    ------
+    ParameterError
+        If such a record is not allowed.
+    """
+    if type(first) is not type(second):
+        return second if prefix.rstrip(".") in taken else first
+    own: dict[str, Any] = {}
+    for field_name, own_name, role in field_layout(first):
+        one, other, name = getattr(first, field_name), getattr(second, field_name), prefix + own_name
+        pairs = _pairs(role, one, other, name, prefix)
+        if pairs is None:
+            own[field_name] = other if name in taken else one
+            continue
+        made = [
+            mixed(a, b, taken, at) if a is not None and b is not None else b if at.rstrip(".") in taken else a
+            for at, a, b in pairs
+        ]
+        if isinstance(role, Part) and role.keyed:
+            names = list(dict.fromkeys((*one, *other)))
+            own[field_name] = Members({n: m for n, m in zip(names, made, strict=True) if m is not None})
+        else:
+            own[field_name] = tuple(made) if isinstance(role, Part) and role.many else made[0]
+    return replace(first, **own)  # type: ignore[type-var]
+
+
+def _pairs(
+    role: Declared, one: Any, other: Any, name: str, prefix: str
+) -> list[tuple[str, FrozenRecord | None, FrozenRecord | None]] | None:
+    """Records in a field of both, each with the prefix of its names, None for one that lacks it; None of a value."""
+    if not isinstance(role, Part) or one is None or other is None:
+        return None
+    if role.many:
+        if len(one) != len(other):
+            return None
+        return [(f"{name}.{i}.", a, b) for i, (a, b) in enumerate(zip(one, other, strict=True), start=1)]
+    if role.keyed:
+        return [(f"{name}.{key}.", one.get(key), other.get(key)) for key in dict.fromkeys((*one, *other))]
+    return [(prefix if role.inline and type(one) is type(other) else f"{name}.", one, other)]

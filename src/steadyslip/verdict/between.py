@@ -1,0 +1,204 @@
+"""Parts of the differences between two rigs in the change of their verdict: Shapley values over rigs between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.core.areas import is_per_area
+from steadyslip.core.arrays import Array, valid_together
+from steadyslip.core.differences import Differing, differing, mixed
+from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.records import replaced
+from steadyslip.linear.spectrum import growth
+from steadyslip.linear.status import STABLE, UNSTABLE, WORDS, status
+from steadyslip.linear.stiffness import own_safety_factor
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.model.point import operating_point
+
+MOST_EXACT = 12  # differences of which every subset is judged, 4096 rigs; of more, subsets along drawn orders
+MOST_RIGS = 1024  # rigs that are built one by one, some milliseconds each, where laws or zeros differ
+IMPOSSIBLE = "not possible"
+ORDERS = 256  # drawn orders of the differences, each also reversed: the error of a share is some percent
+
+Place = tuple[Differing, ...]
+"""What is changed together: one place, or the keys of which each rig has another (stiffness, axial_stiffness)."""
+
+
+def comparable(first: Slider | Machine, second: Slider | Machine) -> tuple[Slider | Machine, Slider | Machine]:
+    """The two rigs in the same quantities, stresses or totals, in which their areas enter no equation.
+
+    Where areas differ, in those in which fewer values differ.
+    """
+    if not (isinstance(first, Slider) and isinstance(second, Slider)) or first.area == second.area:
+        return first, second
+    stresses = replaced(first, {"slider.area": None}), replaced(second, {"slider.area": None})
+    if first.area is None or second.area is None:
+        return stresses
+    totals = _in_totals(first), _in_totals(second)
+    return min(stresses, totals, key=lambda pair: len(list(differing(*pair))))
+
+
+def _in_totals(rig: Slider) -> Slider:
+    values = {name: one for name, one in rig.parameters().items() if one.value is not None}
+    stresses = {name: one.value * rig.area for name, one in values.items() if is_per_area(one.role.unit)}  # type: ignore[operator]
+    return replaced(rig, stresses | {"slider.area": 1.0})
+
+
+def places(first: Slider | Machine, second: Slider | Machine) -> tuple[Place, ...]:
+    """Places at which two comparable rigs differ and that enter their equations."""
+    idle = {*first.not_in_model, *second.not_in_model}
+    found: list[Place] = []
+    exchanged: dict[str, list[Differing]] = {}  # by table: given in one rig alone, and by a name of that table
+    for one in differing(first, second):
+        if one.name in idle:
+            continue
+        table = one.name.rpartition(".")[0]
+        if one.role is not None and (one.first is None) != (one.second is None):
+            exchanged.setdefault(table, []).append(one)
+        else:
+            found.append((one,))
+    for several in exchanged.values():
+        swap = len({one.first is None for one in several}) == 2
+        found += [tuple(several)] if swap else [(one,) for one in several]
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """Verdicts on m rigs, (m,): the words of `stability`, or ``not possible``; growth rate (1/s); k/k_cr; else NaN."""
+
+    words: Array
+    growth: Array
+    safety: Array
+
+
+@dataclass(frozen=True)
+class Between:
+    """Rigs that have some of the differing values from one rig and the others from another.
+
+    Attributes
+    ----------
+    first, second : Slider or Machine
+        Comparable.
+    places : tuple of Place
+    """
+
+    first: Slider | Machine
+    second: Slider | Machine
+    places: tuple[Place, ...]
+
+    def outcomes(self, masks: Array) -> Outcomes:
+        """Verdicts on the rigs with the second's values where `masks` (m, places) are True."""
+        unknown = np.full(len(masks), math.nan)
+        found = Outcomes(np.full(len(masks), IMPOSSIBLE, dtype=object), unknown, unknown.copy())
+        built = np.array([not self._varies(place) for place in self.places], dtype=bool)
+        kinds, which = np.unique(masks[:, built], axis=0, return_inverse=True)
+        for i, kind in enumerate(kinds):
+            rows = np.flatnonzero(np.ravel(which) == i)
+            taken = {one.name for j in np.flatnonzero(built)[kind] for one in self.places[j]}
+            try:
+                rig = mixed(self.first, self.second, taken)
+                self._judge(rig, masks[rows], built, rows, found)
+            except (ParameterError, NotAvailable):
+                continue  # such a rig cannot exist
+        return found
+
+    def _judge(self, rig: Slider | Machine, masks: Array, built: Array, rows: Array, found: Outcomes) -> None:
+        vary = {
+            place[0].name: np.where(masks[:, j], place[0].second, place[0].first)
+            for j, place in enumerate(self.places)
+            if not built[j]
+        }
+        possible = np.broadcast_to(valid_together(rig, "", vary), rows.shape)
+        rows = rows[possible]
+        if not rows.size:
+            return
+        point = operating_point(rig, {name: values[possible] for name, values in vary.items()})
+        with np.errstate(all="ignore"):
+            found.words[rows] = np.broadcast_to(np.array(WORDS)[status(point)], rows.shape)
+            found.growth[rows] = growth(point)
+            if isinstance(rig, Slider):
+                found.safety[rows] = own_safety_factor(point)
+
+    def _varies(self, place: Place) -> bool:
+        """True if the place is a number that both rigs have, and none of them as zero: one model serves both."""
+        (one, *more) = place
+        plain = not more and one.role is not None and bool(one.first) and bool(one.second)
+        return plain and one.name in self.first.parameters() and one.name in self.second.parameters()
+
+
+def shapley(between: Between) -> tuple[str, Array]:
+    """Shapley value of every place in the change of a measure from the first rig to the second.
+
+    The value of a place is the mean of what its change adds, over all orders in which the places can be changed (L. S.
+    Shapley, A value for n-person games, 1953); with more than `MOST_EXACT` places over drawn orders (J. Castro,
+    D. Gómez and J. Tejada, Computers & Operations Research 36, 2009). The values add up to the whole change.
+
+    Returns
+    -------
+    measure : str
+        ``safety``: natural logarithm of k/k_cr, where all rigs between have one that tells their verdict; else
+        ``growth``: growth rate, 1/s; empty where some rig between has neither.
+    values : ndarray (places,)
+    """
+    count = len(between.places)
+    built = sum(not between._varies(place) for place in between.places)
+    exact = count <= MOST_EXACT and 2**built <= MOST_RIGS
+    orders = _orders(count, ORDERS if 2**built <= MOST_RIGS else max(1, MOST_RIGS // (2 * count)))
+    masks = _all_subsets(count) if exact else _prefixes(orders)
+    found = between.outcomes(masks)
+    measure, worth = _measure(found)
+    if not measure:
+        return measure, np.full(count, math.nan)
+    if exact:
+        return measure, _exact(worth, count)
+    steps = np.diff(worth.reshape(len(orders), count + 1), axis=1)
+    values = np.zeros((len(orders), count))
+    np.put_along_axis(values, orders, steps, axis=1)
+    return measure, values.mean(axis=0)
+
+
+def _measure(found: Outcomes) -> tuple[str, Array]:
+    """What tells the distance of all these rigs from the edge, and its value for each."""
+    stable = found.words == WORDS[STABLE]
+    if not np.all(stable | (found.words == WORDS[UNSTABLE])):
+        return "", found.growth
+    if np.all(found.safety > 0) and np.all((found.safety > 1) == stable):
+        return "safety", np.log(found.safety)
+    return ("growth" if np.all(np.isfinite(found.growth)) else ""), found.growth
+
+
+def _all_subsets(count: int) -> Array:
+    """Rows of bool (2**count, count); row i has the binary digits of i, the lowest first."""
+    return np.asarray((np.arange(2**count)[:, None] >> np.arange(count)) & 1 == 1)
+
+
+def _exact(worth: Array, count: int) -> Array:
+    rows = np.arange(2**count)
+    size = _all_subsets(count).sum(axis=1)
+    weight = np.array([1 / (count * math.comb(count - 1, n)) for n in range(count)])
+    without = [rows[(rows >> j) & 1 == 0] for j in range(count)]
+    return np.array([np.sum(weight[size[r]] * (worth[r | 1 << j] - worth[r])) for j, r in enumerate(without)])
+
+
+def _orders(count: int, drawn_orders: int) -> Array:
+    """Drawn orders of the places and their reversals, (2 drawn_orders, count)."""
+    chance = np.random.default_rng(0)
+    drawn = np.array([chance.permutation(count) for _ in range(drawn_orders)])
+    return np.concatenate([drawn, drawn[:, ::-1]])
+
+
+def _prefixes(orders: Array) -> Array:
+    """Subsets on the way along each order, from none to all, as rows of bool (orders * (count + 1), count)."""
+    count = orders.shape[1]
+    rank = np.argsort(orders, axis=1)
+    return np.asarray(rank[:, None, :] < np.arange(count + 1)[None, :, None]).reshape(-1, count)
+
+
+def ones_and_others(count: int) -> Array:
+    """Subsets of one place each, then of all but one each, (2 count, count)."""
+    return np.concatenate([np.eye(count, dtype=bool), ~np.eye(count, dtype=bool)])

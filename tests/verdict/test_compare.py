@@ -1,0 +1,163 @@
+"""Comparison of two rigs: parts agree with closed forms and with all orders by hand."""
+
+import itertools
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from command import run
+from rigs_of_theory import rate_state, rig
+from steadyslip.verdict import between
+from toleranced import AXIS
+
+TILTED = rig(
+    friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.5)),
+    contact=ss.laws.InclinedSpring(preload=5e6, angle=-0.3), mass=1e3,
+)  # fmt: skip
+EXACT = 1e-9  # relative: sums of some ten rounded numbers
+
+
+def parts(found):
+    return {one.parameter: one.part for one in found.differences}
+
+
+def test_nothing_differs_from_itself():
+    for one in (rig(), ss.read_rig("examples/machines/feed-axis.toml")):
+        found = ss.compare_rigs(one, one)
+        assert found.differences == ()
+        assert "same equations" in str(found)
+
+
+def test_parts_of_a_product_are_its_factors():
+    """Quasistatic, constant σ: k/k_cr = k d_c/(σ(b − a)), so the parts of σ, k and d_c are their ratios."""
+    a = rig()
+    b = a.with_values({"stiffness": 3 * a.value("stiffness"), "preload": 8e6, "d_c": 4e-6})
+    found = ss.compare_rigs(a, b)
+    assert found.measure == "safety"
+    wanted = {"slider.stiffness": 3, "contact.preload": 5 / 8, "friction.d_c": 4e-6 / a.value("d_c")}
+    assert parts(found) == pytest.approx(wanted, rel=EXACT)
+    assert sum(one.share for one in found.differences) == pytest.approx(1, rel=EXACT)
+
+
+def orders_by_hand(a, b, names, measure):
+    """Mean step of each value over all orders, from rigs that are judged one by one."""
+    total = dict.fromkeys(names, 0.0)
+    for order in itertools.permutations(names):
+        now = a
+        for name in order:
+            after = now.with_values({name: b.value(name)})
+            total[name] += measure(after) - measure(now)
+            now = after
+    return {name: value / math.factorial(len(names)) for name, value in total.items()}
+
+
+def test_parts_are_means_over_all_orders():
+    a = TILTED
+    b = a.with_values({"angle": 0.3, "friction.a": 0.011, "alpha": 0.2, "mass": 4e4})
+    found = ss.compare_rigs(a, b)
+    by_hand = orders_by_hand(a, b, list(parts(found)), lambda one: math.log(ss.safety_factor(one)))
+    assert found.measure == "safety"
+    assert {name: math.log(one) for name, one in parts(found).items()} == pytest.approx(by_hand, rel=1e-7)
+
+
+def test_parts_of_a_machine_are_of_the_growth_rate():
+    a = ss.read_rig("examples/machines/feed-axis.toml")
+    b = a.with_values({"table.mass": 500.0, "screw.stiffness": 3e7, "guide.friction.a": 0.02})
+    found = ss.compare_rigs(a, b)
+    assert found.measure == "growth"
+    assert parts(found) == pytest.approx(orders_by_hand(a, b, list(parts(found)), ss.growth_rate), rel=1e-6, abs=1e-9)
+    assert sum(parts(found).values()) == pytest.approx(ss.growth_rate(b) - ss.growth_rate(a), rel=1e-9)
+
+
+def test_exchanging_the_rigs_inverts_the_parts():
+    a = TILTED
+    b = a.with_values({"angle": 0.2, "friction.b": 0.02})
+    there, back = parts(ss.compare_rigs(a, b)), parts(ss.compare_rigs(b, a))
+    assert back == pytest.approx({name: 1 / one for name, one in there.items()}, rel=EXACT)
+
+
+def test_drawn_orders_agree_with_all(monkeypatch):
+    a = TILTED
+    b = a.with_values({"angle": 0.3, "friction.a": 0.011, "alpha": 0.2, "mass": 4e4, "d_c": 3e-6})
+    exact = ss.compare_rigs(a, b)
+    monkeypatch.setattr(between, "MOST_EXACT", 2)
+    drawn = ss.compare_rigs(a, b)
+    size = sum(abs(math.log(one)) for one in parts(exact).values())
+    for name, one in parts(exact).items():
+        assert abs(math.log(parts(drawn)[name] / one)) < 0.05 * size  # drawn orders: error of some percent
+    assert math.prod(parts(drawn).values()) == pytest.approx(math.prod(parts(exact).values()), rel=EXACT)
+
+
+def test_keys_that_exclude_each_other_are_one_difference_and_laws_are_whole():
+    a = rig(contact=ss.laws.InclinedSpring(preload=5e6, angle=-0.3))
+    b = ss.Slider(
+        friction=rate_state(evolution=ss.laws.Aging()), contact=a.contact, axial_stiffness=2e10, drive=a.drive
+    )
+    found = ss.compare_rigs(a, b)
+    assert set(parts(found)) == {"slider.stiffness + axial_stiffness", "friction.evolution"}
+    assert parts(found)["friction.evolution"] == pytest.approx(1, rel=EXACT)  # slip and aging share one linearisation
+
+
+def test_a_contact_area_enters_no_equation():
+    """Ten times the area with the same forces is the same rig."""
+    a = ss.Slider(friction=rate_state(), contact=ss.laws.ConstantNormalStress(preload=5e6), stiffness=1e9, area=1e-3,
+                  drive=ss.machine.SteadyDrive(1e-6))  # fmt: skip
+    b = a.with_values({"area": 1e-2, "preload": 5e5, "stiffness": 1e8})
+    assert ss.compare_rigs(a, b).differences == ()
+    assert ss.compare_rigs(a, a.with_values({"area": 1e-2})).differences == ()  # the same stresses
+
+
+def test_a_rig_between_that_locks_up_leaves_verdicts_without_parts():
+    a = rig(contact=ss.laws.InclinedSpring(preload=5e6, angle=-0.9))
+    b = a.with_values({"angle": -0.1, "mu_ref": 1.2})
+    found = ss.compare_rigs(a, b)
+    assert found.measure == ""
+    assert all(math.isnan(one.part) for one in found.differences)
+    with_it = {one.parameter: one.first_with for one in found.differences}
+    assert with_it["friction.mu_ref"] == "no steady sliding"
+
+
+def test_verdicts_with_one_value_of_the_other_are_those_of_analyze():
+    a = TILTED
+    b = a.with_values({"stiffness": 5e10, "friction.b": 0.0155, "mass": 4e4})
+    for one in ss.compare_rigs(a, b).differences:
+        assert one.first_with == ss.stability(a.with_values({one.parameter: b.value(one.parameter)}))
+        assert one.second_with == ss.stability(b.with_values({one.parameter: a.value(one.parameter)}))
+
+
+def test_files_are_compared_with_their_tolerances(tmp_path):
+    first, second = tmp_path / "a.toml", tmp_path / "b.toml"
+    first.write_text(AXIS)
+    second.write_text(re.sub(r" (±|\+-|\+/-) 20 %", "", AXIS).replace('"12 N/um"', '"25 N/um"'))
+    page = tmp_path / "page.html"
+    done = run("compare", first, second, "-o", page)
+    assert done.returncode == 0
+    assert "slider.stiffness  12 N/um -> 25 N/um" in done.stdout
+    assert "a becomes stable with that of b in slider.stiffness" in done.stdout
+    assert re.search(r"stable in +24\.\d+ ± 0\.\d+ % +\w", done.stdout)
+    assert "slider.stiffness" in page.read_text()
+
+
+def test_json_has_both_rigs_and_their_differences():
+    done = run("compare", "examples/slow-axis.toml", "examples/slow-axis.toml", "--set", "drive.kp=2 N/um", "--json")
+    data = json.loads(done.stdout)
+    assert data["differences"] == []
+    assert [one["stable"] for one in data["rigs"]] == [True, True]
+
+
+def test_a_slider_beside_a_machine_is_refused():
+    with pytest.raises(ss.ParameterError, match="machine of one body"):
+        ss.compare_rigs(rig(), ss.read_rig("examples/machines/feed-axis.toml"))
+    done = run("compare", "examples/slow-axis.toml", "examples/machines/feed-axis.toml")
+    assert done.returncode == 2
+    assert "machine of one body" in done.stderr
+
+
+def test_orders_and_subsets_are_complete():
+    assert {tuple(row) for row in between._all_subsets(3)} == set(itertools.product((False, True), repeat=3))
+    rows = between._prefixes(np.array([[2, 0, 1]]))
+    assert rows.tolist() == [[False] * 3, [False, False, True], [True, False, True], [True] * 3]

@@ -15,21 +15,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import steadyslip as ss
-from steadyslip.figures.style import BLACK, BLUE, GREY, VERMILION
+from steadyslip.core.palette import BLACK, BLUE, GREY, VERMILION
+from steadyslip.figures.style import JOURNAL
 from steadyslip.units import GPa, MPa, m, mm, s, um
 
-WIDTH, FONT = 85 / 25.4, 7.0  # inches, points
-STYLE = {
-    "font.size": FONT, "axes.labelsize": FONT, "xtick.labelsize": FONT, "ytick.labelsize": FONT, "legend.fontsize": 6.5,
-    "legend.frameon": False, "legend.handlelength": 2.6, "lines.linewidth": 1.0, "lines.markersize": 3.5,
-    "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6, "svg.hashsalt": "steadyslip",
-    "svg.fonttype": "path",
-}  # fmt: skip
+STYLE = JOURNAL | {"svg.hashsalt": "steadyslip", "svg.fonttype": "path"}
 
 
 def panels(*heights):
     """Axes one above the other, of heights in mm."""
-    figure = Figure(figsize=(WIDTH, sum(heights) / 25.4), layout="constrained")
+    figure = Figure(figsize=(JOURNAL["figure.figsize"][0], sum(heights) / 25.4), layout="constrained")
     return np.atleast_1d(figure.subplots(len(heights), 1, height_ratios=heights))
 
 

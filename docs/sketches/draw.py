@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
 
 from steadyslip import analyze, figures, read_rig
-from steadyslip.figures.style import BLACK, BLUE, GREEN, VERMILION
+from steadyslip.core.palette import BLACK, BLUE, GREEN, VERMILION
 from steadyslip.reproduce import paper_rig
 from steadyslip.units import GPa, deg
 
@@ -353,9 +353,6 @@ def overview():
     figures.stability_chart(rig, "angle", "stiffness", chart, ("-70 deg", "60 deg"), (0, 40 * GPa), points=101)
     chart.set(xlabel="spring angle ψ (deg)", ylabel="spring stiffness k (GPa/m)")
     chart.get_legend().remove()
-    chart.text(20, 25, "slides steadily", ha="center")
-    chart.text(-8, 4, "unstable", ha="center")
-    chart.text(-62.5, 20, "locked up", rotation=90, ha="center", va="center")
     chart.annotate("this rig", (-20, 16), xytext=(12, 5), textcoords="offset points")
     chart.set_title("Where does it slide steadily?", fontsize=11)
     return ax

@@ -1,5 +1,6 @@
 """Pictures that must not mislead: spacing of axes, samples without a value, runs that hardly change, probabilities."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,12 @@ from matplotlib.figure import Figure
 import lab_records as lab
 import steadyslip as ss
 from dimensionless import unit_rig
+from steadyslip import figures
+from steadyslip.core import palette
 from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.map_axes import Scale, is_geometric
+from steadyslip.figures.style import EDGES, save_with_footer
 from steadyslip.maps.view.cut import _quantiles, _with_failures
 
 
@@ -69,3 +73,42 @@ def test_a_dollar_in_a_name_is_a_dollar(tmp_path):
         assert name.partition(".")[0] in title.get_text()
         assert not title.get_parse_math()
         plt.close(axes[0].figure)
+
+
+@pytest.mark.parametrize("theme", [palette.LIGHT, palette.DARK])
+def test_areas_differ_in_grey(theme):
+    """A quarter of the lightness scale between any two of these, so that a print in grey tells them apart."""
+    light = {name: palette.lightness(theme[name]) for name in ("stable", "unstable", "blow-up")}
+    assert abs(light["stable"] - light["unstable"]) >= 25
+    assert abs(light["blow-up"] - light["unstable"]) >= 25
+    if theme is palette.LIGHT:
+        assert abs(light["blow-up"] - light["stable"]) >= 25
+
+
+def test_edges_of_different_kinds_look_different():
+    styles = [str(style["linestyle"]) for style in EDGES.values()]
+    assert len(set(styles)) == len(styles)
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_a_saved_figure_says_what_it_shows(tmp_path, ending):
+    """The rig, the version and the date stand in it, in its own fonts; a figure for a journal is 85 mm wide."""
+    run = ss.simulate(unit_rig("aging", 0.5, 1.5), until=1.0)
+    with figures.journal():
+        axes = run.plot()
+        save_with_footer(axes, str(tmp_path / f"run.{ending}"), run)
+    figure = axes[0].figure
+    (footer,) = figure.texts
+    assert "stiffness\xa0k" in footer.get_text()
+    assert f"steadyslip\xa0{ss.__version__}" in footer.get_text()
+    assert re.search(r"\d{4}-\d\d-\d\d$", footer.get_text())
+    assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+    figure.canvas.draw()
+    box = footer.get_window_extent()
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= min(ax.get_tightbbox().y0 for ax in axes) + 1
+    if ending == "pdf":
+        assert b"/FontFile2" in (tmp_path / "run.pdf").read_bytes()
+    if ending == "svg":
+        assert "<text" not in (tmp_path / "run.svg").read_text(encoding="utf-8")
+    plt.close(figure)

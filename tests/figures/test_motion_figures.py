@@ -61,13 +61,13 @@ def test_phase_plane_shows_the_run_and_steady_states(spiral):
 
 
 def test_the_dot_is_where_a_stable_run_ends_and_stress_steps_are_named(spiral):
-    dot = lines(spiral.plot("phase", ax=Figure().subplots()))["_steady sliding"]
+    dot = lines(spiral.plot("phase", ax=Figure().subplots()))["steady sliding of the last drive"]
     assert dot.get_xdata()[0] == pytest.approx(np.log(1.5))
     assert dot.get_ydata()[0] == pytest.approx(spiral["spring_stress"][-1], rel=1e-3)
     pressed = ss.simulate(paper_rig(), ss.protocol.NormalStressStep(at=1.0, by=1e4), until=5.0)
     drawn = lines(pressed.plot("phase", ax=Figure().subplots()))
     assert "steady states before the change of normal stress" in drawn
-    assert "_steady sliding" not in drawn
+    assert "steady sliding of the last drive" not in drawn
 
 
 def test_history_needs_three_axes(spiral):

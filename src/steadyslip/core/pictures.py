@@ -12,6 +12,7 @@ from steadyslip.core.errors import NotAvailable, unknown_name
 
 _figures: dict[type, dict[str, Callable[..., Any]]] = {}
 _sources: list[Callable[[], object]] = []
+_savers: list[Callable[[Any, str, Any], object]] = []
 
 
 def register_figures(result: type, **figures: Callable[..., Any]) -> None:
@@ -26,6 +27,16 @@ def register_figures(result: type, **figures: Callable[..., Any]) -> None:
 def figures_from(load: Callable[[], object]) -> None:
     """Set a function that imports the figures; it is called once, when the first figure is drawn."""
     _sources.append(load)
+
+
+def saved_by(save: Callable[[Any, str, Any], object]) -> None:
+    """Set the function that saves drawn Axes to a file, given the path and the result that they show."""
+    _savers[:] = [save]
+
+
+def save(axes: Any, path: str, result: Any) -> None:
+    """Save the figure of Axes, or of an array of them, with what it shows: the rig of the result, version and date."""
+    _savers[-1](axes, path, result)
 
 
 def draw(result: Any, kind: str | None = None, **options: Any) -> Any:

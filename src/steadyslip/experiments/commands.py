@@ -55,7 +55,7 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Dra
     def as_page(target: Path) -> None:
         write_page(fit, target, "Fit", comparison=comparison, draws=draws)
 
-    write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
+    write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot, fit)
 
 
 def write_table(found: StepTable, path: Path) -> None:
@@ -84,7 +84,7 @@ def write_population(found: Population, path: Path) -> None:
     def as_page(target: Path) -> None:
         write_page(found, target, "Population")
 
-    write_by_ending(path, {".nc": found.save, ".html": as_page, ".json": as_text}, found.plot)
+    write_by_ending(path, {".nc": found.save, ".html": as_page, ".json": as_text}, found.plot, found)
 
 
 def write_speeds(found: SpeedFit, path: Path) -> None:

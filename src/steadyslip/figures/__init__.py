@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-from steadyslip.core.pictures import register_figures
+from steadyslip.core.pictures import register_figures, saved_by
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction, Profile, Record
 from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
@@ -27,6 +27,7 @@ from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
+from steadyslip.figures.style import journal, save_with_footer
 from steadyslip.figures.tolerances import tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
@@ -47,6 +48,7 @@ __all__ = [
     "frozen_verdicts",
     "history",
     "hopf_curve",
+    "journal",
     "kicks",
     "machine_sketch",
     "machine_verdict",
@@ -73,6 +75,7 @@ def _locus(found: Analysis, ax: Axes | None = None, **options: Any) -> Axes:
     return root_locus(found.rig, ax, **options)
 
 
+saved_by(save_with_footer)
 register_figures(Analysis, locus=_locus)
 register_figures(
     MachineAnalysis, verdict=machine_verdict, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane

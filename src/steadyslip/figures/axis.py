@@ -12,7 +12,7 @@ import numpy as np
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.roles import Parameter
-from steadyslip.figures.style import axis_label, display_unit
+from steadyslip.figures.style import axis_label, display_unit, parameter_label
 from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider
 
@@ -75,7 +75,7 @@ def chart_axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> ChartAxi
     log = low > 0 and high / low > 100
     typical = value if low <= value <= high and value else math.sqrt(low * high) if log else max(abs(low), abs(high))
     factor, unit_name = display_unit(role.unit, typical, rig.area)
-    return ChartAxis(full, low, high, log, factor, axis_label(full, unit_name))
+    return ChartAxis(full, low, high, log, factor, axis_label(parameter_label(rig, full), unit_name))
 
 
 def _checked_range(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[float, float]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -10,16 +12,23 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures import regions
 from steadyslip.figures.axis import ChartAxis, chart_axis
-from steadyslip.figures.style import BLACK, GREY, ORANGE, OWN_RIG, SKY, add_legend_above, axes_or_new
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
+from steadyslip.figures.style import AREAS, CONTOURS, EDGES, HALO, OWN_RIG, SAFETY_LEVELS, add_legend_above, axes_or_new
+from steadyslip.linear.stable_values import safety_factor
+from steadyslip.linear.status import ABSENT, STABLE, status as status_of
+from steadyslip.linear.stiffness import eigenvalues
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence
 
+_CONTOUR_POINTS = 61  # along each axis: contours are smooth, and delays cost some 0.1 ms a point (measured)
+_LETTER, _LINE = (
+    0.0105,
+    0.045,
+)  # half a letter's width and a line's height with its halo, share of the axes of a new figure
 _SAMPLES = 12  # points at which the reason for no steady sliding is computed: time against missing a reason (by trial)
 
 
@@ -66,38 +75,111 @@ def stability_chart(
     if not isinstance(points, int) or points < 2:
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a whole number >= 2")])
 
+    def vary(a: Any, b: Any) -> dict[str, Any]:
+        return {first.name: first.at(a), second.name: second.at(b)}
+
     def status(a: Any, b: Any) -> Any:
-        return status_of(operating_point(rig, {first.name: first.at(a), second.name: second.at(b)}, scan=True))
+        return status_of(operating_point(rig, vary(a, b), scan=True))
 
     ax = axes_or_new(ax)
-
-    def draw(code: int, label: str, **style: Any) -> bool:
-        path = regions.region_path(lambda a, b: status(a, b) == code, points)
-        if len(path):
-            path = Path(np.column_stack(_display_points(path.vertices, first, second)), path.codes)
-            ax.add_patch(PathPatch(path, label=label, linewidth=0, **style))
-        return len(path) > 0
-
-    draw(STABLE, "stable", facecolor=SKY, alpha=0.55)
-    draw(UNSTABLE, "unstable", facecolor=ORANGE, alpha=0.45)
-    reasons = _absence_reasons(rig, first, second, status, points)
-    if draw(ABSENT, f"no steady sliding ({reasons})", facecolor="white", edgecolor=GREY, hatch="///"):
-        gone = regions.edges(lambda a, b: status(a, b) == ABSENT, points)
-        ax.plot(
-            *_display_points(gone, first, second), color=BLACK, linestyle="--", linewidth=1.5, label=f"edge: {reasons}"
-        )
-    line = regions.edges(lambda a, b: status(a, b) == STABLE, points, lambda a, b: status(a, b) != ABSENT)
-    if np.isfinite(line).any():
-        ax.plot(*_display_points(line, first, second), color=BLACK, linewidth=2, label="edge of stability")
-    _mark_own(ax, rig, first, second)
     _set_axes(ax, first, second)
+    grid = regions.on_grid(status, points)
+
+    def place(shares: Any) -> tuple[Any, Any]:
+        return _display_points(shares, first, second)
+
+    def inside(code: int) -> regions.Predicate:
+        return lambda a, b: status(a, b) == code
+
+    reasons = _absence_reasons(rig, first, second, grid)
+    for code, (words, style) in AREAS.items():
+        path = regions.region_path(inside(code), grid == code)
+        if len(path):
+            label = f"{words} ({reasons})" if code == ABSENT and reasons else words
+            ax.add_patch(PathPatch(Path(np.column_stack(place(path.vertices)), path.codes), label=label, **style))
+    draw_contours(ax, rig, first, second, grid)
+    gone = regions.edges(inside(ABSENT), grid == ABSENT)
+    if np.isfinite(gone).any():
+        ax.plot(*place(gone), **EDGES["no steady sliding"], label=f"edge: {reasons}")
+    line = regions.edges(inside(STABLE), grid == STABLE, grid == ABSENT)
+    draw_edges(ax, rig, line, vary, place)
+    _mark_own(ax, rig, first, second)
+    written = [words for code, (words, _) in AREAS.items() if write_inside(ax, grid == code, words, place)]
+    add_legend_above(ax, without=written)
     return ax
 
 
-def _absence_reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) -> str:
+Place = Callable[[Any], tuple[Any, Any]]  # fractions of the axes, shape (n, 2), to their units
+
+
+def draw_edges(ax: Axes, rig: Slider | Machine, line: Any, vary: Callable[[Any, Any], Any], place: Place) -> None:
+    """Draw the edge of stability, with the style of what begins beyond it: of the least damped disturbance on it.
+
+    `line` has its points in fractions of the axes, shape (n, 2), NaN between pieces; `vary` gives the parameters there.
+    """
+    kinds = np.full(len(line), "", dtype="<U16")
+    known = np.flatnonzero(np.isfinite(line[:, 0]))
+    if not len(known):
+        return
+    roots = eigenvalues(rig, vary(*line[known].T))
+    sizes = np.maximum(np.abs(roots), np.finfo(float).tiny)
+    rates = np.where(np.isfinite(roots), np.abs(roots.real) / sizes, np.inf)
+    least = np.take_along_axis(roots, np.argmin(rates, axis=-1)[:, None], axis=-1)[:, 0]
+    kinds[known] = np.where(np.abs(least.imag) > np.abs(least.real), "oscillation", "drift")
+    for kind in ("oscillation", "drift"):
+        here = kinds == kind
+        here[1:] |= here[:-1] & (kinds[1:] != "")  # up to the next point, so that there is no gap between pieces
+        if here.any():
+            points = place(np.where(here[:, None], line, np.nan))
+            ax.plot(*points, **EDGES[kind], label=f"edge of stability: {kind}")
+
+
+def draw_contours(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) -> None:
+    """Draw contours of k/k_cr over a chart whose statuses are `grid`; none where no stiffness is critical."""
+    share = np.linspace(0, 1, _CONTOUR_POINTS)
+    a, b = np.meshgrid(share, share)
+    vary = {x.name: x.at(a), y.name: y.at(b)}
+    nearest = (share * (len(grid) - 1)).round().astype(int)
+    slides = grid[np.ix_(nearest, nearest)] != ABSENT
+    values = None
+    with suppress(NotAvailable, ParameterError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of delays too long to be judged: there are no contours there
+        values = safety_factor(rig, vary)
+    if values is None or not np.isfinite(values).any():
+        return
+    values = np.where(slides & np.isfinite(values), values, np.nan)
+    shown = [level for level in SAFETY_LEVELS if level != 1 and np.nanmin(values) < level < np.nanmax(values)]
+    if shown:
+        lines = ax.contour(x.shown(x.at(share)), y.shown(y.at(share)), values, levels=shown, **CONTOURS)
+        ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}")
+        ax.plot([], [], color=CONTOURS["colors"], linewidth=CONTOURS["linewidths"], label="k/k$_{cr}$")
+
+
+def write_inside(ax: Axes, region: Any, words: str, place: Place) -> bool:
+    """Write words into the widest place of a region, upright if there is room for them only so; True if there is room.
+
+    `region` is true inside, shape (rows, columns); `place` gives the units of the axes for fractions of them, (n, 2).
+    """
+    mask, length = region.copy(), _LETTER * len(words)
+    rows, columns = np.indices(mask.shape)
+    own = [np.asarray(line.get_xydata())[0] for line in ax.lines if line.get_label() == OWN_RIG["label"]]
+    others = np.reshape([*(text.get_position() for text in ax.texts), *own], (-1, 2))
+    for x, y in ax.transAxes.inverted().transform(ax.transData.transform(others)):
+        away = np.abs(columns / (mask.shape[1] - 1) - x), np.abs(rows / (mask.shape[0] - 1) - y)
+        mask &= (away[0] > 2 * _LETTER) | (away[1] > _LINE)
+    for size, turned in (((length, _LINE), 0), ((_LINE, length), 90)):
+        across, up, room = regions.widest_place(mask, size)
+        if room >= 1:
+            x, y = (float(one[0]) for one in place(np.array([[across, up]])))
+            ax.text(x, y, words, ha="center", va="center", rotation=turned, path_effects=HALO, zorder=4)
+            return True
+    return False
+
+
+def _absence_reasons(rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) -> str:
     """Reasons for no steady sliding (lock-up, lift-off), from up to `_SAMPLES` points of the chart without it."""
-    share = np.linspace(0, 1, points)
-    b, a = np.nonzero(status(*np.meshgrid(share, share)) == ABSENT)
+    share = np.linspace(0, 1, len(grid))
+    b, a = np.nonzero(grid == ABSENT)
     if not len(a):
         return ""
     chosen = np.unique(np.linspace(0, len(a) - 1, _SAMPLES).astype(int))
@@ -128,4 +210,3 @@ def _set_axes(ax: Axes, x: ChartAxis, y: ChartAxis) -> None:
     ax.set_ylim(y.shown(y.low), y.shown(y.high))
     ax.set_xlabel(x.label)
     ax.set_ylabel(y.label)
-    add_legend_above(ax)

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.palette import BLACK, CURVES, LINES
 from steadyslip.figures import mass
-from steadyslip.figures.style import BLACK, CURVES, LINES, axes_or_new, axis_label
+from steadyslip.figures.style import axes_or_new, axis_label
 from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider
 from steadyslip.units import deg

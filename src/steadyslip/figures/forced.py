@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, axis_label, display_unit, new_panels
+from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+from steadyslip.figures.style import axis_label, display_unit, new_panels
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import FrequencyResponse, FrozenVerdicts

@@ -11,7 +11,8 @@ from matplotlib.colors import LogNorm
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.figures.style import BLACK, VERMILION, add_legend_above, axes_or_new, axis_label, display_unit
+from steadyslip.core.palette import BLACK, VERMILION
+from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit
 from steadyslip.linear import eigenvalues, stable_stiffness, stable_values
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point

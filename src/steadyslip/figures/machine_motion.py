@@ -8,21 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.format import format_quantity
-from steadyslip.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    add_arrowheads,
-    add_legend_above,
-    axes_or_new,
-    axis_label,
-    display_unit,
-)
+from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from steadyslip.figures.style import add_arrowheads, add_legend_above, axes_or_new, axis_label, display_unit
 from steadyslip.machine.machine import Machine
 from steadyslip.model.sliding import steady_contact_at
 from steadyslip.motion.events import ContactSlip

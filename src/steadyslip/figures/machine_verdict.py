@@ -11,7 +11,8 @@ from matplotlib.ticker import NullLocator
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity, typeset
-from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, axes_or_new
+from steadyslip.core.palette import BLACK, BLUE, GREY, ORANGE, SKY, STABLE, VERMILION
+from steadyslip.figures.style import axes_or_new
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import MachineAnalysis
@@ -66,9 +67,9 @@ def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
         for low, high in _stable_intervals(margin):
             a, b = max(low / margin.value, known[0]), min(high / margin.value, known[1])
             if a < b:
-                ax.barh(row, b - a, left=a, height=0.62, color=SKY, edgecolor=BLACK, linewidth=0.6, label="_stable")
+                ax.barh(row, b - a, left=a, height=0.62, color=STABLE, edgecolor=BLACK, linewidth=0.6, label="_stable")
         _edge_text(found, ax, row, margin)
-    ax.axvline(1.0, color=VERMILION, linewidth=2)
+    ax.axvline(1.0, color=BLACK, linewidth=2.5)
     ax.set_xscale("log")
     ax.set_xlim(1 / _SPAN_FACTOR, _SPAN_FACTOR)
     ax.set_xticks([0.01, 0.1, 1, 10, 100], ["1/100", "1/10", "as it is", "× 10", "× 100"])

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Polygon, Rectangle
 
 from steadyslip.core.format import typeset
-from steadyslip.figures.style import BLACK, BLUE, VERMILION, axes_or_new
+from steadyslip.core.palette import BLACK, BLUE, VERMILION
+from steadyslip.figures.style import axes_or_new
 from steadyslip.machine.drawing import DRIVEN, FORCED, INK, LONG, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
 

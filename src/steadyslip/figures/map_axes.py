@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -9,27 +10,29 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from steadyslip.core.areas import stress_name
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent
-from steadyslip.figures.style import (
+from steadyslip.core.palette import (
     BLACK,
+    BLOW_UP,
     BLUE,
     GREEN,
     GREY,
     ORANGE,
     PURPLE,
     SKY,
+    STABLE,
+    UNSTABLE,
     VERMILION,
     YELLOW,
-    add_legend_above,
-    axis_label,
-    display_unit,
 )
+from steadyslip.figures.style import add_legend_above, axis_label, display_unit, parameter_label
 from steadyslip.maps.view.cut import FAILING, View
 from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
 LOG_RATIO = 100.0  # highest over lowest value from which on a scale is logarithmic: two decades
-OUT_OF_RANGE = "numbers out of the range of floating point"
+WORD_COLOURS = {"stable": STABLE, "unstable": UNSTABLE, "blow-up": BLOW_UP}  # of results that have their own colour
 KIND_COLOURS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
 
 
@@ -100,6 +103,10 @@ def label_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
         Scale(n, found.unit(n), p, not view.scattered, found.area(n))
         for n, p in zip(view.names, view.places, strict=True)
     ]
+    with suppress(NotAvailable):
+        for name, scale in zip(view.names, scales, strict=True):
+            if name in found.rig.parameters():
+                scale.label = axis_label(stress_name(parameter_label(found.rig, name), found.area(name)), scale.unit)
     ax.set_xlabel(scales[0].label)
     ax.set_xscale("log" if scales[0].log else "linear")
     if len(scales) == 2:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.palette import BLACK, BLUE, CURVES, GREY, ORANGE, VERMILION
 from steadyslip.figures.map_axes import (
     KIND_COLOURS,
-    OUT_OF_RANGE,
     Scale,
     add_legend_entry,
     drawn_result,
@@ -19,7 +17,7 @@ from steadyslip.figures.map_axes import (
     missing_note,
     result_label,
 )
-from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, axis_label
+from steadyslip.figures.style import AREAS, OUT_OF_RANGE, axis_label
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import without_number
 from steadyslip.maps.view.cut import View, own_value
@@ -50,18 +48,11 @@ def draw_curve(ax: Axes, found: MapResult, view: View, show: str | None) -> None
 def _bands_of_status(ax: Axes, x: Array, status: Array) -> None:
     """Shade the intervals of `x` by status; intervals end midway between points."""
     ends = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
-    styles: dict[int, dict[str, Any]] = {
-        STABLE: {"facecolor": SKY, "alpha": 0.35, "label": "stable"},
-        UNSTABLE: {"facecolor": ORANGE, "alpha": 0.3, "label": "unstable"},
-        ABSENT: {"facecolor": "none", "edgecolor": GREY, "hatch": "///", "label": "no steady sliding"},
-        UNKNOWN: {"facecolor": "none", "edgecolor": GREY, "hatch": "xx", "label": OUT_OF_RANGE},
-    }
-    for code, style in styles.items():
+    for code, (words, style) in AREAS.items():
         inside = np.concatenate([[False], status == code, [False]])
         turns = np.flatnonzero(np.diff(inside.astype(int)))
         for number, (start, stop) in enumerate(zip(turns[::2], turns[1::2], strict=True)):
-            keep = {k: v for k, v in style.items() if k != "label" or number == 0}
-            ax.axvspan(ends[start], ends[stop], linewidth=0, zorder=0, **keep)
+            ax.axvspan(ends[start], ends[stop], zorder=0, label="" if number else words, **style)
 
 
 def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: Array, name: str) -> None:

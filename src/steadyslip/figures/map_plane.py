@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity
-from steadyslip.figures.chart import absence_reasons
+from steadyslip.core.palette import BLACK, GREY, VERMILION
+from steadyslip.figures import regions
+from steadyslip.figures.chart import absence_reasons, draw_edges
 from steadyslip.figures.map_axes import (
     KIND_COLOURS,
     LOG_RATIO,
-    OUT_OF_RANGE,
+    WORD_COLOURS,
     Scale,
     add_legend_entry,
     drawn_result,
@@ -27,14 +31,16 @@ from steadyslip.figures.map_axes import (
     result_label,
     short_name,
 )
-from steadyslip.figures.style import BLACK, GREY, ORANGE, OWN_RIG, SKY, VERMILION, axis_label, display_unit
-from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
+from steadyslip.figures.style import AREAS, EDGES, OWN_RIG, SAFETY_LEVELS, axis_label, display_unit
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.result import MapResult
+from steadyslip.model.point import operating_point
 
 Array = np.ndarray
-SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # contours of the safety factor k/k_cr
 
 
 def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
@@ -42,43 +48,101 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
     scales = label_axes(ax, found, view)
     x, y = (s(p) for s, p in zip(scales, view.places, strict=True))
     name = drawn_result(found, view, show)
-    regions = "status" in view.values and name in (None, "safety_factor", "growth_rate", "critical_stiffness", "edge")
-    if regions and view.shares:
+    judged = "status" in view.values and name in (None, "safety_factor", "growth_rate", "critical_stiffness", "edge")
+    line: list[Array] = []
+    if judged and view.shares:
         _share_of_stable(ax, x, y, view)
+        line = _edge_of_shares(ax, x, y, view.shares["status"][STABLE])
         name = None if show is None else name
-    elif regions:
-        _regions(ax, found, view, x, y)
-    if name is not None and regions:
+    elif judged:
+        _areas(ax, found, view, _Refined(found, view, scales))
+    if name is not None and judged:
         _contours(ax, x, y, view.values[name], name, found, missing_note(view, name))
     elif name is not None:
         _colours(ax, found, view, x, y, name, scale)
-    line = _edge(ax, x, y, view)
+    if "status" in view.values and not view.shares:
+        line = _edge(ax, view.values["status"], _Refined(found, view, scales))
     ax.set_xlim(x.min(), x.max())
     ax.set_ylim(y.min(), y.max())
     _mark_own(ax, found, view, scales, line, with_values=scale is None)
 
 
-def _regions(ax: Axes, found: MapResult, view: View, x: Array, y: Array) -> None:
+def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> None:
+    """Fill the area of each status, its outline refined between the points of the map."""
     status = view.values["status"]
-    colours = {UNSTABLE: (ORANGE, 0.45, "unstable"), STABLE: (SKY, 0.55, "stable")}
-    for code, (colour, alpha, label) in colours.items():
-        inside = np.where(status == code, 1.0, np.nan)
-        if np.isfinite(inside).any():
-            ax.pcolormesh(x, y, inside, cmap=ListedColormap([colour]), alpha=alpha, shading="nearest", rasterized=True,
-                          linewidth=0)  # fmt: skip
-            add_legend_entry(ax, Patch(facecolor=colour, alpha=alpha, label=label))
-    absent = status == ABSENT
-    if absent.any():
-        if min(absent.shape) > 1:
-            ax.contourf(x, y, absent.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
-        reasons = _absence_reasons(found, view, absent)
-        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="///", label=f"no steady sliding{reasons}"))
-    if (unknown := status == UNKNOWN).any():
-        if min(unknown.shape) > 1:
-            ax.contourf(x, y, unknown.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xx"])
-        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="xx", label=OUT_OF_RANGE))
+    for code, (words, style) in AREAS.items():
+        if not (here := status == code).any():
+            continue
+        label = words + (_absence_reasons(found, view, here) if code == ABSENT else "")
+        path = regions.region_path(refined.has(code), here) if min(here.shape) > 1 else Path(np.empty((0, 2)))
+        if len(path):
+            path = Path(np.column_stack(refined.place(path.vertices)), path.codes)
+            ax.add_patch(PathPatch(path, label=label, **style))
+        else:
+            add_legend_entry(ax, Patch(label=label, **style))
     if (status < 0).any():
         add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
+
+
+def _edge(ax: Axes, status: Array, refined: _Refined) -> list[Array]:
+    """Draw the edge of stability; return its pieces as vertices of shape (n, 2) in the units of the axes."""
+    if min(status.shape) < 2:
+        return []
+    left_out = (status != STABLE) & (status != UNSTABLE)
+    line = regions.edges(refined.has(STABLE), status == STABLE, left_out)
+    if refined.rig is not None:
+        draw_edges(ax, refined.rig, line, refined.vary, refined.place)
+    elif np.isfinite(line).any():
+        ax.plot(*refined.place(line), **EDGES["oscillation"], label="edge of stability")
+    return [np.column_stack(refined.place(piece)) for piece in _pieces(line)]
+
+
+def _pieces(line: Array) -> list[Array]:
+    """Pieces of a line of points (n, 2) that NaN separates."""
+    whole = np.isfinite(line[:, 0])
+    cuts = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
+    return [line[a:b] for a, b in cuts.reshape(-1, 2)]
+
+
+class _Refined:
+    """Statuses between the points of a map, from its rig; without a rig or of samples those of the nearest points."""
+
+    def __init__(self, found: MapResult, view: View, scales: Sequence[Scale]) -> None:
+        self.view, self.scales = view, scales
+        self.rig: Slider | Machine | None = None
+        names = [*view.names, *view.held]
+        with suppress(NotAvailable):
+            self.rig = None if any(name.startswith("protocol.") for name in names) else found.rig
+
+    def _values(self, shares: Any, which: int) -> Any:
+        """SI values of a parameter at fractions of its axis, whose grid points are at equal distances."""
+        places = self.view.places[which]
+        log = self.scales[which].log
+        at = np.interp(np.asarray(shares) * (len(places) - 1), range(len(places)), np.log(places) if log else places)
+        return np.exp(at) if log else at
+
+    def vary(self, a: Any, b: Any) -> dict[str, Any]:
+        """Parameters of the rig at fractions of both axes."""
+        x, y = self.view.names
+        return self.view.held | {x: self._values(a, 0), y: self._values(b, 1)}
+
+    def place(self, shares: Any) -> tuple[Any, Any]:
+        """Convert fractions of the axes, shape (n, 2), to their units."""
+        return self.scales[0](self._values(shares[:, 0], 0)), self.scales[1](self._values(shares[:, 1], 1))
+
+    def has(self, code: int) -> regions.Predicate:
+        """Predicate of the fractions of both axes: whether a rig has this status."""
+
+        def predicate(a: Any, b: Any) -> Any:
+            if self.rig is not None:
+                return status_of(operating_point(self.rig, self.vary(a, b), scan=True)) == code
+            status = self.view.values["status"]
+            row, column = (
+                np.rint(np.asarray(s) * (n - 1)).astype(int) for s, n in zip((b, a), status.shape, strict=True)
+            )
+            return status[row, column] == code
+
+        return predicate
 
 
 def _absence_reasons(found: MapResult, view: View, absent: Array) -> str:
@@ -140,7 +204,7 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         raise ParameterError([Problem("show", message)])
     words = found.words(name)
     if words:
-        colours = [KIND_COLOURS[i % len(KIND_COLOURS)] for i in range(len(words))]
+        colours = [WORD_COLOURS.get(word, KIND_COLOURS[i % len(KIND_COLOURS)]) for i, word in enumerate(words)]
         norm = BoundaryNorm(np.arange(len(words) + 1) - 0.5, len(words))
         kinds = np.where(values >= 0, values, np.nan).astype(float)
         ax.pcolormesh(x, y, kinds, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)
@@ -172,37 +236,14 @@ def colour_scale(fields: Sequence[Array], unit: str, area: float | None) -> tupl
     return factor, name, Normalize(float(low) / factor, float(high) / factor)
 
 
-def _edge(ax: Axes, x: Array, y: Array, view: View) -> list[Array]:
-    """Draw the edge of stability; return its pieces as vertices of shape (n, 2) in the units of the axes."""
-    if len(x) < 2 or len(y) < 2:
+def _edge_of_shares(ax: Axes, x: Array, y: Array, share: Array) -> list[Array]:
+    """Draw where half of the samples are stable; return its pieces as vertices (n, 2) in the units of the axes."""
+    if min(share.shape) < 2 or not np.nanmin(share) < 0.5 < np.nanmax(share):
         return []
-    values = view.values
-    if view.shares.get("status") is not None:
-        field, level = view.shares["status"][STABLE], 0.5
-    elif "status" in values:
-        sign = np.select([values["status"] == STABLE, values["status"] == UNSTABLE], [1.0, -1.0], np.nan)
-        field, level = sign * _edge_distance(values, sign), 0.0
-    else:
-        return []
-    good = field[np.isfinite(field)]
-    if not len(good) or not good.min() < level < good.max():
-        return []
-    lines = ax.contour(x, y, np.where(np.isfinite(field), field, np.nan), levels=[level], colors=BLACK, linewidths=2)
+    lines = ax.contour(x, y, share, levels=[0.5], colors=BLACK, linewidths=2)
     add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=2, label="edge of stability"))
     polygons = [np.asarray(p) for path in lines.get_paths() for p in path.to_polygons(closed_only=False)]
     return [p for p in polygons if len(p)]
-
-
-def _edge_distance(values: Mapping[str, Array], sign: Array) -> Array:
-    """Non-negative values that vanish at the edge, so that contours are finer than the grid; ones if unavailable."""
-    if "growth_rate" in values and np.isfinite(values["growth_rate"]).any():
-        rate = np.abs(values["growth_rate"])
-        return np.asarray(np.where(np.isfinite(rate), np.arcsinh(rate / (np.nanmedian(rate) or 1.0)), 1.0))
-    if "safety_factor" in values:
-        with np.errstate(all="ignore"):
-            away = np.abs(np.log(values["safety_factor"]))
-        return np.asarray(np.where(np.isfinite(away), away, np.nanmax(away, initial=1.0, where=np.isfinite(away))))
-    return np.asarray(np.ones_like(sign))
 
 
 def _mark_own(
@@ -210,6 +251,8 @@ def _mark_own(
 ) -> None:
     """Mark the base rig, if in view, and the point of the edge nearest to it, with its values if `with_values`."""
     own = [own_value(found, name) for name in view.names]
+    if not all(_is_own(found, name, value) for name, value in view.held.items()):
+        return  # it is in another panel, or in none
     limits = [ax.get_xlim(), ax.get_ylim()]
     if any(value is None for value in own):
         return
@@ -227,6 +270,12 @@ def _mark_own(
     )
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
             label=f"nearest edge\n({words})" if with_values else "nearest edge", zorder=5)  # fmt: skip
+
+
+def _is_own(found: MapResult, name: str, value: float) -> bool:
+    """True if a value of a parameter that is held is the one of the map's values that stands for the rig's own."""
+    own, values = own_value(found, name), np.asarray(found.dataset[name].values)
+    return own is None or (values.min() <= own <= values.max() and value == values[np.argmin(np.abs(values - own))])
 
 
 def _nearest(pieces: Sequence[Array], at: Sequence[float], limits: Sequence[Any], logs: Sequence[bool]) -> Any:

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem
+from steadyslip.core.palette import BLACK, BLUE, ORANGE
 from steadyslip.figures.map_axes import KIND_COLOURS, add_legend, label_axes, short_name
-from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new, new_panels
+from steadyslip.figures.style import axes_or_new, new_panels
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import Sensitivity
 from steadyslip.maps.view.cut import View, own_value

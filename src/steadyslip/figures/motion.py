@@ -14,14 +14,10 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.format import format_quantity
+from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREY, ORANGE
 from steadyslip.figures import machine_motion
 from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE
 from steadyslip.figures.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    VERMILION,
     add_arrowheads,
     add_legend_above,
     axes_or_new,
@@ -91,11 +87,11 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
             begin, end = (slip.begin - wider) / factor, (slip.end + wider) / factor
             panel.axvspan(begin, end, color=ORANGE, alpha=0.15 if not wider else 0.4, linewidth=0)
         if run.status != "done":
-            panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
+            panel.axvline(run.end / factor, color=BLOW_UP, linewidth=1.5, linestyle="--")
     if run.status != "done":
         pad = 36 if "creep" in run.data else 22  # the legend has a second line
         panels[0].set_title(
-            f"{run.status} at {format_quantity(run.end, 's')}", color=VERMILION, fontsize="medium", pad=pad
+            f"{run.status} at {format_quantity(run.end, 's')}", color=BLOW_UP, fontsize="medium", pad=pad
         )
     return panels
 
@@ -196,12 +192,13 @@ def phase_plane(
     shows = np.abs(u) < _MAX_DECADES * np.log(10)
     factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), area)
     x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
-    ax.plot(x, y, color=color, label=label or None, linewidth=1)
+    ax.plot(x, y, color=color, label=label or "the run", linewidth=1)
     add_arrowheads(ax, x, y, color)
     if not ax.get_xlabel():
         _draw_steady_states(run, run.rig, ax, x, factor)
         ax.set_xlabel("ln(v/v0) (1)")
         ax.set_ylabel(axis_label(stress_name("spring stress", area), unit))
+    ax.legend(fontsize="small")
     return ax
 
 
@@ -230,6 +227,4 @@ def _draw_steady_states(run: History, rig: Slider, ax: Axes, x: np.ndarray, fact
         with suppress(NoSteadySliding):
             level = _steady_spring_stress(rig, last) / factor
             u = np.log(last / rig.drive.velocity)
-            ax.plot([u], [level], "o", color=BLACK, markersize=4, label="_steady sliding")
-    elif pressed:
-        ax.legend(fontsize="small")
+            ax.plot([u], [level], "o", color=BLACK, markersize=4, label="steady sliding of the last drive")

@@ -12,20 +12,9 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
+from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
 from steadyslip.figures.map_axes import is_geometric, short_name
-from steadyslip.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    SKY,
-    VERMILION,
-    YELLOW,
-    axes_or_new,
-    axis_label,
-    display_unit,
-)
+from steadyslip.figures.style import axes_or_new, axis_label, display_unit
 from steadyslip.machine.machine import Machine
 
 if TYPE_CHECKING:
@@ -34,7 +23,7 @@ if TYPE_CHECKING:
 _MARKERS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN),
             "branch point": ("v", SKY)}  # fmt: skip
 _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY, "not decided": BLACK}
-_OUTCOME_COLOURS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN,
+_OUTCOME_COLOURS = {"returns": STABLE, "oscillation": UNSTABLE, "blow-up": BLOW_UP, "contact lost": GREEN,
                     "no solution": GREY, "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
 _UNDECIDED_HATCHES = ("xx", "++", "oo")
 NARROW_RANGE = 1e-3  # relative range of a branch below which its axis is the distance from the onset (by trial)
@@ -90,6 +79,11 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         seen.add(point.kind)
         x = (point.cycle.value - origin) / factor
         ax.plot([x], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
+    reached = [(branch.cycles[i].value, branch.cycles[i].peak_velocity) for i in ((0, -1) if len(branch) else ())]
+    for i, (value, peak) in enumerate(reached):
+        label = "" if i else f"ends of the branch: {branch.end}"
+        style = {"markersize": 12, "markeredgewidth": 1.5, "linestyle": "none", "label": fill(label, LEGEND_WIDTH)}
+        ax.plot([(value - origin) / factor], [peak / speed], "|", color=BLACK, **style)  # type: ignore[arg-type]
     left = [end.cycle for one in (branch, branch.doubled) if one for end, _ in one.not_followed if end.cycle]
     for i, one in enumerate(left):
         x, y = (one.value - origin) / factor, one.peak_velocity / speed
@@ -176,8 +170,8 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
 def basin(found: Basin, ax: Axes | None = None) -> Axes:
     """Plot the outcome of motion from every starting point: velocity over slip ahead of the load point.
 
-    White: motion returns to steady sliding (the dot). Yellow: undecided, with the reason in the legend. Dashed lines:
-    unstable cycles.
+    Pale blue: motion returns to steady sliding (the dot). Yellow: undecided, with the reason in the legend. Dashed
+    lines: unstable cycles.
 
     Parameters
     ----------

@@ -17,9 +17,11 @@ Predicate = Callable[[Any, Any], Any]  # fractions of the two axes, 0 to 1, to b
 _HALVINGS = 40  # bisection of one grid spacing to 1e-12 of it
 
 
-def region_path(predicate: Predicate, points: int) -> Path:
-    """Outline of the region where the predicate is true, in fractions of the axes; empty path if there is none."""
-    mask = _on_grid(predicate, points)
+def region_path(predicate: Predicate, mask: Any) -> Path:
+    """Outline of the region where the predicate is true, in fractions of the axes; empty path if there is none.
+
+    `mask` has its values on a grid over the axes, shape (rows, columns).
+    """
     generator = contour_generator(z=mask.astype(float), name="serial", fill_type=FillType.OuterOffset)
     vertices, codes = [np.empty((0, 2))], [np.empty(0, np.uint8)]
     for outline, offsets in zip(*generator.filled(0.5, 2.0), strict=True):
@@ -31,14 +33,12 @@ def region_path(predicate: Predicate, points: int) -> Path:
     return Path(np.concatenate(vertices), np.concatenate(codes))
 
 
-def edges(predicate: Predicate, points: int, where: Predicate | None = None) -> Any:
+def edges(predicate: Predicate, mask: Any, left_out: Any = False) -> Any:
     """Lines along which the predicate changes, shape (n, 2) in fractions of the axes, NaN between lines.
 
-    Grid cells with a corner where the predicate `where` is false are left out.
+    `mask` has its values on a grid; grid cells with a corner where `left_out` is true are left out.
     """
-    mask = _on_grid(predicate, points)
-    left_out = np.zeros_like(mask) if where is None else ~_on_grid(where, points)
-    z = np.ma.masked_array(mask.astype(float), left_out)
+    z = np.ma.masked_array(mask.astype(float), np.array(np.broadcast_to(left_out, mask.shape)))
     generator = contour_generator(z=z, name="serial", line_type=LineType.Separate, corner_mask=False)
     gap = np.full((1, 2), np.nan)
     lines = [gap]
@@ -47,15 +47,29 @@ def edges(predicate: Predicate, points: int, where: Predicate | None = None) -> 
     return np.concatenate(lines)
 
 
-def _on_grid(predicate: Predicate, points: int) -> Any:
+def on_grid(function: Predicate, points: int) -> Any:
+    """Values of a function of the fractions of both axes on a grid of so many points along each."""
     share = np.linspace(0, 1, points)
-    x, y = np.meshgrid(share, share)
-    return np.asarray(predicate(x, y), bool)
+    return np.asarray(function(*np.meshgrid(share, share)))
+
+
+def widest_place(mask: Any, size: tuple[float, float]) -> tuple[float, float, float]:
+    """Point of a region around which an ellipse is largest, in fractions of the axes, and its size over `size`.
+
+    `size` is half the width and half the height of the ellipse, in fractions of the axes.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    rows, columns = mask.shape
+    steps = 1 / (rows - 1) / size[1], 1 / (columns - 1) / size[0]
+    away = distance_transform_edt(np.pad(mask, 1), sampling=steps)[1:-1, 1:-1]
+    row, column = np.unravel_index(np.argmax(away), mask.shape)
+    return float(column / (columns - 1)), float(row / (rows - 1)), float(away[row, column])
 
 
 def _bisected(outline: Any, mask: Any, predicate: Predicate) -> Any:
     """Outline with each point halfway between two grid points moved to where the predicate changes, by bisection."""
-    last = len(mask) - 1
+    last = np.array(mask.shape)[::-1] - 1
     low, high = np.floor(outline).astype(int), np.ceil(outline).astype(int)
     start = mask[low[:, 1], low[:, 0]]
     moves = start != mask[high[:, 1], high[:, 0]]

@@ -2,41 +2,74 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
+from steadyslip.core.palette import BLACK, GREY, STABLE, UNSTABLE
+from steadyslip.linear.status import (
+    ABSENT as ABSENT_CODE,
+    STABLE as STABLE_CODE,
+    UNKNOWN as UNKNOWN_CODE,
+    UNSTABLE as UNSTABLE_CODE,
+)  # fmt: skip
+from steadyslip.machine.letters import letter_of, said
+from steadyslip.machine.rig import Rig
 
-# Okabe & Ito (2008): palette for all common kinds of colour vision
-BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
-    "#000000",
-    "#E69F00",
-    "#56B4E9",
-    "#009E73",
-    "#F0E442",
-    "#0072B2",
-    "#D55E00",
-    "#CC79A7",
-)
-CURVES = (BLUE, SKY, BLACK, ORANGE, VERMILION, GREEN, PURPLE)
-LINES = ("-", "--", "-.", ":")
-GREY = "#BBBBBB"
+OUT_OF_RANGE = "numbers out of the range of floating point"
+
 OWN_RIG: dict[str, Any] = {
-    "color": VERMILION,
-    "markeredgecolor": BLACK,
+    "color": BLACK,
+    "markeredgecolor": "white",
+    "markeredgewidth": 1.5,
     "markersize": 9,
     "linestyle": "none",
     "label": "this rig",
     "clip_on": False,
 }  # fmt: skip -- style of the marker at the values of the rig itself
+
+
+WIDTH = 6.4  # inches, of a figure that is not for a journal: Matplotlib's own default
+JOURNAL: Any = {
+    "figure.figsize": (85 / 25.4, 64 / 25.4), "font.size": 7, "axes.labelsize": 7, "axes.titlesize": 7,
+    "xtick.labelsize": 7, "ytick.labelsize": 7, "legend.fontsize": 6.5, "legend.frameon": False,
+    "legend.handlelength": 2.6, "lines.linewidth": 1.0, "lines.markersize": 3.5, "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6, "ytick.major.width": 0.6, "hatch.linewidth": 0.5,
+}  # fmt: skip
+"""Settings of Matplotlib for a figure as wide as one column of a journal: 85 mm, letters of 7 points."""
+_SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are in the file
+_FOOTER = 6.0  # points, size of the letters below a saved figure
+HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
+"""Outline of words that stand on an area."""
+SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Contours of the safety factor k/k_cr."""
+CONTOURS: dict[str, Any] = {"colors": BLACK, "linewidths": 0.6}
+EDGES: dict[str, dict[str, Any]] = {
+    "oscillation": {"color": BLACK, "linewidth": 2, "linestyle": "-"},
+    "drift": {"color": BLACK, "linewidth": 2, "linestyle": (0, (5, 1.5, 1, 1.5))},
+    "no steady sliding": {"color": BLACK, "linewidth": 1.5, "linestyle": (0, (3, 2))},
+}
+"""Lines of edges by what begins beyond them: an oscillation, a growth without one, no steady sliding."""
+AREAS: dict[int, tuple[str, dict[str, Any]]] = {
+    STABLE_CODE: ("stable", {"facecolor": STABLE, "linewidth": 0}),
+    UNSTABLE_CODE: ("unstable", {"facecolor": UNSTABLE, "linewidth": 0}),
+    ABSENT_CODE: ("no steady sliding", {"facecolor": "white", "edgecolor": GREY, "hatch": "///", "linewidth": 0}),
+    UNKNOWN_CODE: (OUT_OF_RANGE, {"facecolor": "white", "edgecolor": GREY, "hatch": "xx", "linewidth": 0}),
+}
+"""Words and style of the area of each status."""
 
 
 def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
@@ -45,13 +78,19 @@ def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
         return ax
     from matplotlib import pyplot as plt
 
-    return plt.subplots(figsize=(6.4, height), layout="constrained")[1]
+    width = rcParams["figure.figsize"][0]
+    return plt.subplots(figsize=(width, height * width / WIDTH), layout="constrained")[1]
 
 
 def new_panels(rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
     """Axes of a new pyplot figure, shape (rows, columns); size in inches, further options of `pyplot.subplots`."""
     from matplotlib import pyplot as plt
 
+    size = (
+        (size[0], size[1])
+        if (share := rcParams["figure.figsize"][0] / WIDTH) == 1
+        else (WIDTH * share, size[1] * share)
+    )
     axes: Any = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)[1]
     return np.asarray(axes, dtype=object)
 
@@ -82,6 +121,46 @@ def save_figure(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -
     return paths
 
 
+@contextmanager
+def journal() -> Iterator[None]:
+    """Context in which new figures are 85 mm wide, one column of a journal, with letters of 7 points.
+
+    >>> with journal():
+    ...     round(axes_or_new(None).figure.get_figwidth() * 25.4, 6)
+    85.0
+    """
+    with rc_context(JOURNAL):
+        yield
+
+
+def save_with_footer(axes: Any, path: str, result: Any) -> None:
+    """Save the figure of Axes with the values of the rig, version and date below it, and with its fonts inside."""
+    figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
+    width, height = figure.get_size_inches()
+    text = fill(_footer(result), int(width * 72 / (0.55 * _FOOTER)))  # a letter is some .55 of its size wide
+    extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
+    figure.set_size_inches(width, height + extra)
+    if engine := figure.get_layout_engine():
+        engine.set(rect=(0, extra / (height + extra), 1, height / (height + extra)))
+    figure.text(0.01, 0.03 / (height + extra), text, fontsize=_FOOTER, va="bottom", linespacing=1.2, parse_math=False)
+    with rc_context(_SAVED):
+        figure.savefig(path, dpi=200, facecolor="white")
+
+
+def _footer(result: Any) -> str:
+    """Values of the rig of a result with their letters, the version of the program, and the date."""
+    from steadyslip import __version__
+
+    rig = getattr(result, "rig", None)
+    values = []
+    if isinstance(rig, Rig):
+        for name, one in rig.parameters().items():
+            if one.value and np.ndim(one.value) == 0:
+                word = format_quantity(float(one.value), one.role.unit, 4, rig.area_of(name))
+                values.append(f"{said(rig, name)} {typeset(word)}".replace(" ", "\xa0").replace("-", "−"))
+    return f"{', '.join(values)}. ".lstrip(". ") + f"steadyslip\xa0{__version__}, {datetime.now(UTC):%Y-%m-%d}"
+
+
 def display_unit(si_unit: str, typical: float, area: float | None = None) -> tuple[float, str]:
     """Display unit for values of a typical size: its size in SI units, and its name.
 
@@ -95,9 +174,24 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     return factor, typeset(name)
 
 
-def add_legend_above(ax: Axes, columns: int = 2, height: float = 1.04, **options: Any) -> None:
-    """Add a legend above the axes, where it covers no data; `height` leaves room for the power of ten of the y axis."""
-    ax.legend(loc="lower left", bbox_to_anchor=(0, height), ncols=columns, frameon=False, borderaxespad=0.2, **options)
+def add_legend_above(
+    ax: Axes, columns: int = 2, height: float = 1.04, without: Sequence[str] = (), **options: Any
+) -> None:
+    """Add a legend above the axes, where it covers no data; `height` leaves room for the power of ten of the y axis.
+
+    Labels that begin as one in `without` are left out.
+    """
+    handles, labels = ax.get_legend_handles_labels()
+    kept = [(one, label) for one, label in zip(handles, labels, strict=True) if not label.startswith(tuple(without))]
+    ax.legend(
+        *zip(*kept, strict=True),
+        loc="lower left",
+        bbox_to_anchor=(0, height),
+        ncols=columns,
+        frameon=False,
+        borderaxespad=0.2,
+        **options,
+    )
 
 
 def add_arrowheads(ax: Axes, x: Any, y: Any, color: str) -> None:
@@ -120,3 +214,15 @@ def add_arrowheads(ax: Axes, x: Any, y: Any, color: str) -> None:
 def axis_label(name: str, unit_name: str) -> str:
     """Axis label: name and unit, 1 for plain numbers."""
     return f"{name} ({unit_name or '1'})"
+
+
+def parameter_label(rig: Rig, name: str) -> str:
+    """Words and letter of a parameter for an axis, its subscript set below the line; the dotted name if it has neither.
+
+    >>> from steadyslip.reproduce import paper_rig
+    >>> parameter_label(paper_rig(), "contact.angle"), parameter_label(paper_rig(), "friction.d_c")
+    ('angle ψ', 'slip distance $d_{\\mathrm{c}}$')
+    """
+    text, letter = said(rig, name), letter_of(rig, name)
+    base, line, below = letter.partition("_")
+    return text.replace(letter, f"${base}_{{\\mathrm{{{below}}}}}$") if line and not below.isdigit() else text

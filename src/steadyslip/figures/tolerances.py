@@ -6,12 +6,13 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.format import format_range
-from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, axes_or_new
+from steadyslip.core.palette import BLACK, STABLE, UNKNOWN, UNSTABLE
+from steadyslip.figures.style import axes_or_new
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
 from steadyslip.verdict.tolerances import Tolerated
 
-COLOURS = {True: BLUE, False: ORANGE, None: GREY}
+COLOURS = {True: STABLE, False: UNSTABLE, None: UNKNOWN}
 WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable in a part"}
 
 
@@ -36,11 +37,20 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     for row, one in enumerate(shown, start=1):
         low, high = spans[one.parameter]
         label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: row - 1]] else None
-        ax.barh(row, high - low, 0.55, left=low, color=COLOURS[one.stable], label=label)
+        ax.barh(row, high - low, 0.55, left=low, color=COLOURS[one.stable], edgecolor=BLACK, label=label)
     values = found.safety if edges else found.growth
     known = values[np.isfinite(values)]
     if len(known):
-        ax.barh(0, known.max() - known.min(), 0.55, left=known.min(), color=SKY, label="all together")
+        ax.barh(
+            0,
+            known.max() - known.min(),
+            0.55,
+            left=known.min(),
+            color="white",
+            edgecolor=BLACK,
+            hatch="///",
+            label="all together",
+        )
     ranges = [f"{one.parameter}\n{format_range(one.low, one.high, one.unit, one.area)}" for one in shown]
     ax.set_yticks(
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]

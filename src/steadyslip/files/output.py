@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.pictures import save
 
 _NO_FILES = ("/dev", "/proc", "/sys")
 FIGURES = (".png", ".svg", ".pdf")
@@ -67,8 +68,10 @@ def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
             raise NotAvailable(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
 
 
-def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]], figure: Callable[[], Any]) -> None:
-    """Write a file with the writer for its ending, or else as a figure (an Axes or an array of them).
+def write_by_ending(
+    path: Path, writers: Mapping[str, Callable[[Path], object]], figure: Callable[[], Any], result: Any
+) -> None:
+    """Write a file with the writer for its ending, or else as a figure (an Axes or an array of them) of a result.
 
     Raises
     ------
@@ -82,9 +85,8 @@ def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]],
             writers[ending](path)
             return
         axes = figure()
-        first = axes.flat[0] if hasattr(axes, "flat") else axes
         with whole_file(path) as temporary:
-            first.figure.savefig(temporary, dpi=150)
+            save(axes, temporary, result)
     except OSError as error:
         raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
 

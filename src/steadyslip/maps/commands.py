@@ -85,7 +85,7 @@ def write_map(
         writers[".html"] = lambda p: write_page(found, p, "Map", source=source)
     if edge is not None:
         writers[".csv"] = edge.to_csv
-    write_by_ending(path, writers, lambda: found.plot(**options) if edge is None else edge.plot())
+    write_by_ending(path, writers, lambda: found.plot(**options) if edge is None else edge.plot(), found)
 
 
 def sensitivity_file(
@@ -122,7 +122,7 @@ def write_sensitivity(found: Sensitivity, path: Path, source: Path | None = None
         If the ending is none of these, or the file cannot be written.
     """
     writers = {".html": lambda p: write_page(found, p, "Sensitivity", source=source)}
-    write_by_ending(path, writers, found.plot)
+    write_by_ending(path, writers, found.plot, found)
 
 
 def _range_of(axis: Axis) -> tuple[float, float, str]:

@@ -12,6 +12,7 @@ import sympy as sp
 from steadyslip.core.options import checked
 from steadyslip.core.records import Address, parameters, shape_of, with_values
 from steadyslip.core.symbols import Letters
+from steadyslip.machine.letters import LETTERS
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -20,13 +21,6 @@ from steadyslip.model.equations import MOVED, Model
 
 RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 """Letters that the equations use, which parameters cannot have."""
-_LETTERS = {
-    "slider.stiffness": "k",
-    "slider.mass": "m",
-    "slider.damping": "c",
-    "slider.radiation_damping": "eta",
-    "drive.velocity": "v_0",
-}
 
 
 @checked()
@@ -81,9 +75,9 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
     symbols: dict[str, Any] = {}
     every = parameters(rig)
     declared = Counter(address.role.letter for address in every.values())
-    letters = Letters({*RESERVED, *_LETTERS.values(), *declared})
+    letters = Letters({*RESERVED, *LETTERS.values(), *declared})
     for place, (name, address) in enumerate(every.items()):
-        called, letter = f"parameter_{place:03d}", _LETTERS.get(name) or _declared_letter(address, declared)
+        called, letter = f"parameter_{place:03d}", LETTERS.get(name) or _declared_letter(address, declared)
         before = name.rpartition(".")[0]
         dotted = f"{before}.{address.role.letter}" if address.role.letter else name
         if name in rig.always_symbols:
@@ -102,4 +96,4 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
 def _declared_letter(address: Address, declared: Mapping[str, int]) -> str:
     """Letter declared for a parameter; empty if another parameter or the equations use the same."""
     letter = address.role.letter
-    return letter if declared[letter] == 1 and letter not in (*RESERVED, *_LETTERS.values()) else ""
+    return letter if declared[letter] == 1 and letter not in (*RESERVED, *LETTERS.values()) else ""

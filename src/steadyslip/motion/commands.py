@@ -161,4 +161,4 @@ def write_history(
         ".csv": history.to_csv,
         ".html": lambda p: write_page(history, p, "Run", source=source),
     }
-    write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind, contact=contact), dtype=object)))
+    write_by_ending(path, writers, lambda: history.plot(kind, contact=contact), history)

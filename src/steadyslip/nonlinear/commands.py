@@ -84,7 +84,7 @@ def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) ->
         ".csv": branch.to_csv,
         ".html": lambda p: write_page(branch, p, "Cycles", source=source),
     }
-    write_by_ending(path, writers, branch.plot)
+    write_by_ending(path, writers, branch.plot, branch)
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = N
         If the ending is another one, or the file cannot be written.
     """
     writers = {".html": lambda p: write_page(thresholds, p, "Kicks", source=source)}
-    write_by_ending(path, writers, lambda: thresholds.basin.plot())
+    write_by_ending(path, writers, lambda: thresholds.basin.plot(), thresholds)
     return path.suffix.lower() != ".html" and thresholds.basin.interrupted
 
 
@@ -203,7 +203,7 @@ def write_answers(found: FrequencyResponse | FrozenVerdicts, path: Path, title: 
         If the ending is another one, or the file cannot be written.
     """
     writers = {".csv": found.to_csv, ".html": lambda p: write_page(found, p, title, source=source)}
-    write_by_ending(path, writers, lambda: found.plot()[0])
+    write_by_ending(path, writers, lambda: found.plot()[0], found)
 
 
 def verdicts_of_file(

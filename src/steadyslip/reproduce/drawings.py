@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip import figures
-from steadyslip.figures import style
+from steadyslip.core import palette
 from steadyslip.laws.contact import ConstantNormalStress, InclinedSpring
 from steadyslip.laws.friction import LinkerDieterich, RateState, Slip
 from steadyslip.linear import critical_stiffness
@@ -71,15 +71,15 @@ def _plot_step(ax: Any, run: History, direct: str, evolution: str) -> Any:
     """Plot shear stress over slip, with labels at the direct and the evolving part of its change."""
     change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
     slip = run["slip"] / D_C
-    ax.plot(slip, change, color=style.BLUE)
+    ax.plot(slip, change, color=palette.BLUE)
     peak = float(np.interp(STEP_TIME + DIRECT_TIME, run["t"], change))
     last, where = float(change[-1]), float(slip[-1])
     middle = 1.0 + 0.55 * (where - 1.0)
     for low, high, text, x in ((0.0, peak, direct, middle * 0.55), (peak, last, evolution, middle)):
-        ax.annotate("", (x, high), (x, low), arrowprops={"arrowstyle": "<->", "color": style.VERMILION})
-        ax.text(x + 0.02 * where, 0.5 * (low + high), text, va="center", color=style.VERMILION)
+        ax.annotate("", (x, high), (x, low), arrowprops={"arrowstyle": "<->", "color": palette.VERMILION})
+        ax.text(x + 0.02 * where, 0.5 * (low + high), text, va="center", color=palette.VERMILION)
     for level in (0.0, peak, last):
-        ax.axhline(level, color=style.GREY, linewidth=0.5)
+        ax.axhline(level, color=palette.GREY, linewidth=0.5)
     ax.set_xlabel("slip/d_c (1)")
     ax.set_ylabel("change of shear stress/σ (1)")
     return ax
@@ -112,7 +112,7 @@ def simulate_orbit(angle: float, stiffness: float, cycles: float = 4.0, kick: fl
 
 def _figure_5(ax: Any) -> Any:
     edge = float(critical_stiffness(paper_rig()))
-    for share, color in ((0.97, style.VERMILION), (1.0, style.BLUE), (1.1, style.GREEN)):
+    for share, color in ((0.97, palette.VERMILION), (1.0, palette.BLUE), (1.1, palette.GREEN)):
         run = simulate_orbit(-45 * deg, share * edge, cycles=3.0)
         figures.phase_plane(run, ax=ax, label=f"k = {share:g} k_cr", color=color)
     ax.set_title("ψ = −45°, start at x = 0, ln(v/v0) = 0.5; k_cr: closed to linear order only", fontsize="medium")
@@ -122,12 +122,12 @@ def _figure_5(ax: Any) -> Any:
 
 def _figure_6(ax: Any) -> Any:
     stiffness = 1.1 * float(critical_stiffness(paper_rig()))
-    for angle, color in ((-45, style.BLUE), (0, style.ORANGE), (45, style.GREEN)):
+    for angle, color in ((-45, palette.BLUE), (0, palette.ORANGE), (45, palette.GREEN)):
         run = simulate_orbit(angle * deg, stiffness, cycles=3.0)
         drive = run.rig.drive.velocity
         scaled = run["spring_stress"] / run["spring_stress"][0]
         ax.plot(np.log(run["v"] / drive), scaled, color=color, linewidth=1, label=f"ψ = {angle}°".replace("-", "−"))
-    ax.plot([0], [1], "o", color=style.BLACK, markersize=4)
+    ax.plot([0], [1], "o", color=palette.BLACK, markersize=4)
     ax.set_xlabel("ln(v/v0) (1)")
     ax.set_ylabel("spring stress/its steady value (1)")
     ax.set_title("k = 1.1 k_cr(−45°), start at x = 0, ln(v/v0) = 0.5", fontsize="medium")

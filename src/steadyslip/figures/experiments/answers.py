@@ -11,20 +11,10 @@ from scipy.stats import chi2
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    SKY,
-    VERMILION,
-    axes_or_new,
-    axis_label,
-    display_unit,
-)
+from steadyslip.figures.style import axes_or_new, axis_label, display_unit
 from steadyslip.nonlinear.kicks.kicks import KICKS
 
 if TYPE_CHECKING:

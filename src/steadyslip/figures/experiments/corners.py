@@ -11,9 +11,10 @@ from scipy.ndimage import gaussian_filter
 from scipy.stats import chi2, norm
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.palette import BLACK, BLUE, SKY, VERMILION
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import BLACK, BLUE, SKY, VERMILION, axis_label, display_unit
+from steadyslip.figures.style import axis_label, display_unit
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit

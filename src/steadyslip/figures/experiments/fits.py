@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.palette import BLACK, BLUE, GREY, SKY, VERMILION
 from steadyslip.experiments.numerics.noise import autocorrelation
 from steadyslip.figures.experiments.panels import (
     LEGEND_DOT_SIZE,
@@ -20,7 +21,7 @@ from steadyslip.figures.experiments.panels import (
     title_name,
 )
 from steadyslip.figures.experiments.records import draw_normal_stress, draw_rates
-from steadyslip.figures.style import BLACK, BLUE, GREY, SKY, VERMILION, axis_label, display_unit
+from steadyslip.figures.style import axis_label, display_unit
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Fit, Record

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from steadyslip.core.palette import BLUE, GREY, SKY, VERMILION
 from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import BLUE, GREY, SKY, VERMILION, axis_label, display_unit
+from steadyslip.figures.style import axis_label, display_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

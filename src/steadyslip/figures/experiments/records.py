@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from steadyslip.core.palette import BLACK, BLUE, GREY, ORANGE, SKY
 from steadyslip.figures.experiments.panels import (
     LEGEND_DOT_SIZE,
     commanded_curve,
@@ -17,7 +18,7 @@ from steadyslip.figures.experiments.panels import (
     time_label,
     title_name,
 )
-from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, axis_label, display_unit
+from steadyslip.figures.style import axis_label, display_unit
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Record

@@ -1,0 +1,58 @@
+"""Colours of page, figures and reports, declared once.
+
+Areas differ in grey as well: stable and unstable, and blow-up and both, by at least 25 in lightness L* (CIE 1976), so
+that a print without colour tells them apart. Pages get these values as variables of their style sheet.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Okabe & Ito (2008): lines and marks, for all common kinds of colour vision
+BLACK: Final = "#000000"
+ORANGE: Final = "#E69F00"
+SKY: Final = "#56B4E9"
+GREEN: Final = "#009E73"
+YELLOW: Final = "#F0E442"
+BLUE: Final = "#0072B2"
+VERMILION: Final = "#D55E00"
+PURPLE: Final = "#CC79A7"
+GREY: Final = "#BBBBBB"
+
+STABLE: Final = "#C3E1F7"
+UNSTABLE: Final = "#D97F12"
+BLOW_UP: Final = "#84215F"
+ABSENT: Final = "#E4E0EA"  # no steady sliding; hatched besides
+UNKNOWN: Final = "#8D949E"
+CURVES: Final = (BLUE, SKY, BLACK, ORANGE, VERMILION, GREEN, PURPLE)
+LINES: Final = ("-", "--", "-.", ":")
+
+LIGHT: Final = {
+    "ink": "#1b2430", "soft": "#566173", "paper": "#f7f7f5", "card": "#ffffff", "line": "#cfd5dd", "accent": "#005a92",
+    "bad": "#a83200", "stable": STABLE, "unstable": UNSTABLE, "blow-up": BLOW_UP, "none": ABSENT, "unknown": UNKNOWN,
+}  # fmt: skip
+"""Colours of a light page, of figures and of paper, by role."""
+DARK: Final = {
+    "ink": "#e8ecf1", "soft": "#a9b4c2", "paper": "#12161c", "card": "#1a2028", "line": "#3a4452", "accent": "#6cc0f5",
+    "bad": "#ff9a5c", "stable": "#5ba5d8", "unstable": "#8a4b00", "blow-up": "#f08cc4", "none": "#3c3550",
+    "unknown": "#7b818b",
+}  # fmt: skip
+"""Colours of a dark page, by role."""
+FORCED: Final = {
+    "ink": "CanvasText", "soft": "CanvasText", "paper": "Canvas", "card": "Canvas", "line": "CanvasText",
+    "accent": "Highlight", "bad": "CanvasText", "stable": "Canvas", "unstable": "CanvasText", "blow-up": "Highlight",
+    "none": "Canvas", "unknown": "GrayText",
+}  # fmt: skip
+"""System colours by role, where the reader's system sets all colours."""
+
+
+def lightness(colour: str) -> float:
+    """Lightness L* (0 to 100, CIE 1976) of a colour such as ``#D55E00``, that of its grey.
+
+    >>> lightness("#000000"), round(lightness("#ffffff"), 6), round(lightness("#777777"))
+    (0.0, 100.0, 50)
+    """
+    shares = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in shares]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return 116 * luminance ** (1 / 3) - 16 if luminance > (6 / 29) ** 3 else luminance * (29 / 3) ** 3

@@ -20,6 +20,7 @@ from steadyslip.kernels.nodes import Node, Program, Value, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing, cubic
 from steadyslip.linear.boundary import present_zeros
+from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.response import has_closed_form, response
 from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.linear.stiffness import interval_ingredients
@@ -28,6 +29,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
+from steadyslip.model.point import operating_point
 from steadyslip.model.posed import vanishing_terms
 from steadyslip.model.range import highest_coefficients, highest_is_lost
 from steadyslip.model.sliding import observed_in_steady_sliding
@@ -72,6 +74,11 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         raise NotAvailable(
             "the page judges by a polynomial, and the characteristic equation of a rig with delay is none; "
             "steadyslip analyze and boundary take it, and stable_values in Python"
+        )
+    if isinstance(rig, Machine) and is_undamped(operating_point(rig)):
+        raise NotAvailable(
+            "the page tells growth from decay, and nothing damps this machine, so that none of its oscillations dies "
+            "out; steadyslip analyze and boundary tell where two couple and one grows; for a page give it a damping"
         )
     coefficients = characteristic_coefficients(model)
     names, observables = _shown_observables(model)

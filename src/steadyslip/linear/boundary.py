@@ -13,7 +13,8 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
-from steadyslip.linear.search import Boundary, Search
+from steadyslip.linear.coupling import search_for
+from steadyslip.linear.search import Boundary
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -88,7 +89,7 @@ def boundary(
     limits = None if between is None else _checked_range(full, role, [rig.read(full, one) for one in between])
     if limits is not None:
         operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
-    return Search(rig, full, _kept(rig, full), branch).boundaries(limits)
+    return search_for(rig, full, _kept(rig, full), branch).boundaries(limits)
 
 
 def _require_answers(rig: Rig, branch: int) -> None:
@@ -122,7 +123,7 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
             continue
         if address.value == 0 and address.role.structural and name not in present:
             continue
-        search = Search(rig, name, present, branch)
+        search = search_for(rig, name, present, branch)
         if search.takes_long:
             continue
         edges = search.boundaries(None)

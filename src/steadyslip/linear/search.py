@@ -54,7 +54,7 @@ _DIPS = 16  # deepest dips that are examined: similar contacts have eigenvalues 
 _ROUNDS = 8  # rounds of narrowing; each finds one more edge between two samples that have several between them
 _CHANGES = 64  # changes of kind above which only changes of the status are narrowed: rounding makes the others
 _MORE = 8  # changes that a round may find beyond those of the round before
-_SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
+SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # largest number of growing roots (with delay) at which a dip between two samples is examined
 _SCARCE = 6  # factor by which samples are fewer with several delays: their roots are counted rig by rig
 
@@ -74,9 +74,10 @@ class Boundary(Displayed):
     kind : str
         ``oscillatory`` (a pair of eigenvalues crosses at ±iβ), ``divergence`` (one crosses at zero),
         ``ill-posed`` (the effective mass or direct effect changes sign), ``lock-up``, ``lift-off`` or
-        ``no solution`` (steady sliding ceases to exist).
+        ``no solution`` (steady sliding ceases to exist); of a rig that nothing damps ``coupling`` (two oscillations
+        meet in frequency, and one grows beyond) instead of ``oscillatory``.
     angular_frequency : float
-        β in rad/s, 0 unless oscillatory.
+        β in rad/s, 0 unless oscillatory or coupling.
     stable : str
         On which side steady sliding is stable: ``above``, ``below`` or ``neither``.
     unit : str
@@ -84,6 +85,8 @@ class Boundary(Displayed):
         Contact area of the rig, m²; where there is one, values are printed as totals.
     contact : str
         Contact of a machine that locks up or lifts off beyond the edge; empty otherwise.
+    quiet : str
+        Of a rig that nothing damps the side on which no root grows, ``above`` or ``below``; empty otherwise.
     """
 
     parameter: str
@@ -95,13 +98,16 @@ class Boundary(Displayed):
     unit: str
     area: float | None = None
     contact: str = ""
+    quiet: str = ""
 
     def __str__(self) -> str:
         text = f"{self.parameter} = {format_quantity(self.value, self.unit, 6, self.area)}: {self.kind}"
         if self.contact:
             text += f" at contact {self.contact}"
-        if self.kind == "oscillatory":
+        if self.angular_frequency:
             text += f", period {format_quantity(2 * np.pi / self.angular_frequency, 's')}"
+        if self.quiet:
+            return f"{text}, no root grows {self.quiet}"
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
 
 
@@ -146,6 +152,13 @@ class Search:
     def _usual(self) -> tuple[Array, OperatingPoint]:
         grid = self._grid(None)
         return grid, self.values(grid)
+
+    @property
+    def on_the_grid(self) -> OperatingPoint:
+        """The rig at all values of the usual grid at which it can be built."""
+        grid, point = self._usual
+        valid = np.broadcast_to(point.valid, grid.shape)
+        return point if np.all(valid) else self.values(grid[valid])
 
     def _grid(self, between: tuple[float, float] | None) -> Array:
         """Sample values, rising, the rig's own value among them."""
@@ -308,9 +321,9 @@ class Search:
         found = []
         row = np.arange(len(low))
         for _ in range(4):
-            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, SPLIT + 1)
             value = sign[:, None] * self.measures(x.ravel())[which].reshape(x.shape)
-            best = np.clip(np.argmin(np.where(np.isnan(value), np.inf, value), axis=-1), 1, _SPLIT - 1)
+            best = np.clip(np.argmin(np.where(np.isnan(value), np.inf, value), axis=-1), 1, SPLIT - 1)
             found.append(x[row, best])
             low, high = x[row, best - 1], x[row, best + 1]
         return found
@@ -323,13 +336,13 @@ class Search:
         judged = (low_kind - high_kind) % _BESIDE != 0
         for rows, asked in ((np.flatnonzero(judged), self.status), (np.flatnonzero(~judged), self.kinds)):
             first = None
-            for _ in range(int(60 / np.log2(_SPLIT)) if rows.size else 0):
-                x = low[rows, None] + (high - low)[rows, None] * np.linspace(0, 1, _SPLIT + 1)
+            for _ in range(int(60 / np.log2(SPLIT)) if rows.size else 0):
+                x = low[rows, None] + (high - low)[rows, None] * np.linspace(0, 1, SPLIT + 1)
                 x[:, -1] = high[rows]
                 kind = asked(x.ravel()).reshape(x.shape)
                 first = kind[:, :1] if first is None else first
                 at = np.argmax(kind != first, axis=-1)
-                at = np.where(at == 0, _SPLIT, at)
+                at = np.where(at == 0, SPLIT, at)
                 row = np.arange(len(rows))
                 low[rows], high[rows] = x[row, at - 1], x[row, at]
         return low, high

@@ -22,6 +22,7 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.linear.boundary import Margin, present_zeros, without_edges
+from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum, takes_long_to_count
@@ -47,6 +48,12 @@ nearer to that, and where a root lies on the axis that the parameter hardly move
 AXIS_TOLERANCE = 1e-6
 """Allowed distance of a root from the imaginary axis at the critical stiffness, relative to the size of the root.
 Chosen by trial, as `GOOD` is."""
+
+DOUBLE_ROOT = 1e-6
+"""Real part of an eigenvalue over its size below which an undamped one counts as imaginary: rounding of the polynomial
+moves a double root by 1e-8; at the least of `SIDE_OFFSETS` growth is some 1e-5."""
+NEUTRAL = 4
+"""Status, beside those of `steadyslip.linear.status`, of undamped rigs of which no root grows."""
 
 _DECIDING = ("steady sliding", "growing roots")  # checks that must pass for a verdict
 _STEP = 1e-3  # change of ln velocity, ln stress and ln memory by which the typical size of a memory rate is found
@@ -289,9 +296,12 @@ def _rigs_beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: floa
 
 
 def _sides_agree(edge: Boundary, below: int, above: int) -> bool:
-    """True if the status below and above an edge agrees with its field `stable`."""
+    """True if the status below and above an edge agrees with its fields `stable` and `quiet`."""
     if UNKNOWN in (below, above):
         return False
+    if edge.quiet:
+        quiet, other = (below, above) if edge.quiet == "below" else (above, below)
+        return quiet == NEUTRAL and other in (UNSTABLE, ABSENT)
     stable = {"above": (below != STABLE and above == STABLE), "below": (below == STABLE and above != STABLE)}
     return stable.get(edge.stable, {below, above} == {ABSENT, UNSTABLE})
 
@@ -301,8 +311,11 @@ def _status_by_roots(point: OperatingPoint) -> NDArray[np.int64]:
     if point.model.delays:
         grows = counts(point) != 0
     else:
-        real = spectrum(point).real
-        grows = np.max(np.where(np.isnan(real), -np.inf, real), axis=-1) >= 0
+        s = spectrum(point)
+        grows = np.max(np.where(np.isnan(s.real), -np.inf, s.real), axis=-1) >= 0
     found = np.where(grows | is_ill_posed(point), UNSTABLE, STABLE)
+    if np.any(undamped := is_undamped(point)):
+        share = np.max(np.where(np.isnan(s), -np.inf, s.real / np.abs(s)), axis=-1)
+        found = np.where(undamped & (share <= DOUBLE_ROOT), NEUTRAL, found)
     found = np.where(point.exists, found, ABSENT)
     return np.asarray(np.where(in_range(point) & point.valid & can_be_counted(point), found, UNKNOWN))

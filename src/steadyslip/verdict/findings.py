@@ -38,6 +38,7 @@ class Verdict(Displayed):
     time_to_halve: float | None = None
     time_to_double: float | None = None
     on_edge: bool = False
+    undamped: bool = False
     characteristic_terms: tuple[tuple[float, tuple[float, ...]], ...] = ()
     unstable_roots: int | None = None
     checks: tuple[Check, ...] = ()
@@ -142,6 +143,8 @@ class MachineFindings(Verdict):
     growth_rate, period, damping_ratio, time_to_halve, time_to_double : float or None
         As for a slider.
     on_edge : bool
+    undamped : bool
+        Whether nothing damps it, its friction included: then no disturbance dies out, and edges are those of growth.
     onset : Onset or None
         Kind of onset at the nearest oscillatory edge of all parameters, None where there is none, or with a delay.
     kicks : tuple of Threshold

@@ -15,6 +15,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
+from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.modes import Mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
@@ -28,9 +29,10 @@ from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, finite, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.reasons import ON_EDGE
+from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
 from steadyslip.verdict.words import (
     BEYOND,
+    QUIET,
     beyond,
     disturbance,
     headline,
@@ -128,15 +130,17 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
                 rig=machine, stable=None, reason=doubt, margins=(), checks=checks, version=__version__
             )
         distances, of_edges = edge_checks(machine, margins(machine), 0)
+        undamped = bool(is_undamped(point))
         posed = numbers["growth_rate"] not in (math.inf, None)
         leading = next(iter(numbers["eigenvalues"] if posed else ()), None)
-        onset = None if point.model.delays else _onset(machine, distances)
+        onset = None if point.model.delays or undamped else _onset(machine, distances)
         found = MachineAnalysis(
             rig=machine,
             reason="",
             steady=steady,
             mode=None if leading is None else mode_of(machine, point, complex(leading.real, abs(leading.imag))),
             on_edge=edged,
+            undamped=undamped,
             margins=distances,
             onset=onset,
             kicks=_kicks(machine, kicks),
@@ -185,10 +189,10 @@ def _reason(found: MachineAnalysis) -> str:
     """Sentence that explains a machine's verdict: what grows, and the nearest edge of all parameters."""
     if found.growth_rate == math.inf:
         return why_delay_is_ill_posed(operating_point(found.rig)) or PHRASES["are ill-posed"]
-    if found.on_edge:
-        return PHRASES["on edge"]
     first = next((one for one in found.margins if one.edge is not None), None)
     hint = "" if first is None else f"; {_nearest(found, first)}"
+    if found.on_edge:
+        return UNDAMPED + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
         return PHRASES["oscillatory" if any(s.imag for s in found.eigenvalues[:1]) else "divergence"] + hint
     return PHRASES["dies out"] + hint
@@ -201,7 +205,7 @@ def _nearest(found: MachineAnalysis, margin: Margin) -> str:
         return ""
     side = "above" if edge.value > margin.value else "below"
     value = format_quantity(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
-    what = PHRASES["stable"] if edge.stable == side else beyond(edge)
+    what = PHRASES["stable"] if edge.stable == side else QUIET if edge.quiet == side else beyond(edge)
     return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=what)
 
 

@@ -22,6 +22,11 @@ NEXT_TO_IT = 1e-6
 ON_EDGE = "neither verdict should be relied on: the least change of a number decides"
 """Reason given for a slider or machine on an edge of stability."""
 
+UNDAMPED = (
+    "nothing damps it, so no disturbance dies out; the least damping decides, and may move the edges of growth far"
+)
+"""Reason given for a machine without damping of which no root grows."""
+
 REASONS = {
     "are ill-posed": ILL_POSED,
     "on edge": ON_EDGE,

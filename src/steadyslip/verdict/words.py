@@ -38,12 +38,17 @@ _ONSETS = {
 
 BEYOND = {
     "oscillatory": "an oscillation grows",
+    "coupling": "two oscillations couple and one grows",
     "divergence": "a disturbance grows without oscillating",
     "ill-posed": "the equations become ill-posed",
     "lock-up": "it locks up",
     "lift-off": "it lifts off",
     "no solution": "steady sliding ceases to exist",
 }
+
+
+QUIET = "no disturbance grows"
+"""Phrase on the quiet side of an edge of an undamped rig."""
 
 
 def beyond(edge: Boundary) -> str:
@@ -96,6 +101,7 @@ def _limited(rig: Slider) -> bool:
 HEADLINES = {
     "stable": ("Stable", ": steady sliding {speed}"),
     "unstable": ("Unstable", ": steady sliding {speed}"),
+    "undamped": ("Undamped", ": no disturbance of steady sliding {speed} grows, and none dies out"),
     "edge": ("On the edge", " of stability to within rounding: steady sliding {speed}"),
     "none": ("No steady sliding", " {speed}"),
     "undecided": ("Not decided", ": steady sliding {speed}"),
@@ -111,6 +117,7 @@ def headline(analysis: Verdict, capitals: bool = True) -> str:
         kind = "undecided" if is_undecided(analysis) else "none"
     else:
         kind = "edge" if analysis.on_edge else "stable" if analysis.stable else "unstable"
+        kind = "undamped" if analysis.on_edge and analysis.undamped else kind
     first, rest = HEADLINES[kind]
     return (first.upper() if capitals else first) + rest.format(speed=f"at {speed}")
 
@@ -259,7 +266,7 @@ def disturbance(analysis: Verdict) -> str:
     if analysis.growth_rate is None:
         return f"{'dies away' if analysis.stable else 'grows'}; not decided: how fast"
     if analysis.on_edge:
-        text = "neither grows nor dies, to within rounding"
+        text = "neither grows nor dies" + ("" if analysis.undamped else ", to within rounding")
     elif analysis.time_to_double is not None:
         text = f"doubles in {format_quantity(analysis.time_to_double, 's')}"
     elif analysis.time_to_halve is not None:
@@ -347,6 +354,8 @@ def _margin_row(analysis: Verdict, margin: Margin, edge: Boundary) -> tuple[str,
         change, words = "0", f"on the edge, stable {edge.stable} it" if edge.stable != "neither" else "on the edge"
     elif edge.stable == towards:
         words = "becomes stable"
+    elif edge.quiet == towards:
+        words = QUIET
     elif analysis.stable is None:
         words = "slides steadily, but unstable"
     else:

@@ -1,0 +1,124 @@
+"""Edges of rigs that nothing damps: from "no root grows" to "a root grows" (theory 13).
+
+Without damping and without memory in the friction the characteristic polynomial has even powers of s only. Its roots
+in s² are real and negative where every disturbance oscillates for ever; where two of them meet and part as a complex
+pair, two oscillations couple and one grows: at the edge the polynomial has a double imaginary root, and the growth rate
+beyond it rises as the square root of the distance, from zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.linear.roots import Array, ComplexArray, roots
+from steadyslip.linear.search import SPLIT, Boundary, Search
+from steadyslip.linear.status import ABSENT, UNKNOWN, status
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
+from steadyslip.model.linearisation import is_written_out
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.range import characteristic
+
+QUIET, GROWS = 10, 11  # beside the values of `status`
+ROUNDS = 4  # of following dips of the gap between two roots: each narrows it 16 times
+
+
+def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
+    """True where the characteristic polynomial has even powers of s only, one beside the constant at least, (...)."""
+    if point.model.delays or not is_written_out(point.model):
+        return np.zeros(point.shape, dtype=bool)
+    c = characteristic(point)
+    return np.asarray(np.all(c[..., 1::2] == 0, axis=-1) & np.any(c[..., 2::2] != 0, axis=-1))
+
+
+def squares(point: OperatingPoint) -> ComplexArray:
+    """Roots in s² of undamped rigs, (..., n); NaN where there are fewer."""
+    return roots(characteristic(point)[..., ::2])
+
+
+def grows(point: OperatingPoint) -> NDArray[np.bool_]:
+    """True where a root of undamped rigs grows, (...): one of the roots in s² is complex or positive."""
+    u = squares(point)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.any((u.imag != 0) | (u.real > 0), axis=-1))
+
+
+def _gap(point: OperatingPoint) -> Array:
+    """Least distance of two roots in s², relative to their size, (...); inf with one root."""
+    u = squares(point)
+    apart = np.abs(u[..., 1:] - u[..., :-1]) / np.abs(u[..., 1:] + u[..., :-1])  # they are sorted
+    return np.asarray(np.min(np.where(np.isnan(apart), np.inf, apart), axis=-1, initial=np.inf))
+
+
+class UndampedSearch(Search):
+    """Scan of one parameter of a rig that is undamped at all its values."""
+
+    def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
+        with np.errstate(all="ignore"):
+            low, high = self.searched if between is None else between
+            grid, point = self._usual if between is None else self._asked(between)
+            x = np.unique(np.concatenate([grid, self._near_couplings(grid, point)]))
+            kind = self._kinds_of_growth(x)
+            at = np.flatnonzero((kind[1:] != kind[:-1]) & (kind[1:] != UNKNOWN) & (kind[:-1] != UNKNOWN))
+            found = [self._edge(x[i], x[i + 1], kind[i], kind[i + 1]) for i in at]
+        zero = self.role.domain.low == 0  # the end of the domain, no edge
+        return tuple(one for one in found if low <= one.value <= high and not (zero and one.bracket[0] == 0))
+
+    def _kinds_of_growth(self, x: Array) -> NDArray[np.int64]:
+        """QUIET, GROWS, ABSENT or UNKNOWN at values (n,)."""
+        point = self.values(x)
+        found = status(point)
+        known = (found != ABSENT) & (found != UNKNOWN)
+        return np.where(known, np.where(grows(point), GROWS, QUIET), found)
+
+    def _near_couplings(self, grid: Array, point: OperatingPoint) -> Array:
+        """Values between samples at which two roots in s² come closest, where a narrow window may lie."""
+        gap = _gap(point)
+        dips = np.flatnonzero((gap[1:-1] <= gap[:-2]) & (gap[1:-1] <= gap[2:]) & np.isfinite(gap[1:-1])) + 1
+        low, high, found = grid[dips - 1], grid[dips + 1], [np.empty(0)]
+        for _ in range(ROUNDS if dips.size else 0):
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, SPLIT + 1)
+            best = np.clip(np.argmin(_gap(self.values(x.ravel())).reshape(x.shape), axis=1), 1, SPLIT - 1)
+            row = np.arange(len(low))
+            found.append(x[row, best])
+            low, high = x[row, best - 1], x[row, best + 1]
+        return np.concatenate(found)
+
+    def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
+        absent = low if below == ABSENT else high  # a sample, where absence is no matter of rounding
+        for _ in range(int(60 / np.log2(SPLIT))):  # bits of a float, and some to spare
+            x = np.linspace(low, high, SPLIT + 1)
+            at = max(1, int(np.argmax(self._kinds_of_growth(x) != below)))
+            low, high = float(x[at - 1]), float(x[at])
+        quiet = "below" if below == QUIET else "above" if above == QUIET else ""
+        if ABSENT in (below, above):
+            lost = self._why_none(absent)
+            kind, frequency, contact = lost.condition, 0.0, lost.contact
+        else:
+            kind, frequency, contact = *self._meeting(low, high), ""
+        middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
+        return Boundary(
+            self.name, middle, (low, high), kind, frequency, "neither", self.role.unit, self.rig.area_of(self.name),
+            contact, quiet,
+        )  # fmt: skip
+
+    def _meeting(self, low: float, high: float) -> tuple[str, float]:
+        """Kind and frequency (rad/s) of an edge: two roots in s² meet, or one passes zero."""
+        u = squares(self.values(np.array([low, high])))
+        growing = u[np.isfinite(u) & ((u.imag != 0) | (u.real > 0))]
+        paired = growing[growing.imag != 0]
+        return ("coupling", float(np.sqrt(-paired.real.mean()))) if paired.size else ("divergence", 0.0)
+
+
+def search_for(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Search:
+    """Scan of one parameter for edges of stability, or of growth where a machine is undamped at all its values."""
+    found = Search(rig, name, present, branch)
+    if not isinstance(rig, Machine):
+        return found  # one body in one direction couples with nothing
+    with np.errstate(all="ignore"):
+        if not np.all(is_undamped(found.own)):
+            return found
+        point = found.on_the_grid
+        everywhere = np.all(is_undamped(point) | ~np.broadcast_to(point.exists, point.shape))
+    return UndampedSearch(rig, name, present, branch) if everywhere else found

@@ -1,0 +1,165 @@
+"""Edges of growth of undamped machines (theory 13): closed forms of two modes, and printed values."""
+
+import math
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from command import run
+from steadyslip.linear.coupling import is_undamped
+from steadyslip.model.point import operating_point
+
+BLOCK = """
+[bodies.block]
+motion = "plane"
+mass = 1
+press = 10
+[links.one]
+between = ["drive", "block"]
+angle = "30 deg"
+stiffness = 3.6666666666666665
+[links.two]
+between = ["drive", "block"]
+angle = "-30 deg"
+stiffness = 1
+[contacts.belt]
+body = "block"
+[contacts.belt.friction]
+law = "coulomb"
+mu_coulomb = 0.5
+[contacts.belt.contact]
+law = "compliant"
+normal_stiffness = 1.3333333333333333
+[drive]
+control = "steady"
+velocity = 1
+"""
+ALONG = '[links.along]\nbetween = ["drive", "block"]\ndamping = {}\n'
+ACROSS = '[links.across]\nbetween = ["ground", "block"]\ndirection = "normal"\ndamping = {}\n'
+EXACT = 1e-13  # a double root is told from a close pair to within rounding of the polynomial
+
+
+def block(*more, contact=0.0):
+    return ss.rig_from_text("\n".join([BLOCK, *more])).with_values({"normal_damping": contact})
+
+
+def edges(machine, name="mu_coulomb"):
+    return [one.value for one in ss.boundary(machine, name)]
+
+
+def test_undamped_edge_of_hoffmann_and_gaul():
+    (edge,) = ss.boundary(block(), "mu_coulomb")
+    assert (edge.kind, edge.quiet, edge.stable) == ("coupling", "below", "neither")
+    assert edge.value == pytest.approx(1.0284051669940213, rel=EXACT)
+    assert edge.angular_frequency == pytest.approx(math.sqrt(3), rel=EXACT)  # u = −(k11 + k22 + k3)/2 = −3
+    assert "no root grows below" in str(edge)
+
+
+@pytest.mark.parametrize(
+    ("machine", "critical"),
+    [
+        (block(ALONG.format(0.05)), 0.8660254037844386),
+        (block(ALONG.format(0.3)), 0.8660254037844386),
+        (block(contact=0.05), 0.411197204687487),
+        (block(contact=0.2), 0.411197204687487),
+        (block(ALONG.format(0.05), contact=0.05), 0.870158834866838),
+        (block(ALONG.format(0.01), contact=0.01), 0.866190736),
+        (block(ALONG.format(0.1), contact=0.1), 0.882560660540601),
+        (block(ACROSS.format(0.05)), 0.8660254037844386),
+        (block(ACROSS.format(0.4)), 0.8660254037844386),
+        (block(ACROSS.format(0.05), ALONG.format(0.05)), 1.03327655989031),
+    ],
+)
+def test_damped_edges_of_hoffmann_and_gaul(machine, critical):
+    """The least damping moves the edge from 1.03 to .87 or .41: an undamped edge is no limit of damped ones."""
+    (edge,) = ss.boundary(machine, "mu_coulomb")
+    assert (edge.kind, edge.stable) == ("oscillatory", "below")
+    assert edge.value == pytest.approx(critical, rel=1e-9)
+
+
+def test_mode_coupling_of_two_springs():
+    """m = 1, k1 = 1, k12 = .3, k2 = 1.2 with k3 = .8: μ_c = [k12² + (k1 − k2)²/4]/(k12 k3); .0476 at 1.1 μ_c."""
+    values, vectors = np.linalg.eigh([[1.0, 0.3], [0.3, 0.4]])
+    angles = [math.atan2(*v[::-1]) for v in vectors.T]
+    machine = block().with_values(
+        {"one.stiffness": values[0], "one.angle": _angle(angles[0]), "two.stiffness": values[1],
+         "two.angle": _angle(angles[1]), "normal_stiffness": 0.8, "mu_coulomb": 0.1}
+    )  # fmt: skip
+    if not edges(machine):  # friction acts towards the other side
+        machine = machine.with_values({"one.angle": -_angle(angles[0]), "two.angle": -_angle(angles[1])})
+    first = ss.boundary(machine, "mu_coulomb")[0]
+    assert first.value == pytest.approx((0.3**2 + 0.2**2 / 4) / (0.3 * 0.8), rel=1e-12)
+    grown = machine.with_values({"mu_coulomb": 1.1 * first.value})
+    assert ss.growth_rate(grown) == pytest.approx(0.0476240575692899, rel=1e-11)
+
+
+def _angle(angle):
+    """The same line within a quarter turn of the slide."""
+    return (angle + math.pi / 2) % math.pi - math.pi / 2
+
+
+def closed_form(machine):
+    """Edges of two modes in μ, from tr² = 4 det (coupling) and det = 0 (lock-up) of [[a, b − μ k], [b, c + k]]."""
+    k, mass = machine.value("normal_stiffness"), machine.value("block.mass")
+    a = b = c = 0.0
+    for link in ("one", "two"):
+        stiffness, angle = machine.value(f"links.{link}.stiffness"), machine.value(f"links.{link}.angle")
+        a += stiffness * math.cos(angle) ** 2
+        b += stiffness * math.cos(angle) * math.sin(angle)
+        c += stiffness * math.sin(angle) ** 2
+    coupling, static = b**2 + (a - c - k) ** 2 / 4, b**2 - a * (c + k)
+    assert mass == 1
+    return {"coupling": coupling / (b * k), "lock-up": static / (b * k)}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_edges_of_random_pairs_of_springs(seed):
+    chance = np.random.default_rng(seed)
+    machine = block().with_values(
+        {"one.stiffness": chance.uniform(0.5, 5), "two.stiffness": chance.uniform(0.5, 5),
+         "one.angle": chance.uniform(0.1, 1.4), "two.angle": chance.uniform(-1.4, -0.1),
+         "normal_stiffness": chance.uniform(0.3, 3), "mu_coulomb": 1e-3}
+    )  # fmt: skip
+    wanted = {kind: value for kind, value in closed_form(machine).items() if value > 0}
+    found = {one.kind: one.value for one in ss.boundary(machine, "mu_coulomb", (1e-6, 1e3)) if one.quiet}
+    assert found == pytest.approx(wanted, rel=1e-10)
+
+
+def test_growth_rises_as_the_square_root_of_the_distance():
+    machine = block()
+    critical = edges(machine)[0]
+    near, far = (ss.growth_rate(machine.with_values({"mu_coulomb": critical * (1 + h)})) for h in (1e-6, 4e-6))
+    assert far / near == pytest.approx(2, rel=1e-4)
+
+
+def test_any_damping_or_memory_is_damped():
+    def undamped(machine):
+        return bool(is_undamped(operating_point(machine)))
+
+    assert undamped(block())
+    assert not undamped(block(ALONG.format(1e-9)))
+    assert not undamped(block(contact=1e-9))
+    assert not undamped(ss.read_rig("examples/machines/brake-pad.toml"))
+
+
+def test_the_verdict_says_that_nothing_dies_out():
+    found = ss.analyze(block())
+    assert str(found).startswith("UNDAMPED: no disturbance of steady sliding at 1 m/s grows, and none dies out")
+    assert "two oscillations couple and one grows" in str(found)
+    assert found.undamped
+    assert found.to_dict()["undamped"]
+    assert all(one.passed for one in found.checks)
+    beyond = ss.analyze(block().with_values({"mu_coulomb": 1.1}))
+    assert beyond.stable is False
+    assert "no disturbance grows" in str(beyond)
+    assert ss.analyze(block(ALONG.format(0.05))).undamped is False
+
+
+def test_a_page_refuses_what_nothing_damps(tmp_path):
+    path = tmp_path / "block.toml"
+    path.write_text(BLOCK)
+    done = run("explore", path, "-o", tmp_path / "block.html")
+    assert done.returncode == 2
+    assert "nothing damps this machine" in done.stderr
+    assert run("explore", path, "--set", "normal_damping=0.1", "-o", tmp_path / "damped.html").returncode == 0

@@ -162,7 +162,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "title": title,
         "version": __version__,
         "branch": branch,
-        "area": rig.area if isinstance(rig, Slider) else None,
+        "area": rig.area,
         "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],
         "facts": dict(facts),
         "places": places,

@@ -62,7 +62,7 @@ def own_file(rig: Slider | Machine, names: Sequence[str], text: str) -> OwnFile:
 
 def display_unit(rig: Slider | Machine, unit: str) -> tuple[float, str]:
     """Factor and unit in which a page shows a parameter: totals for sliders with an area, SI units for machines."""
-    return outside(unit, rig.area) if isinstance(rig, Slider) else (1.0, unit)
+    return outside(unit, rig.area)
 
 
 def _file_pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate) -> list[Any]:

@@ -58,11 +58,10 @@ def in_units_of(rig: Slider | Machine, plan: Protocol) -> Protocol:
         _, _, number, _ = name.split(".", 3)
         piece, given = plan.pieces[int(number) - 1], address.value
         wanted = unit_of(rig, piece, address.role.unit)
-        area = rig.area if isinstance(rig, Slider) else None
         if given.unit == wanted:
             changes[name] = float(given)
-        elif area is not None and given.unit == total_unit(wanted):
-            changes[name] = float(given) / area
+        elif rig.area is not None and given.unit == total_unit(wanted):
+            changes[name] = float(given) / rig.area
         else:
             hint = "; of a slider with an area a force will do" if (given.unit, wanted) == ("N", "Pa") else ""
             problems.append(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from steadyslip.machine.mechanism import (
     Integral,
     Mechanism,
 )
-from steadyslip.machine.rig import Rig
+from steadyslip.machine.rig import LawsOfContact, Rig
 from steadyslip.machine.servo import MachineDrive, control_for, wrong_control
 from steadyslip.machine.surfaces import Surface
 
@@ -50,6 +50,9 @@ class Machine(Rig):
     speeds in fixed ratios to the drive's velocity. Parameters have dotted names such as ``bodies.table.mass``,
     ``links.screw.stiffness``, ``contacts.guide.friction.a``; the last part is enough if it is unique.
     """
+
+    area: ClassVar[None] = None
+    """Area of a slider, by which its stresses are shown as forces; results of a machine are forces already."""
 
     bodies: Any = members(Body, "bodies, by name")
     links: Any = members(Link, "links, by name", default=Members())
@@ -241,6 +244,16 @@ class Machine(Rig):
     def _slip_rate(self, surface: Surface, speeds: dict[str, Any]) -> Any:
         lever = 1 if surface.radius is None else surface.radius
         return lever * speeds[surface.body] - speeds[surface.against]
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        return tuple(self.contacts)
+
+    def laws_by_contact(self) -> dict[str, LawsOfContact]:
+        return {
+            name: LawsOfContact(f"contacts.{name}.", one.friction, one.contact, one.area)
+            for name, one in self.contacts.items()
+        }
 
     def area_of(self, name: str) -> float | None:
         kind, _, rest = name.partition(".")

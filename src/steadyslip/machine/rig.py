@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.names import resolve
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.mechanism import Mechanism
 
 S = TypeVar("S", bound="Rig")
+
+
+class LawsOfContact(NamedTuple):
+    """Laws at one contact: prefix of their parameters' names, and area (m²) of a machine's contact that has one."""
+
+    prefix: str
+    friction: FrictionLaw
+    contact: ContactLaw
+    area: float | None = None
 
 
 class Rig(FrozenRecord, Keeper):
@@ -24,6 +35,18 @@ class Rig(FrozenRecord, Keeper):
 
     not_in_model: ClassVar[tuple[str, ...]] = ()
     """Parameters that occur in no equation of the Model."""
+
+    default_along: ClassVar[str | None] = None
+    """Parameter along which edges and cycles are sought unless another is named; None if none stands out."""
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of the contacts, which prefix their results; empty for the one contact of a slider."""
+        return ()
+
+    def laws_by_contact(self) -> dict[str, LawsOfContact]:
+        """Laws of each contact by its name in the Model, which is empty for a slider's."""
+        raise NotImplementedError
 
     def mechanism(self) -> Mechanism:
         """Mechanism from which the Model is assembled; symbolic for a copy of the rig with symbols."""

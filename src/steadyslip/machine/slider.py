@@ -14,7 +14,7 @@ from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, DegreeOfFreedom, Element, Integral, Mechanism
-from steadyslip.machine.rig import Rig
+from steadyslip.machine.rig import LawsOfContact, Rig
 
 
 class Slider(Rig, section="slider"):
@@ -32,6 +32,7 @@ class Slider(Rig, section="slider"):
     always_symbols: ClassVar[Mapping[str, str]] = {"slider.stiffness": "k"}
     replaces: ClassVar[Mapping[str, str]] = {"slider.axial_stiffness": "slider.stiffness"}
     not_in_model: ClassVar[tuple[str, ...]] = ("slider.area",)
+    default_along: ClassVar[str | None] = "stiffness"
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
@@ -89,6 +90,9 @@ class Slider(Rig, section="slider"):
 
     def area_of(self, name: str) -> float | None:
         return self.area
+
+    def laws_by_contact(self) -> dict[str, LawsOfContact]:
+        return {"": LawsOfContact("", self.friction, self.contact)}
 
     def mechanism(self) -> Mechanism:
         """Mechanism with one coordinate, x, and spring and controller between it and the load point."""

@@ -158,7 +158,7 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
     NotAvailable
         If numbers leave the range of floating point.
     """
-    return steady_machine(rig) if isinstance(rig, Machine) else steady_states(rig)[0]
+    return steady_states(rig)[0]
 
 
 def steady_machine(rig: Machine) -> SteadyMachine:
@@ -273,9 +273,8 @@ def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
         return _jointly_absent(point, joint)
     missing = next(place for place, sigma in enumerate(point.sigmas) if not np.isfinite(sigma))
     contact = point.model.contacts[missing]
-    law = rig.contacts[contact.name].contact if isinstance(rig, Machine) else rig.contact  # type: ignore[attr-defined]
-    area = (rig.contacts[contact.name].area or 1.0) if isinstance(rig, Machine) else rig.area  # type: ignore[attr-defined]
-    return _absent(point, missing, law, area)
+    own = rig.laws_by_contact()[contact.name]
+    return _absent(point, missing, own.contact, (own.area or 1.0) if rig.contact_names else rig.area_of("contact"))
 
 
 def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | None) -> NoSteadySliding:

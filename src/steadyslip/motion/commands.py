@@ -85,8 +85,7 @@ def read_experiment(
     rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
     machine = rig if isinstance(rig, Machine) else None
-    area = rig.area if isinstance(rig, Slider) else None
-    added = _pieces(pieces, area, machine)
+    added = _pieces(pieces, rig.area, machine)
     end = protocol.until if until is None else _seconds(until)
     if end is None:
         raise ParameterError(

@@ -296,10 +296,7 @@ def _refuse_slow_to_compile(reduction: Reduction, method: str) -> None:
 def _refuse_singular(rig: Slider | Machine, point: OperatingPoint, varied: bool) -> None:
     """Refuse rigs whose friction laws cannot be followed beyond small motions."""
     own = with_values(rig, point.named()) if varied else rig
-    laws = {"friction": own.friction} if isinstance(own, Slider) else {}
-    if isinstance(own, Machine):
-        laws = {f"contacts.{name}.friction": surface.friction for name, surface in own.contacts.items()}
-    for where, friction in laws.items():
-        for condition in friction.motion_conditions():
+    for laws in own.laws_by_contact().values():
+        for condition in laws.friction.motion_conditions():
             if (problem := condition.problem()) is not None:
-                raise NotAvailable(f"{where}.{problem}")
+                raise NotAvailable(f"{laws.prefix}friction.{problem}")

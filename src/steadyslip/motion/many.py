@@ -55,9 +55,9 @@ def event_unit(name: str) -> str:
 
 def event_names(rig: Rig) -> tuple[str, ...]:
     """Columns of `Ensemble.events`; of a machine for each contact, with its name as prefix."""
-    if not isinstance(rig, Machine):
+    if not rig.contact_names:
         return tuple(EVENT_UNITS)
-    return tuple(f"{contact}.{_contact_column(name)}" for contact in rig.contacts for name in EVENT_UNITS)
+    return tuple(f"{contact}.{_contact_column(name)}" for contact in rig.contact_names for name in EVENT_UNITS)
 
 
 NORMAL_FORCE = ".normal_force"

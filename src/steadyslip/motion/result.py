@@ -40,8 +40,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         """Status in a sentence, with advice where the run ended early."""
         where = f" ({self.contact})" if self.contact else ""
         head = f"{self.status}{where} at {format_quantity(self.end, 's')}"
-        area = None if isinstance(self.rig, Machine) else self.rig.area
-        advice = remedy(self.status, isinstance(self.rig, Machine), area)
+        advice = remedy(self.status, isinstance(self.rig, Machine), self.rig.area)
         return f"{head}: {advice}" if advice else head
 
     @property
@@ -63,7 +62,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     @cached_property
     def _sentences(self) -> dict[str, str]:
         """Sentence of each contact, by name."""
-        return sentences(self.events, self.slip_events, self.rig.area if isinstance(self.rig, Slider) else None)
+        return sentences(self.events, self.slip_events, self.rig.area)
 
     def summary(self) -> str:
         """Summary in a few lines."""
@@ -183,7 +182,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     def _forces(self, last: dict[str, float]) -> dict[str, Any]:
         """Final values for the whole contact area; empty without an area."""
-        found = totals(last, self.units, self.rig.area) if isinstance(self.rig, Slider) else {}
+        found = totals(last, self.units, self.rig.area)
         return {"forces": {"area": found["area"], "final": found["values"], "units": found["units"]}} if found else {}
 
     def to_xarray(self) -> Any:

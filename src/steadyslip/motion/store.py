@@ -197,8 +197,7 @@ def to_csv(history: HistoryData, path: str | PathLike[str]) -> None:
         If the file cannot be written.
     """
     names = list(history.data)
-    area = history.rig.area if isinstance(history.rig, Slider) else None
-    written = [outside(history.units[name], area) for name in names]
+    written = [outside(history.units[name], history.rig.area) for name in names]
     columns = {
         f"{name} ({unit})": history.data[name] * factor for name, (factor, unit) in zip(names, written, strict=True)
     }

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
-from steadyslip.laws.contact import ContactLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
@@ -87,10 +85,7 @@ class _TargetSearch:
 
     def __init__(self, rig: Slider | Machine, plan: Protocol) -> None:
         self.plan, self.several = plan, isinstance(rig, Machine)
-        laws: Mapping[str, ContactLaw] = {"": rig.contact} if isinstance(rig, Slider) else {}
-        if isinstance(rig, Machine):
-            laws = {name: surface.contact for name, surface in rig.contacts.items()}
-        self.laws = laws
+        self.laws = {name: own.contact for name, own in rig.laws_by_contact().items()}
         self.bodies = list(rig.bodies) if isinstance(rig, Machine) else [""]
         self.problems: list[Problem] = []
 

@@ -50,7 +50,7 @@ def cycles_of_file(
     drive whose edge of oscillation is the nearest.
     """
     rig = read_rig(path, changes)
-    along = along or ("stiffness" if isinstance(rig, Slider) else _nearest_oscillation(rig))
+    along = along or rig.default_along or _nearest_oscillation(rig)
     with progress_text("following cycles; Ctrl-C keeps what there is") as said:
 
         def progress(count: int, cycle: Cycle) -> None:
@@ -59,7 +59,7 @@ def cycles_of_file(
         return cycles(rig, along, between=between, doublings=doublings, progress=progress)
 
 
-def _nearest_oscillation(machine: Machine) -> str:
+def _nearest_oscillation(machine: Slider | Machine) -> str:
     """Name of the link or drive parameter whose oscillatory edge is nearest; any other where these have none."""
     found = margins(machine)
     built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
@@ -179,7 +179,7 @@ def response_of_file(
         raise ParameterError(
             [Problem("--periods", f"got {periods[0]} {periods[1]}; allowed: a time > 0, and a longer one")]
         )
-    factor, unit = outside(amplitude_unit(rig, input, on), rig.area if isinstance(rig, Slider) else None)
+    factor, unit = outside(amplitude_unit(rig, input, on), rig.area)
     sizes = [_quantity("--amplitude", text, unit) / factor for text in amplitudes]
     return response(
         rig, np.geomspace(low, high, points), input=input, output=output, on=on, amplitudes=sizes, limits=limits

@@ -115,7 +115,7 @@ class FrequencyResponse(ReadOnly):
 
     @property
     def _area(self) -> float | None:
-        return self.rig.area if isinstance(self.rig, Slider) else None
+        return self.rig.area
 
     @property
     def gain_unit(self) -> tuple[float, str]:

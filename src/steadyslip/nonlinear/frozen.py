@@ -320,9 +320,7 @@ def _changes(rates: Array) -> Array:
 
 def _contacts(rig: Slider | Machine) -> dict[str, tuple[ContactLaw, float]]:
     """Contact laws by the prefix of their parameters, and the area (m²) by which forces are divided."""
-    if isinstance(rig, Slider):
-        return {"contact.": (rig.contact, 1.0)}
-    return {f"contacts.{name}.contact.": (own.contact, own.area or 1.0) for name, own in rig.contacts.items()}
+    return {f"{own.prefix}contact.": (own.contact, own.area or 1.0) for own in rig.laws_by_contact().values()}
 
 
 def _refuse_remembered(rig: Slider | Machine) -> None:

@@ -239,7 +239,7 @@ def _slip_table(result: History) -> Iterator[str]:
     if not slips:
         return
     yield heading("Slip events", 3)
-    area = result.rig.area if isinstance(result.rig, Slider) else None
+    area = result.rig.area
     rows = [
         (one.contact if isinstance(one, ContactSlip) else i, format_quantity(one.begin, "s"),
          format_quantity(one.duration, "s"), format_quantity(one.slip, "m"), format_quantity(one.peak_velocity, "m/s"),

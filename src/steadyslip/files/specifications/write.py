@@ -51,7 +51,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
         If the rig or the protocol has a law without registered name, which a file cannot refer to.
     """
     blocks = []
-    area = None if isinstance(rig, Machine) else rig.area
+    area = rig.area
     for section in machine_sections() if isinstance(rig, Machine) else sections():
         if section.keyed:
             blocks += [_members(section.family, inner, section.name)] if (inner := getattr(rig, section.name)) else []

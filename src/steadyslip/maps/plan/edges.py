@@ -160,7 +160,7 @@ class OnsetKind(Along, name="onset"):
         return parameter_along(rig, self.along or "slider.stiffness")
 
     def is_own(self, rig: Slider | Machine) -> bool:
-        return self.along is None and not isinstance(rig, Machine)
+        return self.along is None and rig.default_along is not None
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         full = self.name_of(rig)

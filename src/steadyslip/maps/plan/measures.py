@@ -186,9 +186,9 @@ class Events(Measure, name="events"):
             Output("outcome", "1", "how the run ended", tuple(WORDS)),
             Output("end_time", "s", "time reached"),
         )
-        if isinstance(rig, Machine):
+        if rig.contact_names:
             meaning = "contact that was lost where a run ended so"
-            ended = (*ended, Output("outcome_contact", "1", meaning, ("none", *rig.contacts)))
+            ended = (*ended, Output("outcome_contact", "1", meaning, ("none", *rig.contact_names)))
         meant = (Output(name, event_unit(name), _meaning(name)) for name in event_names(rig))
         return (*ended, *meant)
 
@@ -207,7 +207,7 @@ class Events(Measure, name="events"):
         return float(np.mean(found.steps + found.rejected)) * SECONDS_A_STEP + 1e-6  # to set a run up
 
     def _run(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Any:
-        seen = tuple(f"{name}.normal_force" for name in rig.contacts) if isinstance(rig, Machine) else ()
+        seen = tuple(f"{name}.normal_force" for name in rig.contact_names)
         return simulate_many(
             rig, vary, protocol, until=self.until, observables=seen, method=self.method, rtol=self.rtol,
             most_steps=int(self.most_steps), arrest=self.arrest, threads=1, progress=False,
@@ -216,9 +216,9 @@ class Events(Measure, name="events"):
 
 def _contact_numbers(rig: Slider | Machine, name: str, contact: np.ndarray) -> dict[str, np.ndarray]:
     """Contact names of a machine as numbers, for an output with words; empty for a slider."""
-    if not isinstance(rig, Machine):
+    if not rig.contact_names:
         return {}
-    numbers = {own: number for number, own in enumerate(("", *rig.contacts))}
+    numbers = {own: number for number, own in enumerate(("", *rig.contact_names))}
     return {name: np.vectorize(numbers.__getitem__, otypes=[int])(contact)}
 
 
@@ -241,7 +241,7 @@ class KickThreshold(Measure, name="threshold"):
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         lost = "contact that is lost beyond, or fastest in a blow-up"
-        names = ("none", *rig.contacts) if isinstance(rig, Machine) else ()
+        names = ("none", *rig.contact_names) if rig.contact_names else ()
         return (
             Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
             Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),

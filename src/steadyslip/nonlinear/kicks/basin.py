@@ -192,7 +192,7 @@ def basin(
     contact = contacts_of(runs, np.flatnonzero(np.isin(found, (CONTACT_LOST, BLOW_UP))), threads)
     reasons = [doubt_of(code) for code in range(len(OUTCOMES))]
     outcome, doubt = (np.array(words)[found].reshape(width.shape) for words in (OUTCOMES, reasons))
-    along = "stiffness" if along is None and isinstance(rig, Slider) else along
+    along = rig.default_along if along is None else along
     orbits = () if along is None or np.any(found == INTERRUPTED) else _unstable_cycles(rig, along, branch, progress)
     return Basin(
         rig, across, up, outcome, doubt, orbits, plane.names, plane.units, (0.0, plane.steady),

@@ -118,7 +118,7 @@ def threshold_map(
     about = {"units": "1", "long_name": f"{kick} kick that is survived, {kicks_of(rig)[kick].size}"}
     about["steadyslip"] = version()
     beside = {"limit": (dims, np.array(BEYOND)[found.beyond])}
-    if isinstance(rig, Machine):
+    if rig.contact_names:
         beside["contact"] = (dims, found.contact)
     return xr.DataArray(found.size, dims=dims, coords={**coords, **beside}, name=f"{kick}_threshold", attrs=about)
 

@@ -16,7 +16,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import out_of_range_error
-from steadyslip.model.sliding import steady_state, steady_states
+from steadyslip.model.sliding import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.spans import (
     BLOW_UP,
@@ -102,7 +102,7 @@ class Threshold(Displayed):
     @property
     def area(self) -> float | None:
         """Contact area by which a stress amount is multiplied for display as a force; None without one."""
-        return self.rig.area if isinstance(self.rig, Slider) else None
+        return self.rig.area
 
     def __str__(self) -> str:
         what = f"{self.kick} kick" + (f" at {self.at}" if self.at else "")
@@ -229,7 +229,7 @@ def threshold(
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
-    require_steady(rig)
+    steady_states(rig)  # raises, and says why
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol, at)
     if not kicked.exists[0]:
         raise out_of_range_error(kicked.jobs.point)
@@ -243,14 +243,6 @@ def threshold(
     except KeyboardInterrupt:
         search.interrupted = True
     return search.result(rig, precision)
-
-
-def require_steady(rig: Slider | Machine) -> None:
-    """Raise NoSteadySliding, with the reason, if the rig has no steady sliding."""
-    if isinstance(rig, Machine):
-        steady_state(rig)
-    else:
-        steady_states(rig)
 
 
 class _Search:

@@ -106,8 +106,7 @@ class CycleBranch(Displayed):
 
     def _of_contacts(self) -> dict[str, tuple[str, str]]:
         """Contact and attribute of each quantity at the contacts of a machine, by public name."""
-        contacts = self.rig.contacts if isinstance(self.rig, Machine) else ()
-        return {f"{one}.{item.name}": (one, item.name) for one in contacts for item in fields(CycleRange)}
+        return {f"{one}.{item.name}": (one, item.name) for one in self.rig.contact_names for item in fields(CycleRange)}
 
     def _units(self) -> dict[str, str]:
         """SI unit of each numeric quantity, by name."""

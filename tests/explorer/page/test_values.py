@@ -63,6 +63,21 @@ def test_an_edge_in_the_list_goes_there(browser, file):
         assert "is 1.001 times the critical" in visit.page.inner_text(".verdict p"), "not 1 times, as on the edge"
 
 
+def test_an_edge_outside_the_range_of_a_slider_takes_the_slider_there(browser, file):
+    """With some radiation damping the edge of the velocity is further off than a track is widened by itself."""
+    with Visit(browser, file) as visit:
+        visit.type("slider.radiation_damping", "1e5 Pa s/m")
+        visit.page.locator(".edges button", has_text="drive.velocity → ").evaluate("one => one.click()")
+        slider = visit.slider("drive.velocity")
+        place = 0.1 * float(slider.input_value())  # per cent
+        paint = slider.evaluate("e => e.style.getPropertyValue('--track')")
+        ends = [(name, float(at)) for name, at in re.findall(r"--(\w+)\) ([\d.]+)%", paint)]
+        own = [name for (name, low), (_, high) in zip(ends[::2], ends[1::2], strict=True) if low <= place <= high]
+        assert 50 < place < 100
+        assert own == ["stable"]
+        assert visit.sentence().startswith("Stable: ")
+
+
 @pytest.mark.parametrize("far", [("friction.b", "1e10"), ("friction.b", "1600"), ("slider.stiffness", "1e-300 Pa/m")])
 def test_a_value_far_away_leaves_nothing_behind(browser, file, far):
     """Edges, and where one lands, are the edge's own: no slider's range decides on them; reset brings ranges back."""

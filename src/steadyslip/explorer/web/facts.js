@@ -69,7 +69,7 @@ export class Facts {
     const rows = (edges) => edges.map((edge) => {
       const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", textContent: `${one.name} → ${told(one, edge.at)}` });
       go.addEventListener("click", () => {
-        if (inside(one, edge.landing)) page.change(page.with(edge.i, edge.landing));
+        if (inside(one, edge.landing)) page.put(page.with(edge.i, edge.landing));
       });
       return make("li", {}, go, ` ${beyondWords(edge, page)}`);
     });

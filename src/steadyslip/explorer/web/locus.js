@@ -53,7 +53,7 @@ export class Locus {
     put(this.decays, "d", drawn(eigenvalues.filter((s) => !(s.re > 0)), cross));
     put(this.grows, "d", drawn(eigenvalues.filter((s) => s.re > 0), cross));
     const seen = eigenvalues.filter(shows).length;
-    tell(this.note, seen < eigenvalues.length ? `${eigenvalues.length - seen} of ${eigenvalues.length} are further out than the picture` : "");
+    tell(this.note, seen < eigenvalues.length ? `${eigenvalues.length - seen} of ${eigenvalues.length} ${eigenvalues.length - seen > 1 ? "are" : "is"} further out than the picture` : "");
     put(this.canvas, "aria-label", `eigenvalues in the complex plane, ${seen} of ${eigenvalues.length} in view; dots: as what the bar shows rises`);
   }
 

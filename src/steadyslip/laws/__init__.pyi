@@ -16,6 +16,7 @@ from .contact import (
     SelfEnergising as SelfEnergising,
     SliderCrank as SliderCrank,
     SlopedGuide as SlopedGuide,
+    Transmitted as Transmitted,
     Triaxial as Triaxial,
 )
 from .declare import (

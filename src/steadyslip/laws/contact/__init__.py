@@ -12,6 +12,7 @@ from steadyslip.laws.contact.mechanisms import (
     SelfEnergising,
     SliderCrank,
     SlopedGuide,
+    Transmitted,
     Triaxial,
 )
 
@@ -35,6 +36,7 @@ __all__ = [
     "SelfEnergising",
     "SliderCrank",
     "SlopedGuide",
+    "Transmitted",
     "Triaxial",
     "porous",
     "pressed_at",

@@ -42,6 +42,38 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
         return Shape(rise=self.angle)
 
 
+class Transmitted(ContactLaw, name="transmitted"):
+    """A gear, screw or guide that is pressed by the load it carries: σ = σ0 + g |T|.
+
+    T is the pull on the body, or with `loaded_by` the force of one link (torque over radius where it turns). While T
+    drives the body, T > 0, g is `transmitted`; while the load drives it backwards through the gear, T < 0, g is
+    `transmitted_back`, the same unless given. Steady sliding with T > 0 is an inclined spring with tan ψ = −g:
+    B0...B3 = 0, −c g, −g, 0, and it locks up where g μss >= 1 (where T is the pull of the drive itself).
+    """
+
+    preload: float = parameter(
+        "Pa", nonnegative, "normal stress σ0 without load", default=0.0, kind="normal stress", letter="sigma_0"
+    )
+    transmitted: float = parameter("1", nonnegative, "share g of the load that presses the contact, T > 0")
+    transmitted_back: float | None = parameter(
+        "1", nonnegative, "the same for T < 0; that for T > 0 unless given", default=None
+    )
+
+    def load(self) -> Expression | None:
+        return self.preload
+
+    def coupling(self, motion: ContactInputs) -> Expression:
+        back = self.transmitted if self.transmitted_back is None else self.transmitted_back
+        pull = motion.spring
+        return (self.transmitted + back) / 2 * sp.Abs(pull) + (self.transmitted - back) / 2 * pull
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        return f"the transmitted share must be below 1/μss = {1 / friction_coefficient:.4g}"
+
+    def shape(self) -> Shape:
+        return Shape(rise=-0.3)
+
+
 class SliderCrank(PreloadedContact, name="slider-crank"):
     """The slider of a crank mechanism, held at one crank angle: a rod at angle ψ, σ = σ0 − T tan ψ.
 

@@ -613,6 +613,30 @@ def examples(
 
 
 @app.command()
+def init(
+    kind: Annotated[str, typer.Argument(help="rig, machine, protocol, fit or map")] = "rig",
+    friction: Annotated[str, typer.Option(help="friction law of a rig")] = "lugre",
+    contact: Annotated[str, typer.Option(help="its contact law")] = "constant",
+    drive: Annotated[str, typer.Option(help="its drive: steady, pd or pid")] = "steady",
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the file (.toml)")] = None,
+) -> None:
+    """A commented file to begin with: every key of the chosen laws, with its meaning; a rig answers as it is."""
+    from steadyslip.core.errors import NotAvailable
+    from steadyslip.files.output import check_output, write_text
+    from steadyslip.files.specifications.starter import starter_text
+
+    text = starter_text(kind, friction, contact, drive)
+    if output is None:
+        print_text(text.rstrip())
+        return
+    check_output([output], [".toml"])
+    if output.exists():
+        raise NotAvailable(f"{output} exists already; name another file, or remove it")
+    write_text(output, text)
+    print_text(f"wrote {output}")
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of the files that are read: rigs, protocols, maps and fits."""
     from steadyslip.schemas import json_schema

@@ -57,6 +57,17 @@ def copy_examples(folder: str | PathLike[str]) -> list[Path]:
     return list(contents)
 
 
+def example_text(name: str) -> str:
+    """Text of an example file, such as ``machines/feed-axis.toml``.
+
+    Raises
+    ------
+    NotAvailable
+        If the package was installed without them.
+    """
+    return (_folder() / name).read_text(encoding="utf-8")
+
+
 def _folder() -> Path:
     for place in _PLACES:
         if (place / "inclined-spring.toml").is_file():

@@ -1,0 +1,119 @@
+"""Commented files to begin with: a rig with laws of one's choice, or an example of another kind of file."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import Field
+from typing import Any
+
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.quantities import example
+from steadyslip.core.records import Declared, FrozenRecord, Part, is_required, key_of
+from steadyslip.core.roles import Parameter
+from steadyslip.files.examples import example_text
+from steadyslip.files.specifications.layout import Section, find_law, has_choice, own_fields, sections, selector
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.machine.slider import Slider
+
+START = {
+    "mu_coulomb": "0.11", "mu_static": "0.19", "v_stribeck": '"8 mm/min"', "bristle_stiffness": '"125000 1/m"',
+    "viscous": '"1.25 s/m"', "a": "0.010", "b": "0.014", "d_c": '"10 um"', "mu_ref": "0.6", "v_ref": '"1 mm/min"',
+    "preload": '"3.2 kN"', "confining_pressure": '"160 kPa"', "angle": '"20 deg"', "crank_angle": '"60 deg"',
+    "crank_radius": '"50 mm"', "rod_length": '"200 mm"', "gain": "0.3", "lead_angle": '"5 deg"',
+    "axial_load": '"3.2 kN"', "transmitted": "0.1", "ram_stiffness": '"100 N/um"', "dilatancy": '"0.1 um"',
+    "lift": '"10 N s/m"', "guide_stiffness": '"100 N/um"', "slope": '"1 deg"', "suction": '"10 kPa"',
+    "drainage": '"1 1/s"', "slip_distance": '"10 um"', "velocity": '"0.5 mm/min"', "kp": '"12 N/um"',
+    "kd": '"5 N s/mm"', "ki": '"20 N/um/s"', "area": '"200 cm^2"', "stiffness": '"12 N/um"', "mass": '"240 kg"',
+    "damping": '"5 N s/mm"',
+}  # fmt: skip
+"""Values of a slow machine slide, 240 kg on 3.2 kN; they stand in until replaced."""
+NOT_BESIDE = {"self-energising": ("wedge_angle", "lead_angle"), "lift": (), "linear": ("gain",)}
+"""Keys of which a law takes one alone, left out where another one stands."""
+EXAMPLES = {
+    "machine": "machines/feed-axis.toml", "protocol": "stick-slip.toml", "fit": "fits/basalt.toml",
+    "map": "maps/safe-stiffness.toml",
+}  # fmt: skip
+"""Commented example of each other kind of file."""
+KINDS = ("rig", *EXAMPLES)
+_WIDE = 30  # columns of key and value before the comment
+_HEAD = """# A rig to begin with: replace the numbers, then ask
+#     steadyslip analyze FILE
+# Text carries its unit; a tolerance may follow, such as "12 ± 20 % N/um". Lines that begin with # are what else may be
+# given. With area quantities are forces (N, N/um, kg); without it they are per unit area (MPa, GPa/m).
+"""
+
+
+def starter_text(kind: str = "rig", friction: str = "lugre", contact: str = "constant", drive: str = "steady") -> str:
+    """TOML text of a commented file to begin with.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    friction, contact, drive : str
+        Laws of a rig by the word used in files.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such kind or law.
+    NotAvailable
+        If the package was installed without its examples.
+    """
+    if kind not in KINDS:
+        raise ParameterError([Problem("kind", unknown_name("kind of file", kind, KINDS))])
+    if kind != "rig":
+        return example_text(EXAMPLES[kind])
+    words = {"friction": friction, "contact": contact, "drive": drive}
+    problems = [Problem(f"--{name}", fault) for name, word in words.items() if (fault := _fault(name, word))]
+    if problems:
+        raise ParameterError(problems)
+    return "\n".join([_HEAD, *(_table(section, words.get(section.name, "")) for section in sections())])
+
+
+def _fault(name: str, word: str) -> str:
+    """What is wrong with the law for a table; empty if nothing."""
+    family = next(section.family for section in sections() if section.name == name)
+    return "" if word in (fit := _laws_of_sliders(family)) else unknown_name(family.family, word, fit)
+
+
+def _laws_of_sliders(family: type[FrozenRecord]) -> list[str]:
+    """Laws of a family but those of contacts that need a body that moves away from the surface."""
+    usual = ContactLaw.is_compliant
+    return [name for name, law in family.registry.items() if getattr(law, "is_compliant", usual) is usual]
+
+
+def _table(section: Section, word: str) -> str:
+    law = Slider if section.family is Slider else find_law(section.family, word)
+    key, _ = selector(section.family)
+    lines = [f"[{section.name}]"]
+    if law is not Slider:
+        lines += [*_comment(f"one of {', '.join(_laws_of_sliders(section.family))}"), f'{key} = "{word}"']
+    lines += [line for item, role in own_fields(law) for line in _field(law, item, role)]
+    return "\n".join(lines) + "\n"
+
+
+def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterator[str]:
+    """Lines of one key: with a value if the rig needs one or it is usual, else commented out."""
+    key = key_of(item)
+    if isinstance(role, Part):
+        if has_choice(role.family) and not role.many:
+            words = ", ".join(role.family.registry)
+            default = getattr(item.default, "name", "") or next(iter(role.family.registry))
+            yield from _comment(f"{role.doc}: one of {words}")
+            yield f'# {key} = "{default}"'
+        return
+    usual = key in START and key not in NOT_BESIDE.get(law.name, ())
+    if isinstance(role, Parameter):
+        value = START.get(key, example(role.unit).replace("'", '"'))
+        text = f"{key} = {value}"
+        yield f"{text if usual or is_required(item) else '# ' + text:<{_WIDE}} # {role.doc}"
+    elif hasattr(role, "choices"):
+        default = item.default
+        shown = str(default).lower() if isinstance(default, bool) else f'"{default}"'
+        yield f"{f'# {key} = {shown}':<{_WIDE}} # {role.doc}: {role.allowed()}"
+
+
+def _comment(text: str) -> list[str]:
+    return textwrap.wrap(text, 110, initial_indent="# ", subsequent_indent="#   ")

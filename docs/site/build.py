@@ -27,6 +27,7 @@ CONTENTS = {
     "Start": "start/*",
     "Tutorial": "tutorial/*",
     "How to": "how-to/*",
+    "Notebooks": "notebooks/*",
     "Explanation": "explanation/*",
     "Reference": "reference/*",
     "Python": "api/*",
@@ -45,6 +46,8 @@ API_HEAD = """Every example begins with `import steadyslip as ss`, in a folder b
 def place_of(path: Path) -> str | None:
     """Where a file of the checkout is in the site; None if it has no place there."""
     own = path.relative_to(ROOT).as_posix()
+    if own.startswith("examples/notebooks/"):
+        return f"notebooks/{path.stem}.md"
     if own.startswith("docs/"):
         return own.removeprefix("docs/")
     if own in PROJECT:
@@ -67,6 +70,17 @@ def relinked(page: Path) -> str:
     return re.sub(r"(!?\[[^\]]*\])\((?!\w+:|#)([^)#\s]+)(#[^)\s]*)?\)", link, text)
 
 
+def notebook_text(path: Path) -> str:
+    """A notebook as a page: its cells in order, with what they print."""
+    lines = []
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        lines += [source, ""] if cell["cell_type"] == "markdown" else ["```python", source, "```", ""]
+        for output in cell.get("outputs", ()):
+            lines += ["```text", "".join(output["text"]).rstrip(), "```", ""]
+    return "\n".join(lines)
+
+
 def copy_sources(source: Path) -> None:
     """Copy pages with their links put right, pictures and examples."""
     copied = [*(ROOT / "docs").rglob("*"), *(ROOT / "examples").rglob("*"), *(ROOT / name for name in PROJECT)]
@@ -76,6 +90,8 @@ def copy_sources(source: Path) -> None:
             goal.parent.mkdir(parents=True, exist_ok=True)
             if path.suffix == ".md" and "examples" not in goal.parts:
                 goal.write_text(relinked(path), encoding="utf-8")
+            elif path.suffix == ".ipynb":
+                goal.write_text(notebook_text(path), encoding="utf-8")
             elif path.suffix != ".pyc":
                 shutil.copyfile(path, goal)
 

@@ -14,6 +14,11 @@ def json_schema() -> dict[str, Any]:
 
     A file with a table ``[fit]`` or ``[record]`` may leave out parameters that are fitted or follow from records; a
     file with a protocol alone needs no rig.
+
+    Examples
+    --------
+    >>> ss.json_schema()["title"]
+    'steadyslip file'
     """
     whole = rig_schema((MAP_TABLE,))
     every = partial(rig_schema((MAP_TABLE, *FIT_TABLES)))

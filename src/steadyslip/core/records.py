@@ -115,28 +115,58 @@ def parameter(
     letter: str = "",
     elsewhere: tuple[str, ...] = (),
 ) -> Any:
-    """Declare a numeric field; ``default=None`` makes it optional, the other arguments are those of `Parameter`."""
+    """Declare a numeric field; ``default=None`` makes it optional, the other arguments are those of `Parameter`.
+
+    Examples
+    --------
+    >>> ss.laws.parameter("m", ss.laws.positive, "slip distance").metadata["steadyslip"].unit
+    'm'
+    """
     role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere)
     return field(default=default, metadata={_ROLE: role})
 
 
 def option(*choices: Any, doc: str, default: Any) -> Any:
-    """Declare a field with one of several words, or a bool."""
+    """Declare a field with one of several words, or a bool.
+
+    Examples
+    --------
+    >>> ss.laws.option("slow", "fast", doc="pace", default="slow").default
+    'slow'
+    """
     return field(default=default, metadata={_ROLE: Option(choices, doc)})
 
 
 def samples(unit: str, doc: str) -> Any:
-    """Declare a field with a measured column: a list or array of numbers, or of texts with units."""
+    """Declare a field with a measured column: a list or array of numbers, or of texts with units.
+
+    Examples
+    --------
+    >>> ss.laws.samples("s", "times of the column").metadata["steadyslip"].unit
+    's'
+    """
     return field(metadata={_ROLE: Series(unit, doc)})
 
 
 def part(family: type[FrozenRecord], doc: str, *, default: Any = MISSING, inline: bool = False) -> Any:
-    """Declare a field that holds another record of `family`."""
+    """Declare a field that holds another record of `family`.
+
+    Examples
+    --------
+    >>> ss.laws.part(ss.laws.NormalMemory, "memory of normal stress").metadata["steadyslip"].family.__name__
+    'NormalMemory'
+    """
     return field(default=default, metadata={_ROLE: Part(family, doc, inline)})
 
 
 def parts(family: type[FrozenRecord], doc: str, *, default: tuple[()], by_name: bool = False) -> Any:
-    """Declare a field that holds a tuple of records, empty by default."""
+    """Declare a field that holds a tuple of records, empty by default.
+
+    Examples
+    --------
+    >>> ss.laws.parts(ss.laws.State, "states of friction", default=()).default
+    ()
+    """
     return field(default=default, metadata={_ROLE: Part(family, doc, many=True, by_name=by_name)})
 
 

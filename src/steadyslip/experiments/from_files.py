@@ -56,6 +56,12 @@ def fit_files(
     ------
     ParameterError
         Listing everything that is wrong with the files: of all records, and of the file of the fit.
+
+    Examples
+    --------
+    >>> fit, comparison = ss.fit_files(["examples/data/made_velocity_step.csv"])
+    >>> print(fit["d_c"])
+    friction.d_c = 10.06 ± 0.077 um
     """
     plan = spec_of(spec, changes)
     records = _read(plan, paths, skip_bad_lines)
@@ -94,6 +100,14 @@ def population_files(
         Listing everything that is wrong with the files, or if they do not determine a population.
     NotAvailable
         If emcee is not installed.
+
+    Examples
+    --------
+    >>> paths = ["examples/data/made_velocity_step.csv"] * 3
+    >>> changes = ["fit.trend=0", "population.parameters=['friction.a', 'friction.b']"]
+    >>> pooled = ss.experiments.population_files(paths, "examples/fits/basalt.toml", changes)
+    >>> pooled.names
+    ('friction.a', 'friction.b')
     """
     plan = spec_of(spec, changes)
     members = plan.population or PopulationSettings()

@@ -164,6 +164,11 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
     ------
     RigFileError
         Listing everything that is wrong.
+
+    Examples
+    --------
+    >>> ss.read_spec("examples/fits/basalt.toml").rig.stiffness
+    10000000000.0
     """
     return spec_from_text(text_of(path), str(path), changes)
 
@@ -241,6 +246,12 @@ def lab_rig(
         Rate at which mu_ref holds.
     velocity : float or str
         Rate of the load point before the first change of a protocol; needed where no record has a displacement.
+
+    Examples
+    --------
+    >>> rig = ss.lab_rig("aging", stiffness="50 GPa/m")
+    >>> rig.friction.evolution, rig.stiffness
+    (Aging(), 50000000000.0)
     """
     rate = _checked("v_ref", "m/s", v_ref)
     friction = {"evolution": evolution, "v_ref": rate, "normal_memory": {"law": normal_memory}}

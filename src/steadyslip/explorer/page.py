@@ -78,6 +78,11 @@ def explore(
         If `branch` is not 0 for a machine, which has one steady state.
     RigFileError
         If the source cannot be read.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.explore(rig).save("rig.html")
     """
     if branch and isinstance(rig, Machine):
         raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])

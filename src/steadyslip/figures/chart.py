@@ -68,6 +68,12 @@ def stability_chart(
     ------
     UnknownNameError, ParameterError, NotAvailable
         If a name or range is not allowed, or a range has to be given.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> axes = ss.figures.stability_chart(rig, "contact.angle", "stiffness", points=21)
+    >>> axes.figure.savefig("stability-chart.svg")
     """
     first, second = chart_axis(rig, x, x_range), chart_axis(rig, y, y_range)
     if first.name == second.name:

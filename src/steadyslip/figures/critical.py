@@ -48,6 +48,12 @@ def critical_stiffness_against_mass(
         If the contact is not an inclined spring, or friction has no slip distance.
     ParameterError
         If an angle is outside ±90 degrees or a mass is not positive.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> axes = ss.figures.critical_stiffness_against_mass(rig, angles=[0], m_star=[1e-3, 1e-2])
+    >>> axes.figure.savefig("critical-stiffness-against-mass.svg")
     """
     mass.slip_distance(rig)  # raises NotAvailable before anything is drawn
     angles = ANGLES if angles is None else [float(angle) for angle in angles]

@@ -35,6 +35,13 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
     Returns
     -------
     ndarray of matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> found = ss.response(rig, [10.0, 100.0])
+    >>> axes = ss.figures.frequency_response(found)
+    >>> axes[0].figure.savefig("frequency-response.svg")
     """
     drawn = [_gain, _phase]
     drawn += [_shift] if found.amplitudes.size else []

@@ -49,6 +49,12 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         If the rig has no steady sliding to perturb.
     NotAvailable
         If there is neither a critical nor an own stiffness to start from; pass `stiffness`.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> axes = ss.figures.root_locus(rig)
+    >>> axes.figure.savefig("root-locus.svg")
     """
     steady_state(rig)
     spring = float(operating_point(rig).named()["slider.stiffness"])

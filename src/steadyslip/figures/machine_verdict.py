@@ -28,6 +28,12 @@ def machine_verdict(found: MachineAnalysis) -> np.ndarray:
     -------
     ndarray of matplotlib.axes.Axes
         Axes of `stable_ranges`, `mode_shape` and `eigenvalue_plane`; the first alone without steady sliding.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
+    >>> axes = ss.figures.machine_verdict(ss.analyze(machine))
+    >>> axes[0].figure.savefig("machine-verdict.svg")
     """
     from matplotlib import pyplot as plt
 
@@ -52,6 +58,12 @@ def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     ------
     NotAvailable
         If no parameter has an edge.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
+    >>> axes = ss.figures.stable_ranges(ss.analyze(machine))
+    >>> axes.figure.savefig("stable-ranges.svg")
     """
     margins = _drawn_margins(found)
     if not margins:
@@ -140,6 +152,12 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     ------
     NotAvailable
         If there is no mode, because sliding is not steady or the equations are ill-posed.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
+    >>> axes = ss.figures.mode_shape(ss.analyze(machine))
+    >>> axes.figure.savefig("mode-shape.svg")
     """
     mode = found.mode
     if mode is None:
@@ -181,6 +199,12 @@ def eigenvalue_plane(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     ------
     NotAvailable
         If there are none.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
+    >>> axes = ss.figures.eigenvalue_plane(ss.analyze(machine))
+    >>> axes.figure.savefig("eigenvalue-plane.svg")
     """
     s = np.array(found.eigenvalues)
     s = s[np.isfinite(s)]

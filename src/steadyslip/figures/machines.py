@@ -34,6 +34,12 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         Motion is to the right. Boxes slide, circles turn; zigzags are springs, pistons dashpots; hatched is the ground.
         Solid blue: action of the drive; dashed blue: its sensors; red: constant forces.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
+    >>> axes = ss.figures.machine_sketch(machine)
+    >>> axes.figure.savefig("machine-sketch.svg")
     """
     pencil = AxesPencil(axes_or_new(ax))
     Drawing(machine, pencil).draw()

@@ -34,6 +34,14 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
     ------
     ParameterError
         If the map is over another number of parameters.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> grids = {"stiffness": ss.maps.Grid("10 GPa/m", "40 GPa/m", 4), "friction.a": ss.maps.Grid(0.014, 0.015, 3)}
+    >>> found = ss.run_map(ss.Map(rig, grids, ["growth_rate"]), "plane.zarr")
+    >>> axes = ss.figures.refined(ss.refine(found, 1))
+    >>> axes.figure.savefig("refined.svg")
     """
     names = [name for name in found.map.dims if name in found.spacing]
     if len(names) != 2:

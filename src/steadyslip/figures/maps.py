@@ -62,6 +62,13 @@ def map_figure(
     ------
     ParameterError
         If a name is not one of the map's.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> found = ss.run_map(ss.Map(rig, {"stiffness": [10e9, 20e9, 40e9]}, ["growth_rate"]), "curve.zarr")
+    >>> axes = ss.figures.map_figure(found)
+    >>> axes.figure.savefig("map-figure.svg")
     """
     if show is not None and show not in found.results:
         raise ParameterError([Problem("show", unknown_name("result", show, found.results))])

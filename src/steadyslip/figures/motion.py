@@ -58,6 +58,13 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     ------
     ParameterError
         If `ax` is not three Axes.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> run = ss.simulate(rig, until=10)
+    >>> axes = ss.figures.history(run)
+    >>> axes[0].figure.savefig("history.svg")
     """
     panels = (
         new_panels(3, 1, (6.4, 6.4), sharex=True)[:, 0] if ax is None else given_panels(ax, (3,), "a sequence of three")
@@ -180,6 +187,13 @@ def phase_plane(
     ------
     ParameterError
         If there is no such contact.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> run = ss.simulate(rig, ss.protocol.VelocityStep(at="1 s", to="2 um/s"), until=100)
+    >>> axes = ss.figures.phase_plane(run)
+    >>> axes.figure.savefig("phase-plane.svg")
     """
     check_contact(run.rig, contact)
     if isinstance(run.rig, Machine):

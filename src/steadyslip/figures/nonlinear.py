@@ -44,6 +44,12 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
+    >>> axes = ss.figures.cycle_branch(ss.cycles(rig))
+    >>> axes.figure.savefig("cycle-branch.svg")
     """
     ax = axes_or_new(ax)
     area, origin, along = branch.rig.area_of(branch.along), 0.0, short_name(branch.along)

@@ -29,6 +29,12 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> axes = ss.figures.tolerances(ss.tolerate(rig, {"friction.a": "3 %"}))
+    >>> axes.figure.savefig("tolerances.svg")
     """
     edges = bool(found.along)
     spans = {one.parameter: one.safety if edges else one.growth for one in found.alone}

@@ -76,7 +76,10 @@ def _folder() -> Path:
 
 
 def _headline(path: Path) -> str:
-    """First statement of the comment at the head of a TOML file, on one line; empty for other files."""
+    """First statement of the comment at the head of a TOML file, or the title of a notebook; empty for other files."""
+    if path.suffix == ".ipynb":
+        title = re.search(r'"# (.*?)(?:\\n)?"', path.read_text(encoding="utf-8"))
+        return title[1] if title else ""
     if path.suffix != ".toml":
         return ""
     head = re.match(r"(?:#.*\n)*", path.read_text(encoding="utf-8"))

@@ -82,6 +82,13 @@ def boundary(
         If the name is unknown or the range is not inside the parameter's domain.
     NotAvailable
         If the numbers of the rig leave the range of floating point, or rounding hides eigenvalues.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> for edge in ss.boundary(rig, "stiffness"):
+    ...     print(edge)
+    slider.stiffness = 29.0698 GPa/m: oscillatory, period 33.08 s, stable above
     """
     _require_answers(rig, branch)
     full = rig.resolve(name)
@@ -114,6 +121,13 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     ------
     NotAvailable
         If the numbers of the rig leave the range of floating point, or rounding hides eigenvalues.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> nearest = ss.margins(rig)[0]
+    >>> nearest.parameter, round(nearest.relative, 4)
+    ('friction.b', -0.0647)
     """
     _require_answers(rig, branch)
     present = present_zeros(rig)

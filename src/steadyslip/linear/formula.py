@@ -63,6 +63,12 @@ def formula(rig: Slider | Machine, along: str | None = None) -> sp.Eq:
     Notes
     -----
     It is written as short as SymPy manages in `LONGEST` seconds for each of two steps, else unsimplified.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.formula(rig).rhs
+    sigma_ss*(-a + b)/(d_c*(-alpha*tan(psi) + mu_ss*tan(psi) + 1))
     """
     model, full = build_model(rig), _name(rig, along)
     return _formula(model) if is_own_stiffness(rig, full) else _condition(model, full)

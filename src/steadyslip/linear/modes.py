@@ -126,6 +126,15 @@ def modes(rig: Machine) -> tuple[Mode, ...]:
     ------
     NoSteadySliding
         Naming the contact that locks up or lifts off.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
+    >>> print(ss.modes(machine)[0])
+    mode with eigenvalue -0.403646+0j 1/s: the carriage drifts; 100 % of the energy is in the belt
+      carriage             1 at 0 deg
+      bodies.carriage      0 % of the energy
+      links.belt           100 % of the energy
     """
     point = operating_point(rig)
     if not point.exists:

@@ -189,6 +189,13 @@ def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     NotAvailable
         If the rig has no memory variable, several, or integral control; or if the numbers of a single rig leave the
         range of floating point (of several, `OutOfRangeWarning` is issued).
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> found = ss.small_signal(rig)
+    >>> round(found.f / 1e9, 3), round(found.S / 1e9, 3)
+    (241.667, -25.0)
     """
     point = operating_point(rig, vary)
     numbers = response_numbers(point).as_dict()

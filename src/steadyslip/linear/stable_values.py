@@ -51,6 +51,12 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     With a delay, roots are counted, no rational function stands for it. All delays are found; of other parameters of a
     rig with delay, which may have windows without end, those up to a factor of a million from its own value in which no
     oscillation turns more than a hundred times during the delay; the last interval ends there.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
+    >>> ss.stable_values(rig, "radiation_damping")
+    array([[1.73467337e+10,            inf]])
     """
     full = rig.resolve(name)
     late = rig.parameters()[full].role.kind == "delay"
@@ -95,6 +101,12 @@ def safety_factor(rig: Slider | Machine, vary: Vary | None = None, *, along: str
         If of a machine no parameter is named.
     NotAvailable
         If the parameter does not enter linearly.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> round(ss.safety_factor(rig), 4)
+    0.3096
     """
     full = name_along(rig, along)
     point = operating_point(rig, vary)

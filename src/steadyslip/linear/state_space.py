@@ -153,6 +153,12 @@ def state_space(
     NotAvailable
         If the rig has a delay, the problem is ill-posed, numbers leave the range of floating point, or lie so far
         apart that rounding would take some of the rig's eigenvalues from the state matrix.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.state_space(rig, outputs=["v"], inputs=["load_velocity"]).A.shape
+    (2, 2)
     """
     from scipy.signal import StateSpace
 
@@ -170,6 +176,12 @@ def to_control(rig: Slider | Machine, outputs: Sequence[str] | None = None, inpu
     ------
     NotAvailable
         If ``control`` is not installed.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.linear.to_control(rig, outputs=["v"], inputs=["load_velocity"]).poles().round(6)
+    array([0.03571+0.099485j, 0.03571-0.099485j])
     """
     try:
         import control

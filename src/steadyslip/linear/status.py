@@ -52,6 +52,14 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     ------
     ParameterError
         If a name or value is not allowed.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.stability(rig)
+    'unstable'
+    >>> ss.stability(rig, {"stiffness": [10e9, 40e9]})
+    array(['unstable', 'stable'], dtype='<U17')
     """
     point = operating_point(rig, vary)
     words = np.array(WORDS)[status(point)]

@@ -69,6 +69,14 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     -----
     Eq. 20 of Dupont & Bapna with its errata corrected, or the general route (theory 3). One number is
     never a verdict: see `stable_stiffness`.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> round(ss.critical_stiffness(rig) / 1e9, 3)
+    29.07
+    >>> (ss.critical_stiffness(rig, {"contact.angle": [-0.5, 0, 0.5]}) / 1e9).round(3)
+    array([13.15,  7.5 ,  5.04])
     """
     point = operating_point(rig, vary)
     return point.wrap(in_chunks(point, _nearest_edge), "critical_stiffness", "Pa/m")
@@ -98,6 +106,12 @@ def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     ndarray or xarray.DataArray, shape (..., m, 2)
         Open intervals (low, high) in Pa/m, in rising order; high is inf where there is no upper limit.
         Rigs with fewer than m intervals are padded with NaN; all NaN means that no stiffness is stable.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.stable_stiffness(rig)
+    array([[2.90697674e+10,            inf]])
     """
     point = operating_point(rig, vary)
     most = 1 if has_closed_form(point.model) else most_values(point)
@@ -130,6 +144,12 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
         floating point (see `stability`), and for the root that a rig lacks when its mass is zero. With a delay, which
         makes infinitely many, the rightmost, as many as there are without it; NaN, with an `IllPosedWarning`, where
         infinitely many grow: on a body without mass, what acts late outweighs what acts at once.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.eigenvalues(rig).round(6)
+    array([0.03571+0.099485j, 0.03571-0.099485j])
     """
     point = operating_point(rig, vary)
 
@@ -162,6 +182,14 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     mass under a late controller, say) there may be no slowest decay, only infinitely many that come as near to one rate
     as one likes; then it is that rate, for the given delays or others as near as one likes to them, and NaN where that
     rate is not known to a thousandth.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> round(ss.growth_rate(rig), 6)
+    0.03571
+    >>> ss.growth_rate(rig, {"stiffness": [10e9, 30e9]}).round(6)
+    array([ 0.033931, -0.001655])
     """
     point = operating_point(rig, vary)
 

@@ -44,6 +44,12 @@ def joined(machine: Machine, *links: str) -> Machine:
     NotAvailable
         If a link ends at the ground or the drive, an end moves away from the surface, a contact law depends on the
         force of the link (`loaded_by`), or neither body can take over links and contacts of the other.
+
+    Examples
+    --------
+    >>> machine = ss.read_rig("examples/machines/feed-axis.toml")
+    >>> len(machine.bodies), len(ss.machine.joined(machine, "screw").bodies)
+    (2, 1)
     """
     for link in links:
         name = link.removeprefix("links.")

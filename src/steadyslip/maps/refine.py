@@ -145,6 +145,16 @@ def refine(
         If an argument is wrong.
     NotAvailable
         If the map is not complete, has samples, or no edge, or if another program computed it.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> grid = ss.maps.Grid("10 GPa/m", "40 GPa/m", 4)
+    >>> found = ss.run_map(ss.Map(rig, {"stiffness": grid}, ["growth_rate"]), "edge.zarr")
+    >>> print(ss.refine(found, 2))
+    edge of growth_rate at 0: 2 new points, where the whole grid would have 13
+      slider.stiffness        known to 1.25 GPa/m or better
+      1 points on the edge
     """
     found.store.refuse_another_program()
     of = of or ("status" if "status" in found.results else found.results[0])

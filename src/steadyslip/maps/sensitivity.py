@@ -161,6 +161,20 @@ def sensitivity(
     First-order indices by Saltelli et al. (2010, their table 2 b), total ones by Jansen (2 f), from Sobol points, by
     `scipy.stats.sobol_indices`. Where a result does not exist at one of the points of a set, the set is left out; the
     largest power of 2 of the remaining sets is used.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> found = ss.sensitivity(rig, {"friction.a": (0.0140, 0.0150), "friction.b": (0.0155, 0.0165)}, points=256)
+    >>> print(found)
+    critical_stiffness: share of its variance, by a parameter alone and with others (95 %)
+      friction.a   0.500   0.500  (0.412 to 0.568)
+      friction.b   0.500   0.500  (0.421 to 0.587)
+      not settled: some intervals are wider than 0.2; ask for more points
+    margin: share of its variance, by a parameter alone and with others (95 %)
+      friction.a   0.498   0.513  (0.431 to 0.601)
+      friction.b   0.482   0.513  (0.446 to 0.600)
+      not settled: some intervals are wider than 0.2; ask for more points
     """
     whole = isinstance(points, int) and not isinstance(points, bool)
     if not (whole and LEAST <= points <= MOST and points & (points - 1) == 0):

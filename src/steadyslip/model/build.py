@@ -34,6 +34,34 @@ def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
     present : iterable of str
         Dotted names of parameters that are kept as symbols although they are zero, such as ``slider.mass`` if it is
         about to be varied.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> print(ss.build_model(rig))
+    Model, quasistatic; algebraic unknown v
+    variables
+      x          m        slip of the block ahead of the load point
+      Psi        1        memory of friction
+    parameters
+      a              1        friction.a
+      b              1        friction.b
+      d_c            m        friction.d_c
+      mu_ref         1        friction.mu_ref
+      v_ref          m/s      friction.v_ref
+      alpha          1        friction.normal_memory.alpha
+      sigma_ref      Pa       friction.normal_memory.sigma_ref
+      sigma_0        Pa       contact.preload
+      psi            rad      contact.angle
+      k              Pa/m     slider.stiffness
+      v_0            m/s      drive.velocity
+    equations
+      T = -k*x + sigma_ss*(mu_ref + (a - b)*log(v_0/v_ref))
+      tau = T + q
+      sigma = -T*tan(psi) + p + sigma_0
+      sigma*(Psi + a*log(v/v_ref) - alpha*log(sigma/sigma_ref) + mu_ref) - tau = 0
+      dx/dt = v - v_lp
+      dPsi/dt = -v*(Psi - alpha*log(sigma/sigma_ref) + b*log(v/v_ref))/d_c
     """
     return model_of(rig, present)
 

@@ -157,6 +157,12 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
         With the condition that fails (lock-up, lift-off) and its shortfall.
     NotAvailable
         If numbers leave the range of floating point.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> round(ss.steady_state(rig).normal_stress / 1e6, 3)
+    16.667
     """
     return steady_states(rig)[0]
 
@@ -208,6 +214,12 @@ def steady_states(rig: Slider | Machine) -> tuple[SteadySliding, ...] | tuple[St
         If there is none.
     NotAvailable
         If numbers leave the range of floating point.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/double-direct-shear.toml")
+    >>> len(ss.steady_states(rig))
+    1
     """
     if isinstance(rig, Machine):
         return (steady_machine(rig),)

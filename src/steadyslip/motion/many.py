@@ -219,6 +219,13 @@ def simulate_many(
     ------
     ParameterError
         If any argument is wrong; lists every problem.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> step = ss.protocol.VelocityStep(at="10 s", to="2 um/s")
+    >>> print(ss.simulate_many(rig, {"stiffness": [20e9, 40e9]}, step, until=200))
+    2 runs: 1 done, 1 blow-up
     """
     options = Options(method, rtol, most_steps, arrest)
     flat, start, together = broadcast_arrays(rig, Protocol.of(protocol), vary, initial or {})

@@ -237,6 +237,13 @@ def load_history(path: str | PathLike[str]) -> History:
     ------
     NotAvailable
         If the file is not a saved history, is damaged, or cannot be read.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> ss.simulate(rig, until=10).save("run.nc")
+    >>> ss.load_history("run.nc").end
+    10.0
     """
     return History(**store.read(path))
 

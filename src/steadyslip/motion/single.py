@@ -98,6 +98,13 @@ def simulate(
         If there is no steady sliding to start from.
     NotAvailable
         If the rig's motion is ill-posed, or a law cannot move as asked.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> run = ss.simulate(rig, ss.protocol.VelocityStep(at="10 s", to="2 um/s"), until=200)
+    >>> run.status, round(float(run["v"][-1]) * 1e6, 2)
+    ('done', 2.0)
     """
     most = most_steps or (OWN_STEPS if times is None else Options.most_steps)
     options = Options(method, rtol, most, arrest)

@@ -123,14 +123,13 @@ def response(
 
     Examples
     --------
-    >>> import steadyslip as ss
     >>> rock = ss.laws.RateState(a=.010, b=.008, d_c=1e-5, mu_ref=.6, v_ref=1e-5,
     ...                          normal_memory=ss.laws.LinkerDieterich(alpha=.2))
     >>> press = ss.laws.ConstantNormalStress(preload=25e6)
     >>> rig = ss.Slider(friction=rock, contact=press, stiffness=1e10, drive=ss.machine.SteadyDrive(1e-5))
     >>> found = ss.response(rig, [1.0, 10.0, 100.0], output="shear-stress")
     >>> found.gain.round(4)
-    array([0.0263, 0.6899, 0.6038])
+    array([0.0263, 0.6901, 0.6038])
     """
     forced = _Forced(rig, input, on, output, rtol)
     periods, amplitudes = (np.ravel(np.asarray(given, dtype=float)) for given in (periods, amplitudes))

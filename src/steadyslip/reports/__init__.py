@@ -56,6 +56,11 @@ def report(
         If `result` is neither a rig nor a result.
     NotAvailable
         If the numbers of the rig leave the range of floating point.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.report(rig, explorer=False).save("report.html")
     """
     return Report(
         document_html(parts_of(result, **options), title, explorer, None if source is None else Path(source)), title

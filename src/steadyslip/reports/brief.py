@@ -89,6 +89,12 @@ def brief(result: Any) -> str:
     -------
     str
         A ``div`` element with its own style, without links to other files.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.reports.brief(rig)[:4]
+    '<div'
     """
     return f'<div class="steadyslip-told"><style>{STYLE}</style>{result_html(result)}</div>'
 

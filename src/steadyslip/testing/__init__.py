@@ -91,6 +91,10 @@ def check_friction_law(
     ------
     ContractViolation
         On the first rule that the law breaks.
+
+    Examples
+    --------
+    >>> ss.testing.check_friction_law(ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s"))
     """
     conditions = Conditions(velocity, normal_stress, velocity_decades, stress_decades, instant_weakening)
     for check in FRICTION_CHECKS:
@@ -113,6 +117,10 @@ def check_contact_law(contact: ContactLaw, surroundings: Surroundings | None = N
     ------
     ContractViolation
         On the first rule that the law breaks.
+
+    Examples
+    --------
+    >>> ss.testing.check_contact_law(ss.laws.ConstantNormalStress(preload="5 MPa"))
     """
     place = surroundings or Surroundings()
     for check in CONTACT_CHECKS:

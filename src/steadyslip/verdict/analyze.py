@@ -98,6 +98,13 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
         If `rig` is neither a Slider nor a Machine.
     NotAvailable
         If `branch` does not exist, or the numbers of the rig leave the range of floating point.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> verdict = ss.analyze(rig)
+    >>> verdict.stable, round(verdict.critical_stiffness / 1e9, 3)
+    (False, 29.07)
     """
     if isinstance(rig, Machine):
         if branch:

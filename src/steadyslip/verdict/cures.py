@@ -228,6 +228,18 @@ def cure(
     ------
     ParameterError
         If an argument is not allowed, or the rig has nothing that may be changed.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> print(ss.cure(rig, adjust=None))
+    To be stable (now unstable)
+    cheapest single change: slider.damping from 0 Pa s/m to 57.53 GPa s/m, cost 1
+    no pair is cheaper
+    drive.velocity    1 um/s now; not reached from 1 nm/s to 1 mm/s
+    slider.stiffness  9 GPa/m now; from 29.07 GPa/m up
+    slider.damping    0 Pa s/m now; from 57.53 GPa s/m up
+    contact.preload   5 MPa now; up to 1.548 MPa
     """
     wanted = _share(sure)
     chances = chances_of(rig, tolerances or {})

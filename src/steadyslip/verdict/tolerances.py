@@ -229,6 +229,15 @@ def tolerate(
         If a name or a tolerance is not allowed, or leads out of the domain of a parameter.
     NotAvailable
         If the parameter `along` does not enter linearly.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> print(ss.tolerate(rig, {"friction.a": "3 %"}))
+    Stable in none of 65536 rigs within the tolerances, nor at any of their 2 corners
+    critical stiffness        20.64 to 37.5 GPa/m
+    stiffness over critical   0.24 to 0.436
+    friction.a                0.01407 to 0.01494 alone: unstable, 0.24 to 0.4361 times critical
     """
     name = "" if along is None and isinstance(rig, Machine) else name_along(rig, along)
     spreads = spreads_of(rig, tolerances)

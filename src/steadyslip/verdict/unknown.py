@@ -140,6 +140,13 @@ def stable_within(rig: Slider | Machine, intervals: Mapping[str, tuple[float, fl
     ------
     ParameterError
         If a name or value is not allowed.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> print(ss.verdict.stable_within(rig, {"friction.a": (0.014, 0.017)}))
+    Not known, by the table [unknown] of the file:
+      friction.a: stable above 0.01554, in 0.014 to 0.017
     """
     from scipy.stats import qmc
 

@@ -253,6 +253,14 @@ def load_population(path: str | PathLike[str]) -> Population:
     ------
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> ss.population([fit, fit, fit], ["a", "b"]).save("pooled.nc")
+    >>> ss.experiments.load_population("pooled.nc").names
+    ('friction.a', 'friction.b')
     """
     table = ExpectedTable(path, POPULATION, _ATTRIBUTES, store.ATTRIBUTES)
     named, about, found = table.json(table.attributes["names"], _NAMES), table.attributes, table.columns(_COLUMNS)
@@ -312,6 +320,14 @@ def population(
         If there are too few experiments for this, or they do not have the parameters.
     NotAvailable
         If emcee is not installed.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> pooled = ss.population([fit, fit, fit], ["a", "b"])
+    >>> pooled.names
+    ('friction.a', 'friction.b')
     """
     labelled = dict(fits) if isinstance(fits, Mapping) else _labelled(fits)
     problems = [

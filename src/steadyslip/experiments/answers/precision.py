@@ -107,6 +107,19 @@ def precision(
         Listing everything that is wrong.
     NotAvailable
         If the motion cannot be followed to the end.
+
+    Examples
+    --------
+    >>> values = {"a": 0.012, "b": 0.015, "d_c": "10 um", "mu_ref": 0.6, "stiffness": "30 GPa/m"}
+    >>> rig = ss.lab_rig("slip").with_values(values)
+    >>> step = ss.protocol.VelocityStep(at="20 s", to="10 um/s")
+    >>> print(ss.experiments.precision(rig, step, until=100))
+    4000 samples with noise 0.0002 in friction would give
+      friction.a        ± 2.7e-05 (0.22 %)
+      friction.b        ± 2.7e-05 (0.18 %)
+      friction.d_c      ± 25 nm (0.25 %)
+      friction.mu_ref   ± 7.1e-06 (0.0012 %)
+      slider.stiffness  ± 220 MPa/m (0.74 %)
     """
     problems = []
     if not (isinstance(noise, (int, float)) and noise > 0):
@@ -210,6 +223,19 @@ def best_protocol(
     ------
     ParameterError
         If the parameter is not free, or none is given and the law has not exactly one that is such a share.
+
+    Examples
+    --------
+    >>> values = {"a": 0.012, "b": 0.015, "d_c": "10 um", "mu_ref": 0.6, "stiffness": "30 GPa/m"}
+    >>> rig = ss.lab_rig("slip").with_values(values)
+    >>> protocols = {
+    ...     speed: ss.Protocol(pieces=(ss.protocol.VelocityStep(at=20, to=speed),), until=100)
+    ...     for speed in ("2 um/s", "10 um/s")
+    ... }
+    >>> print(ss.experiments.best_protocol(rig, protocols, "friction.d_c"))
+    friction.d_c, the best experiment first
+      10 um/s  ± 25 nm
+      2 um/s   ± 40 nm
     """
     chosen = normal_stress_protocols(rig) if candidates is None else candidates
     found = {label: precision(rig, protocol, **options) for label, protocol in chosen.items()}

@@ -210,6 +210,14 @@ def predict(
         If a name is unknown.
     NotAvailable
         If the fit does not determine what is needed.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> rig = ss.read_rig("examples/double-direct-shear.toml")
+    >>> print(ss.predict(rig, fit).probability_stable)
+    1.0
     """
     target, draws, vary = transferred(rig, fit, transfer, record, count, seed)
     return _predicted(target, draws, vary, (kick,) if isinstance(kick, str) else tuple(kick))

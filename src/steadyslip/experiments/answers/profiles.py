@@ -119,6 +119,13 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
         Number of values.
     threads : int, optional
         Number of threads; all cores unless given.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> ss.experiments.profile(fit, "friction.a", count=3).values.round(4)
+    array([0.0116, 0.0119, 0.0123])
     """
     i = fit.index(name)
     variance = float(fit.covariance[i, i])

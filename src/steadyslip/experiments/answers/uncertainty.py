@@ -189,6 +189,15 @@ def load_draws(path: str | PathLike[str]) -> Draws:
     ------
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> ss.experiments.normal_draws(fit, 100).save("draws.nc")
+    >>> draws = ss.experiments.load_draws("draws.nc")
+    >>> len(draws.values["friction.a"])
+    100
     """
     table = ExpectedTable(path, DRAWS, _ATTRIBUTES, store.ATTRIBUTES)
     about = table.json(table.attributes["about"], _ABOUT)
@@ -214,6 +223,14 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     ------
     NotAvailable
         If a parameter is not determined.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> draws = ss.experiments.normal_draws(fit, 1000)
+    >>> draws.values["friction.a"].shape
+    (1000,)
     """
     lost = [e.name for e in fit.estimates if not e.determined]
     if lost:
@@ -254,6 +271,14 @@ def bootstrap(
     Returns
     -------
     Draws
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> draws = ss.experiments.bootstrap(fit, 8)
+    >>> sorted(draws.values)
+    ['friction.a', 'friction.b', 'friction.d_c', 'friction.mu_ref', 'slider.stiffness', 'step.1.at']
     """
     if kind not in BOOTSTRAPS:
         raise ParameterError([Problem("kind", unknown_name("choice", kind, BOOTSTRAPS))])
@@ -330,6 +355,14 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     ------
     NotAvailable
         If emcee is not installed.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> draws = ss.experiments.posterior(fit, 10, walkers=16)
+    >>> sorted(draws.values)
+    ['friction.a', 'friction.b', 'friction.d_c', 'friction.mu_ref', 'slider.stiffness', 'step.1.at']
     """
     comparison = fit.plan.comparison(Effort(threads))
     low, high = fit.bounds

@@ -79,6 +79,13 @@ def cross_validate(
         If there are fewer than two folds, or blocks so long that a fold is empty.
     NotAvailable
         If a fold cannot be fitted.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> ss.experiments.cross_validate(fit, 3).block
+    8
     """
     if not (isinstance(folds, int) and not isinstance(folds, bool) and 2 <= folds <= 100):
         raise ParameterError([Problem("folds", f"got {folds!r}; allowed: a whole number from 2 to 100")])

@@ -138,6 +138,13 @@ def fit(
         Listing everything that is wrong.
     NotAvailable
         If the model cannot follow the records from any start.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> print(fit["d_c"])
+    friction.d_c = 10.06 ± 0.077 um
     """
     return search_fit(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,

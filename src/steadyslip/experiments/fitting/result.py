@@ -66,5 +66,13 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     ------
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> fit.save("fit.nc")
+    >>> ss.load_fit("fit.nc")["d_c"] == fit["d_c"]
+    True
     """
     return store.read(path, Fit)

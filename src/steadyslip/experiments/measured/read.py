@@ -81,6 +81,19 @@ def read_record(
         If columns are missing, ambiguous or without unit, or lines damaged; lists every problem.
     NotAvailable
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> print(ss.read_record("examples/data/made_velocity_step.csv"))
+    examples/data/made_velocity_step.csv: 401 samples over 80 s, one every 200 ms
+    friction        0.5959 to 0.61
+    normal stress   5 MPa to 5 MPa
+    load point      200 um, at first 1 um/s
+    step            velocity step at 20 s: 1 um/s to 3 um/s
+    note            time: column 'time (s)', s
+    note            displacement: column 'displacement (um)', um
+    note            friction: column 'friction'
+    note            normal: column 'normal stress (MPa)', MPa
     """
     problems = [
         Problem(name, f"unknown column role; allowed: {', '.join(ROLES)}") for name in columns if name not in ROLES
@@ -200,6 +213,20 @@ def record_from_arrays(
     ------
     ParameterError
         If columns are missing, or differ in length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.linspace(0, 100, 1001)
+    >>> velocity = np.where(time < 50, 1e-6, 1e-5)
+    >>> friction = 0.6 + np.where(time < 50, 0, 0.01 * np.exp((50 - time) / 5))
+    >>> print(ss.record_from_arrays(time, friction=friction, normal=5e6, velocity=velocity))
+    arrays: 1001 samples over 100 s, one every 100 ms
+    friction        0.6 to 0.61
+    normal stress   5 MPa to 5 MPa
+    load point      550.5 um, at first 1 um/s
+    step            velocity step at 49.95 s: 1 um/s to 10 um/s
+    note            displacement of the load point integrated from its velocity
     """
     given: Mapping[str, Any] = {"time": time, "friction": friction, "shear": shear, "normal": normal,
                                 "displacement": displacement, "velocity": velocity,

@@ -38,6 +38,13 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> axes = ss.figures.profile(ss.experiments.profile(fit, "friction.a", count=3))
+    >>> axes.figure.savefig("profile.svg")
     """
     ax = axes_or_new(ax)
     factor, unit = display_unit(result.unit, float(np.median(np.abs(result.values))), result.area)
@@ -73,6 +80,13 @@ def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> axes = ss.figures.comparison(ss.experiments.compare({"slip": fit, "the same": fit}))
+    >>> axes.figure.savefig("comparison.svg")
     """
     ax = axes_or_new(ax)
     labels = list(result.fits)[::-1]
@@ -105,6 +119,15 @@ def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> values = {"a": 0.012, "b": 0.015, "d_c": "10 um", "mu_ref": 0.6, "stiffness": "30 GPa/m"}
+    >>> rig = ss.lab_rig("slip").with_values(values)
+    >>> step = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=20, to="2 um/s"),), until=100)
+    >>> ranking = ss.experiments.best_protocol(rig, {"a step": step}, "friction.d_c")
+    >>> axes = ss.figures.ranking(ranking)
+    >>> axes.figure.savefig("ranking.svg")
     """
     ax = axes_or_new(ax)
     labels = list(result.found)[::-1]
@@ -139,6 +162,14 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> rig = ss.read_rig("examples/double-direct-shear.toml")
+    >>> axes = ss.figures.prediction(ss.predict(rig, fit))
+    >>> axes.figure.savefig("prediction.svg")
     """
     ax = axes_or_new(ax)
     critical = result.critical_stiffness[np.isfinite(result.critical_stiffness)]
@@ -191,6 +222,14 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
     Returns
     -------
     ndarray of matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> rig = ss.read_rig("examples/double-direct-shear.toml")
+    >>> axes = ss.figures.kicks(ss.predict(rig, fit, kick="velocity", count=2))
+    >>> axes.flat[0].figure.savefig("kicks.svg")
     """
     if not result.thresholds:
         raise NotAvailable("no thresholds were asked for; write predict(..., kick='velocity')")

@@ -40,6 +40,13 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     Returns
     -------
     ndarray of matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> axes = ss.figures.corner(fit)
+    >>> axes.flat[0].figure.savefig("corner.svg")
     """
     source = result.fit if isinstance(result, Draws) else result
     names = [e.name for e in source.estimates if e.determined]

@@ -126,6 +126,13 @@ def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
     ------
     NotAvailable
         If there are no steps.
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
+    >>> axes = ss.figures.steps(fit)
+    >>> axes.flat[0].figure.savefig("steps.svg")
     """
     data = result.plan.records[record]
     shown = data.steps[:MAX_STEPS]

@@ -38,6 +38,12 @@ def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
     Returns
     -------
     ndarray of three matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> record = ss.read_record("examples/data/made_velocity_step.csv")
+    >>> axes = ss.figures.record(record)
+    >>> axes[0].figure.savefig("record.svg")
     """
     panels = stacked_panels(ax, (1.6, 1.0, 1.0))
     factor, unit, origin = time_axis(data)

@@ -37,13 +37,25 @@ def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Pro
     ------
     RigFileError
         If the file cannot be read or anything in it is wrong (the rig included).
+
+    Examples
+    --------
+    >>> ss.read_protocol("examples/stick-slip.toml").until
+    500.0
     """
     return protocol_from_text(text_of(path), str(path), changes)
 
 
 @checked()
 def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Protocol | None:
-    """Read the protocol from the text of a rig file; see `read_protocol`."""
+    """Read the protocol from the text of a rig file; see `read_protocol`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> ss.protocol_from_text(Path("examples/stick-slip.toml").read_text())
+    Protocol(until=500.0, pieces=(VelocityStep(at=100.0, to=5e-06), Hold(at=300.0, duration=100.0)))
+    """
     return protocol_of(text, source, changes)
 
 
@@ -67,7 +79,7 @@ def piece_from_text(text: str, area: float | None = None, machine: Machine | Non
 
     Examples
     --------
-    >>> piece_from_text("velocity-step at=10s to='2 um/s'")
+    >>> ss.piece_from_text("velocity-step at=10s to='2 um/s'")
     VelocityStep(at=10.0, to=2e-06)
     """
     try:

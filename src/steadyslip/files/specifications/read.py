@@ -68,6 +68,12 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
     ------
     RigFileError
         If the file cannot be read or anything in it is wrong; ``problems`` lists everything.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=20 GPa/m"])
+    >>> rig.stiffness
+    20000000000.0
     """
     return rig_from_text(text_of(path), str(path), changes)
 
@@ -102,7 +108,15 @@ def text_of(path: str | PathLike[str]) -> str:
 
 @checked()
 def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider | Machine:
-    """Read a rig from TOML text; see `read_rig`."""
+    """Read a rig from TOML text; see `read_rig`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> rig = ss.rig_from_text(Path("examples/inclined-spring.toml").read_text())
+    >>> rig.stiffness
+    9000000000.0
+    """
     found = read_contents(_not_empty(text, source), source, changes)
     found.refuse()
     return found.checked_rig() if found.machine is None else found.machine

@@ -87,6 +87,12 @@ def read_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -> T
     ------
     RigFileError
         If the file cannot be read or anything in it is wrong (the rig included).
+
+    Examples
+    --------
+    >>> found = ss.verdict.read_tolerances("examples/inclined-spring.toml", ["stiffness=9 ± 1 GPa/m"])
+    >>> found.values["slider.stiffness"].above
+    '1 GPa/m'
     """
     return rig_and_tolerances(path, changes)[1]
 

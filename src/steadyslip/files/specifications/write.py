@@ -37,6 +37,13 @@ def write_rig(rig: Slider | Machine, path: str | PathLike[str], protocol: Protoc
         If the rig has a law without registered name.
     NotAvailable
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> ss.write_rig(rig, "copy.toml")
+    >>> ss.read_rig("copy.toml") == rig
+    True
     """
     write_text(path, rig_to_text(rig, protocol))
 
@@ -49,6 +56,33 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     ------
     ParameterError
         If the rig or the protocol has a law without registered name, which a file cannot refer to.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> print(ss.rig_to_text(rig))
+    [friction]
+    law = "rate-state"
+    a = 0.0145
+    b = 0.016
+    d_c = 1e-06  # m
+    mu_ref = 0.7
+    v_ref = 1e-06  # m/s
+    <BLANKLINE>
+    [friction.normal_memory]
+    law = "linker-dieterich"
+    alpha = 0.56
+    <BLANKLINE>
+    [contact]
+    law = "inclined-spring"
+    preload = 5000000.0  # Pa
+    angle = -0.7853981633974483  # rad
+    <BLANKLINE>
+    [slider]
+    stiffness = 9000000000.0  # Pa/m
+    <BLANKLINE>
+    [drive]
+    velocity = 1e-06  # m/s
     """
     blocks = []
     area = rig.area

@@ -133,13 +133,28 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
     ------
     RigFileError
         If anything is wrong; lists every problem.
+
+    Examples
+    --------
+    >>> plan = ss.read_map("examples/maps/safe-stiffness.toml", ["map.over.contact.angle.points=5"])
+    >>> plan.size
+    915
     """
     return map_from_text(text_of(path), str(path), changes, Path(path).parent)
 
 
 @checked()
 def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), folder: Path = Path()) -> Map:
-    """Read a map from the text of a rig file; see `read_map`."""
+    """Read a map from the text of a rig file; see `read_map`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> text = Path("examples/maps/safe-stiffness.toml").read_text()
+    >>> plan = ss.map_from_text(text)
+    >>> plan.size
+    14823
+    """
     spec = read_contents(text, source, changes, (TABLE,))
     settings = spec.further.get(MAP)
     plan = _MapReader(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None

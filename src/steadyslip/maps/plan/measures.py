@@ -366,6 +366,14 @@ def measure(
     Returns
     -------
     FunctionMeasure
+
+    Examples
+    --------
+    >>> @ss.maps.measure(unit="Pa/m")
+    ... def double(rig):
+    ...     return 2 * ss.critical_stiffness(rig)
+    >>> double.name
+    'double'
     """
     if function is None:
         return lambda f: measure(f, name=name, unit=unit, arrays=arrays, seconds=seconds)

@@ -278,6 +278,14 @@ def open_map(path: str | PathLike[str]) -> MapResult:
     ------
     NotAvailable
         If it does not exist.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> plan = ss.Map(rig, {"stiffness": [10e9, 40e9]}, ["status"])
+    >>> found = ss.run_map(plan, "small.zarr")
+    >>> ss.open_map("small.zarr").complete
+    True
     """
     target = Path(path)
     if not target.exists():

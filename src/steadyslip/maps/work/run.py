@@ -64,6 +64,15 @@ def run_map(
         kept.
     ParameterError
         If an argument is wrong.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> plan = ss.Map(rig, {"stiffness": [10e9, 40e9]}, ["status"])
+    >>> print(ss.run_map(plan, "two.zarr"))
+    map of status over slider.stiffness (2): 2 points
+      in two.zarr             complete
+      status                  stable 50 %, unstable 50 %
     """
     target = Path(path)
     _check(cluster)

@@ -156,6 +156,13 @@ def basin(
     -----
     All motions together take two billion steps of integration at most, of machines with more variables fewer, some
     minutes on two cores; what is open then is undecided.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> found = ss.basin(rig, x=[0], v=[1e-6, 1e-4])
+    >>> found.outcome.tolist()
+    [['returns'], ['returns']]
     """
     steady_states(rig)  # raises, and says why
     if isinstance(rig, Slider) and at is not None:
@@ -266,6 +273,14 @@ def orbit(rig: Slider | Machine, cycle: Cycle, periods: float = 1.0) -> History:
     cycle : Cycle
     periods : float
         How many; unstable cycles leave themselves after a few.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
+    >>> (cycle,) = ss.cycles(rig).at(20e9)
+    >>> run = ss.orbit(rig.with_values({"stiffness": 20e9}), cycle)
+    >>> round(run.end / cycle.period, 6)
+    1.0
     """
     names = dict(cycle.start)
     model = operating_point(rig).model

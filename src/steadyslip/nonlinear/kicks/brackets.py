@@ -106,6 +106,12 @@ def threshold_map(
         of larger kicks, ``edge``, ``unstable``, ``no steady sliding``, ``out of range`` (of floating point) or
         ``undecided`` with the reason; ``returns`` where none fails. Of machines another, ``contact``: that which
         is lost beyond, or fastest in a blow-up.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> ss.threshold_map(rig, {"stiffness": [20e9, 40e9]}).round(3)
+    array([0.   , 2.038])
     """
     found, dims, coords = threshold_brackets(
         rig, vary, kick, at=at, direction=direction, reference=reference, precision=precision, rtol=rtol,

@@ -226,6 +226,12 @@ def threshold(
     there. At the edge of stability itself small motions persist; there all that stays bounded counts as returning.
     All motions together take a billion steps of integration at most, of machines with more variables fewer, about a
     minute on two cores; what is open then is undecided.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> print(ss.threshold(rig))
+    velocity kick: survives up to 7.67288... um/s (size 2.037693, bracket ...); beyond: blow-up
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
@@ -430,6 +436,14 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
     ------
     NotAvailable
         If the step is of another kind.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
+    >>> step = ss.protocol.VelocityStep(at=0, to="2 um/s")
+    >>> print(ss.margin_to_kick(rig, step))
+    survives it: the limit is 2.94 times this step
+    velocity kick: survives up to 7.67288... um/s (size 2.037693, bracket ...); beyond: blow-up
     """
     kinds: dict[type, tuple[str, str]] = {
         VelocityStep: ("velocity", "to"),

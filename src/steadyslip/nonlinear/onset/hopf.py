@@ -201,6 +201,13 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
     Notes
     -----
     First Lyapunov coefficient as in `steadyslip.nonlinear.onset.coefficient`; theory 6 has closed forms.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> onset = ss.hopf(rig)
+    >>> onset.kind, round(onset.value / 1e9, 3)
+    ('supercritical', 29.07)
     """
     name = parameter_along(rig, along)
     edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]

@@ -148,6 +148,13 @@ def hopf_curve(
         If there is no oscillatory edge to start from.
     UnknownNameError, ParameterError
         If names or ranges are wrong.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> curve = ss.hopf_curve(rig, "angle", between={"angle": ("-50 deg", "-40 deg")})
+    >>> curve.names
+    ('contact.angle', 'slider.stiffness')
     """
     names = (parameter_along(rig, first), parameter_along(rig, second))
     if names[0] == names[1]:

@@ -104,6 +104,14 @@ def cycles(
     there; from the cycle that one comes to, if Newton's method confirms it, another piece is followed both ways, and
     joined if it meets the first (`CycleBranch.gaps`). Cycles of twice the period are entered at each doubling along the
     eigenvector of the multiplier −1, and followed to the doubling at which they end or until they cannot be followed.
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
+    >>> branch = ss.cycles(rig)
+    >>> (cycle,) = branch.at(20e9)
+    >>> cycle.stable, round(cycle.period, 3)
+    (True, 53.02)
     """
     onset = hopf(rig, along, branch=branch)
     flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol, onset.contact)

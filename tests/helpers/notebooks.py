@@ -1,0 +1,48 @@
+"""Run the cells of a notebook without Jupyter, and write what they print into it.
+
+python tests/helpers/notebooks.py examples/notebooks/*.ipynb     in a folder beside a copy of the examples
+"""
+
+import ast
+import contextlib
+import io
+import json
+import sys
+from pathlib import Path
+
+
+def cells_of(path: Path) -> list[dict]:
+    return [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+
+
+def run_cell(source: str, names: dict) -> str:
+    """What a cell prints, with its last expression as Jupyter shows it."""
+    tree = ast.parse(source)
+    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        exec(compile(tree, "cell", "exec"), names)
+        value = None if last is None else eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+        if value is not None and not source.rstrip().endswith(";"):
+            print(repr(value))
+    return printed.getvalue()
+
+
+def shown(cell: dict) -> str:
+    """What a cell shows in the file."""
+    return "".join("".join(one.get("text", "")) for one in cell["outputs"])
+
+
+def main(paths: list[str]) -> None:
+    for path in map(Path, paths):
+        book = json.loads(path.read_text(encoding="utf-8"))
+        names: dict = {}
+        for number, cell in enumerate(cell for cell in book["cells"] if cell["cell_type"] == "code"):
+            text = run_cell("".join(cell["source"]), names)
+            stream = {"name": "stdout", "output_type": "stream", "text": text.splitlines(keepends=True)}
+            cell["outputs"] = [stream] if text else []
+            cell["execution_count"] = number + 1
+        path.write_text(json.dumps(book, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

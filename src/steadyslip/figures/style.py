@@ -125,8 +125,12 @@ def save_figure(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -
 def journal() -> Iterator[None]:
     """Context in which new figures are 85 mm wide, one column of a journal, with letters of 7 points.
 
-    >>> with journal():
-    ...     round(axes_or_new(None).figure.get_figwidth() * 25.4, 6)
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/inclined-spring.toml")
+    >>> with ss.figures.journal():
+    ...     axes = ss.figures.root_locus(rig)
+    >>> round(float(axes.figure.get_figwidth()) * 25.4, 6)
     85.0
     """
     with rc_context(JOURNAL):

@@ -163,12 +163,15 @@ def test_a_run_can_be_stepped_through(tmp_path):
 def steps(page: Path) -> Iterator[tuple[str, str, str]]:
     """What a reader does, in order: ("save", file name, text) and ("run", command, output shown).
 
-    A block of TOML whose first line is a comment with a file name is saved under it.
+    A block of TOML, or a table, whose first line is a comment with a file name is saved under it.
     """
     for language, block in re.findall(r"^```(\w+)\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S):
         if language == "toml":
             tomllib.loads(block)
             if title := re.match(r"# ([\w-]+\.toml)\n", block):
+                yield "save", title[1], block
+        elif language == "csv":
+            if title := re.match(r"# ([\w-]+\.csv)\n", block):
                 yield "save", title[1], block
         elif language == "console":
             for command, shown in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE):

@@ -35,7 +35,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
-from steadyslip.model.sliding import ABSENT
+from steadyslip.model.steady_results import ABSENT
 from steadyslip.motion.sentence import JUDDERS
 from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES

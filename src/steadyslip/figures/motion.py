@@ -29,7 +29,8 @@ from steadyslip.figures.style import (
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.sliding import SteadySliding, steady_state
+from steadyslip.model.sliding import steady_state
+from steadyslip.model.steady_results import SteadySliding
 from steadyslip.motion.result import check_contact
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS

@@ -14,10 +14,13 @@ from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
 from steadyslip.linear.coupling import search_for
+from steadyslip.linear.matrix_route import require_matrices
+from steadyslip.linear.matrix_search import MatrixSearch
 from steadyslip.linear.search import Boundary
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
+from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_digits, require_range
 
@@ -90,10 +93,13 @@ def boundary(
     ...     print(edge)
     slider.stiffness = 29.0698 GPa/m: oscillatory, period 33.08 s, stable above
     """
-    _require_answers(rig, branch)
     full = rig.resolve(name)
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, [rig.read(full, one) for one in between])
+    if by_matrices(rig):
+        require_matrices(rig)
+        return MatrixSearch(rig, full).boundaries(limits)
+    _require_answers(rig, branch)
     if limits is not None:
         operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
     return search_for(rig, full, _kept(rig, full), branch).boundaries(limits)
@@ -129,7 +135,10 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     >>> nearest.parameter, round(nearest.relative, 4)
     ('friction.b', -0.0647)
     """
-    _require_answers(rig, branch)
+    if by_matrices(rig):
+        require_matrices(rig)
+    else:
+        _require_answers(rig, branch)
     present = present_zeros(rig)
     found = []
     for name, address in rig.parameters().items():
@@ -137,7 +146,7 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
             continue
         if address.value == 0 and address.role.structural and name not in present:
             continue
-        search = search_for(rig, name, present, branch)
+        search = MatrixSearch(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
         if search.takes_long:
             continue
         edges = search.boundaries(None)

@@ -21,9 +21,11 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, ContactPort, Mechanism
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
+from steadyslip.model.numeric import by_matrices
+from steadyslip.model.numeric.machine_point import MachinePoint, machine_point
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import delays_of
-from steadyslip.model.sliding import explain_absence
+from steadyslip.model.sliding import explain_absence, steady_machine
 
 WORDS = {
     "judder": "judders|judder", "drift": "drifts|drift", "still": "hardly moves|hardly move",
@@ -136,6 +138,10 @@ def modes(rig: Machine) -> tuple[Mode, ...]:
       bodies.carriage      0 % of the energy
       links.belt           100 % of the energy
     """
+    if by_matrices(rig):
+        steady_machine(rig)  # raises, and says which contact locks or lifts
+        own = machine_point(rig)
+        return tuple(matrix_mode(own, complex(s)) for s in own.pencil.eigenvalues if s.imag >= 0)
     point = operating_point(rig)
     if not point.exists:
         raise explain_absence(rig, point)
@@ -183,6 +189,23 @@ def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.svd(scaled)[2][-1].conj() * columns)
 
 
+def matrix_mode(point: MachinePoint, s: complex) -> Mode:
+    """Mode of a machine given by matrices that belongs to the eigenvalue `s` (1/s): of bodies and of named points."""
+    machine, names = point.machine, point.matrices.names
+    shape = point.pencil.mode(s)[: len(names)]
+    places = dict(zip(names, shape, strict=True))
+    speeds, drive = machine.speeds(), float(machine.drive.velocity)
+    scaled = {}
+    for end in machine.ends():
+        for name, row in ((end, machine.row(end, "x")), (end + NORMAL, machine.row(end, "y"))):
+            if row:
+                speed = float(speeds[end]) if name == end else 0.0
+                moved = sum(float(share) * places[one] for one, share in row.items())
+                scaled[name] = moved * (drive / speed if speed else 1.0)
+    largest = max(scaled.values(), key=abs, default=1.0) or 1.0
+    return Mode(s, {n: complex(a / largest) for n, a in scaled.items()}, _energies(machine, places, s))
+
+
 @dataclass(frozen=True)
 class EnergyStore:
     """Something that holds energy: `weight` |amplitude of the row|², times |s|² where it is `kinetic`."""
@@ -196,6 +219,7 @@ class EnergyStore:
 def stores(mechanism: Mechanism) -> list[EnergyStore]:
     """Kinetic and elastic energy stores of a mechanism, in numbers or symbols; one name may have several."""
     names = {one.name for one in mechanism.coordinates}
+    names |= {name for part in mechanism.structures for name in part.coordinates}
     found = [
         EnergyStore(f"bodies.{one.name.removesuffix(NORMAL)}", True, one.inertia, {one.name: 1})
         for one in mechanism.coordinates
@@ -217,7 +241,12 @@ def stores(mechanism: Mechanism) -> list[EnergyStore]:
 def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[str, float]:
     """Shares of the energy, kinetic and elastic, averaged over a cycle, by name of body, link or contact."""
     found: dict[str, float] = {}
-    for one in stores(rig.mechanism()):
+    mechanism = rig.mechanism()
+    for part in mechanism.structures:
+        shape = np.array([places[name] for name in part.coordinates])
+        held = [np.real(shape.conj() @ matrix @ shape) for matrix in (part.mass, part.stiffness)]
+        found[f"bodies.{part.name}"] = float(abs(s) ** 2 * held[0] + held[1])
+    for one in stores(mechanism):
         stretch = sum(float(c) * places[name] for name, c in one.row.items())
         energy = float(one.weight) * abs(s * stretch if one.kinetic else stretch) ** 2
         found[one.name] = found.get(one.name, 0.0) + energy

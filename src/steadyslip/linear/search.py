@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,16 +185,8 @@ class Search:
 
     def natural_size(self) -> float:
         """Typical size of the parameter by dimensional analysis, from σss, v0 and the slip distance v0/r."""
-        point = self.own
-        sigma, v0 = np.exp(np.mean(np.log([float(one) for one in point.sigmas]))), point.drive
-        length = v0 / (_decay_rate(point) or 1.0)
-        _, d = unit(self.role.unit)
-        if isinstance(self.rig, Machine) and self.rig.area_of(self.name) is None:
-            d = d.times(Dimension(length=-2 * d.mass))  # a total: of forces, not stresses
-        by_velocity = -2 * d.mass - d.time
-        sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
-        size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
-        return float(size) if np.isfinite(size) and size > 0 else abs(self.value) or 1.0
+        total = isinstance(self.rig, Machine) and self.rig.area_of(self.name) is None
+        return natural_size(self.role.unit, total, self.own.sigmas, self.own.drive, _decay_rate(self.own), self.value)
 
     @cached_property
     def takes_long(self) -> bool:
@@ -413,6 +406,33 @@ class Search:
         bracket = (float(np.nextafter(k, 0)), float(np.nextafter(k, np.inf)))
         beta = frequency if kind == "oscillatory" else 0.0
         return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area_of(self.name))
+
+
+def natural_size(
+    unit_name: str, total: bool, stresses: Iterable[Any], drive: float, rate: float, value: float
+) -> float:
+    """Typical size of a parameter by dimensional analysis, from σss, v0 and the slip distance v0/r.
+
+    Parameters
+    ----------
+    unit_name : str
+    total : bool
+        True for totals: of forces, not stresses.
+    stresses : iterable of float
+        σss of the contacts (Pa).
+    drive, rate : float
+        v0 (m/s), and the fastest decay rate of a memory (1/s), 0 without memory.
+    value : float
+        The rig's own, the result where that is not finite.
+    """
+    sigma = np.exp(np.mean(np.log([float(one) for one in stresses])))
+    _, d = unit(unit_name)
+    if total:
+        d = d.times(Dimension(length=-2 * d.mass))
+    by_velocity = -2 * d.mass - d.time
+    sigma, v0, length = np.float64(sigma), np.float64(drive), np.float64(drive / (rate or 1.0))  # overflow to inf
+    size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
+    return float(size) if np.isfinite(size) and size > 0 else abs(value) or 1.0
 
 
 def _kinds(point: OperatingPoint, status: NDArray[np.int64]) -> NDArray[np.int64]:

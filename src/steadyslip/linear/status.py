@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
+from steadyslip.linear import matrix_route
 from steadyslip.linear.crossing import share_left
 from steadyslip.linear.response import has_closed_form, response_numbers
 from steadyslip.linear.spectrum import is_near_edge, is_stable, outgrown, static_sum
@@ -20,6 +21,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.eigenvalues import digits_lost
 from steadyslip.model.linearisation import characteristic_terms, is_written_out
+from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range
 
@@ -61,6 +63,8 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     >>> ss.stability(rig, {"stiffness": [10e9, 40e9]})
     array(['unstable', 'stable'], dtype='<U17')
     """
+    if by_matrices(rig):
+        return matrix_route.stability(rig, vary)
     point = operating_point(rig, vary)
     words = np.array(WORDS)[status(point)]
     return point.wrap(words, "stability", "1") if point.shape else str(words)

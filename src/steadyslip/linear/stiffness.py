@@ -21,7 +21,7 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
-from steadyslip.linear import cubic
+from steadyslip.linear import cubic, matrix_route
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_many_windows_error
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
@@ -31,6 +31,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import stiffness_split
+from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import OperatingPoint, Vary, operating_point, stacked
 from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import in_range, quasipolynomial, require_range, surely_in_range, warn_of_range
@@ -151,6 +152,8 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     >>> ss.eigenvalues(rig).round(6)
     array([0.03571+0.099485j, 0.03571-0.099485j])
     """
+    if by_matrices(rig):
+        return matrix_route.eigenvalues(rig, vary)
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> ComplexArray:
@@ -191,6 +194,8 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     >>> ss.growth_rate(rig, {"stiffness": [10e9, 30e9]}).round(6)
     array([ 0.033931, -0.001655])
     """
+    if by_matrices(rig):
+        return matrix_route.growth_rate(rig, vary)
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> Array:

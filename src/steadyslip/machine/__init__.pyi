@@ -38,6 +38,12 @@ from .servo import (
 from .slider import (
     Slider as Slider,
 )
+from .structures import (
+    StructureBody as StructureBody,
+    StructureData as StructureData,
+    StructurePoint as StructurePoint,
+    reduced as reduced,
+)
 from .surfaces import (
     Surface as Surface,
 )

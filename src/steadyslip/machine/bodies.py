@@ -15,6 +15,8 @@ class Body(FrozenRecord, family="body"):
     turns: ClassVar[bool] = False
     lifts: ClassVar[bool] = False
     """True if the body also moves away from the surface."""
+    is_structure: ClassVar[bool] = False
+    """True if links and contacts name points of the body."""
 
     def inertia_of(self) -> Any:
         """Mass (kg), or moment of inertia (kg m²)."""

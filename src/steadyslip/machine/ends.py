@@ -13,6 +13,8 @@ from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
     """Yield Problems with names of bodies and links in raw tables: unknown ones, and bodies that nothing refers to."""
     bodies, links, contacts = (_tables(tables.get(name)) for name in ("bodies", "links", "contacts"))
+    own = bodies
+    bodies = {end: body for name, body in own.items() for end in _points(name, body, [*links.values()], contacts)}
     for name, link in links.items():
         ends = link.get("between")
         for end in ends if isinstance(ends, list) else ():
@@ -28,11 +30,32 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
         yield from unknown_body(f"drive.{key}", driven.get(key), list(bodies))
     named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
     named += [surface.get(key) for surface in contacts.values() for key in ("body", "against")]
-    lost = list(unreferenced_bodies(bodies, [*named, driven.get("body")]))
+    lost = list(unreferenced_bodies(own, [*map(body_of, named), driven.get("body")]))
     yield from lost
     if all(end in (*bodies, GROUND, LOAD_POINT) for end in named if isinstance(end, str)):
         told = {problem.name for problem in lost}
-        yield from (one for one in _floating(bodies, links, driven.get("body")) if one.name not in told)
+        plain = [name for name, body in own.items() if not _is_structure(body)]
+        yield from (one for one in _floating(plain, links, driven.get("body")) if one.name not in told)
+
+
+def body_of(end: Any) -> Any:
+    """Name of the body at an end: of a point ``caliper.pad`` the structure."""
+    return end.partition(".")[0] if isinstance(end, str) else end
+
+
+def _is_structure(body: Mapping[str, Any]) -> bool:
+    return "structure" in (body.get("motion"), body.get("kind"))
+
+
+def _points(
+    name: str, body: Mapping[str, Any], links: Sequence[Mapping[str, Any]], contacts: Mapping[str, Mapping[str, Any]]
+) -> list[str]:
+    """Ends at a body in raw tables; of a structure every point that is named, as its file may know more of them."""
+    if not _is_structure(body):
+        return [name]
+    ends = [end for link in links if isinstance(link.get("between"), list) for end in link["between"]]
+    ends += [surface.get(key) for surface in contacts.values() for key in ("body", "against")]
+    return [*dict.fromkeys(end for end in ends if isinstance(end, str) and end.startswith(f"{name}."))]
 
 
 def _floating(bodies: Iterable[str], links: Mapping[str, Mapping[str, Any]], driven: Any) -> Iterator[Problem]:

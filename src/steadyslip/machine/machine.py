@@ -15,7 +15,7 @@ from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part
 from steadyslip.machine.bodies import Body
-from steadyslip.machine.ends import floating_body, unknown_body, unreferenced_bodies
+from steadyslip.machine.ends import body_of, floating_body, unknown_body, unreferenced_bodies
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
     GROUND,
@@ -26,9 +26,11 @@ from steadyslip.machine.mechanism import (
     Element,
     Integral,
     Mechanism,
+    StructurePart,
 )
 from steadyslip.machine.rig import LawsOfContact, Rig
 from steadyslip.machine.servo import MachineDrive, control_for, wrong_control
+from steadyslip.machine.structures import StructureBody
 from steadyslip.machine.surfaces import Surface
 
 _SPEED_TOLERANCE = 1e-9  # relative difference of two speeds of one end that counts as rounding; chosen by trial
@@ -88,7 +90,7 @@ class Machine(Rig):
         else:
             ends = [end for link in self.links.values() for end in link.between]
             ends += [end for surface in self.contacts.values() for end in (surface.body, surface.against)]
-            yield from unreferenced_bodies(self.bodies, [*ends, self.drive.driven()])
+            yield from unreferenced_bodies(self.bodies, [*map(body_of, ends), self.drive.driven()])
 
     def _name_problems(self) -> Iterator[Problem]:
         for name in (GROUND, LOAD_POINT):
@@ -99,7 +101,19 @@ class Machine(Rig):
                 yield Problem(kind, f"there are none; a machine has one or more, [{kind}.NAME]")
 
     def _end(self, where: str, name: str, allowed: tuple[str, ...] = (GROUND, LOAD_POINT)) -> Iterator[Problem]:
-        return unknown_body(where, name, [*self.bodies, *allowed])
+        return unknown_body(where, name, [*self.ends(), *allowed])
+
+    def ends(self) -> tuple[str, ...]:
+        """What links and contacts may name: bodies, and of structures the points, such as ``caliper.pad``."""
+        return tuple(
+            end for name, body in self.bodies.items()
+            for end in ([f"{name}.{one}" for one in body.point_names()] if body.is_structure else [name])
+        )  # fmt: skip
+
+    def _structure_at(self, end: str) -> tuple[str, StructureBody, str] | None:
+        """Name, body and point of an end at a structure; None for others."""
+        name, _, point = end.partition(".")
+        return (name, self.bodies[name], point) if point and name in self.bodies else None
 
     def _end_problems(self) -> Iterator[Problem]:
         """Yield Problems with ends of links, contacts and drive: unknown bodies, or the wrong kind of motion."""
@@ -108,7 +122,7 @@ class Machine(Rig):
             yield from problems
             if not problems and not self._fits(type(link), link.between):
                 yield self._wrong_ends(name, link)
-            kept = [end for end in link.between if end in self.bodies and not self._lifts(end)]
+            kept = [end for end in link.between if end not in (GROUND, LOAD_POINT) and not self._lifts(end)]
             if "y" in link.directions() and kept:
                 message = (
                     f"pulls at an angle, but {kept[0]!r} does not move away from the surface, so that it is open what "
@@ -157,9 +171,13 @@ class Machine(Rig):
     def _turns(self, end: str) -> bool | None:
         if end == GROUND:
             return None
+        if self._structure_at(end) is not None:
+            return False
         return self.drive.turns if end == LOAD_POINT else bool(self.bodies[end].turns)
 
     def _lifts(self, end: str) -> bool:
+        if (found := self._structure_at(end)) is not None:
+            return bool(found[1].moves_away(found[2]))
         return end in self.bodies and bool(self.bodies[end].lifts)
 
     def _contact_problems(self) -> Iterator[Problem]:
@@ -198,13 +216,26 @@ class Machine(Rig):
 
     def _floating(self) -> Iterator[Problem]:
         speeds, _ = self._speeds()
-        for name in self.bodies:
-            if name not in speeds:
+        for name, body in self.bodies.items():
+            if body.is_structure:
+                yield from self._held(name, body, speeds)
+            elif name not in speeds:
                 yield floating_body(name)
 
         for body in () if self.drive.driven() is None else dict.fromkeys(self.drive.watched()):
             if body in speeds and not speeds[body]:
                 yield Problem("drive.measured", f"{body!r} stands still in steady sliding; measure a body that moves")
+
+    def _held(self, name: str, body: StructureBody, speeds: Mapping[str, Any]) -> Iterator[Problem]:
+        """Yield a Problem with a structure whose motion in steady sliding is open."""
+        free = body.data.rigid_motions.shape[1]
+        if free > 1:
+            yield Problem(
+                f"bodies.{name}.matrices", f"leave the structure free to move in {free} ways; allowed: none, or one "
+                "along the slide; hold it by the stiffness in the matrices",
+            )  # fmt: skip
+        elif not any(f"{name}.{one}" in speeds for one in body.point_names()):
+            yield floating_body(name)
 
     def conditions(self) -> Iterator[Condition]:
         """Yield the conditions that loops of links are consistent and that all contacts slide forwards."""
@@ -230,16 +261,22 @@ class Machine(Rig):
             if link.keeps_pace()
         ]
         driven = self.drive.driven()
-        return ties if driven is None else [Tie("drive", LOAD_POINT, driven, 1), *ties]
+        ties = ties if driven is None else [Tie("drive", LOAD_POINT, driven, 1), *ties]
+        return [*ties, *(tie for name, body in self.bodies.items() if body.is_structure
+                         for tie in _structure_ties(name, body))]  # fmt: skip
 
     def _speeds(self) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:
-        speeds, closing = rigid_motion({LOAD_POINT: self.drive.velocity, GROUND: 0}, self._ties())
+        still = {
+            end: 0 for end in self.ends()
+            if (at := self._structure_at(end)) is not None and not at[1].data.rigid_motions.size
+        }  # fmt: skip
+        speeds, closing = rigid_motion({LOAD_POINT: self.drive.velocity, GROUND: 0, **still}, self._ties())
         return {name: 0 if _is_zero(speed) else speed for name, speed in speeds.items()}, closing
 
     def speeds(self) -> dict[str, Any]:
-        """Speeds of the bodies in steady sliding (m/s or rad/s), by name."""
+        """Speeds of bodies and of points of structures in steady sliding (m/s or rad/s), by name."""
         speeds, _ = self._speeds()
-        return {name: speeds[name] for name in self.bodies}
+        return {name: speeds[name] for name in self.ends()}
 
     def _slip_rate(self, surface: Surface, speeds: dict[str, Any]) -> Any:
         lever = 1 if surface.radius is None else surface.radius
@@ -279,6 +316,8 @@ class Machine(Rig):
         speeds, _ = self._speeds()
         coordinates = []
         for name, body in self.bodies.items():
+            if body.is_structure:
+                continue
             unit = "rad" if body.turns else "m"
             coordinates.append(DegreeOfFreedom(name, body.inertia_of(), speeds[name], body.along(), unit))
             if body.lifts:
@@ -294,25 +333,33 @@ class Machine(Rig):
             )
             for name, surface in self.contacts.items()
         )  # fmt: skip
-        return Mechanism(tuple(coordinates), (*elements, *controls), integral, contacts, self.drive.velocity)
+        structures = tuple(_structure_part(n, b, speeds) for n, b in self.bodies.items() if b.is_structure)
+        return Mechanism(
+            tuple(coordinates), (*elements, *controls), integral, contacts, self.drive.velocity, structures=structures
+        )
+
+    def row(self, end: str, axis: str) -> dict[str, Any]:
+        """Row of the displacement of an end along the slide (``x``) or away from the surface (``y``)."""
+        if (found := self._structure_at(end)) is not None:
+            name, body, point = found
+            shares = body.rows(point)[axis == "y"]
+            return {coordinate(name, int(i)): float(shares[i]) for i in np.flatnonzero(shares)}
+        return {} if end == GROUND else {end: 1} if axis == "x" else {end + NORMAL: 1} if self._lifts(end) else {}
 
     def _slip_row(self, ends: tuple[str, str], lever: Any = None) -> dict[str, Any]:
         """Row of the slip of the first end ahead of the second."""
-        row = {ends[0]: 1 if lever is None else lever, ends[1]: -1}
-        return {end: share for end, share in row.items() if end != GROUND}
+        return _combined((1 if lever is None else lever, self.row(ends[0], "x")), (-1, self.row(ends[1], "x")))
 
     def _separation_row(self, surface: Surface) -> dict[str, Any]:
-        row = {surface.held: 1, surface.base: -1}
-        return {end + NORMAL: share for end, share in row.items() if self._lifts(end)}
+        return _combined((1, self.row(surface.held, "y")), (-1, self.row(surface.base, "y")))
 
     def _element(self, name: str, link: Link) -> Element:
         shares = link.directions()
-        row: dict[str, Any] = {}
-        for end, share in zip(link.between, (-link.ratio(), 1), strict=True):
-            if end != GROUND and "x" in shares:
-                row[end] = share * shares["x"]
-            if self._lifts(end) and "y" in shares:
-                row[end + NORMAL] = share * shares["y"]
+        row = _combined(*(
+            (share * cosine, self.row(end, axis))
+            for end, share in zip(link.between, (-link.ratio(), 1), strict=True)
+            for axis, cosine in shares.items()
+        ))  # fmt: skip
         stiffness = 0 if link.rigidity() is None else link.rigidity()
         return Element(f"links.{name}", row, row, stiffness, link.dashpot(), GROUND in link.between)
 
@@ -329,6 +376,46 @@ class Machine(Rig):
             elements.append(Element("", acts, speed, held, 0 if place == speed else kd, delay=late))
         sensed = {name: share for name, share in place.items() if name != LOAD_POINT}
         return tuple(elements), None if ki is None else Integral(acts, sensed, ki, late)
+
+
+def coordinate(name: str, place: int) -> str:
+    """Name of a degree of freedom of a structure; contains a space, so that no body has it."""
+    return f"{name} {place + 1}"
+
+
+def _combined(*parts: tuple[Any, Mapping[str, Any]]) -> dict[str, Any]:
+    """Sum of rows, each times a factor."""
+    found: dict[str, Any] = {}
+    for factor, row in parts:
+        for name, share in row.items():
+            own = factor if isinstance(share, int) and share == 1 else factor * share
+            found[name] = found[name] + own if name in found else own
+    return found
+
+
+def _structure_ties(name: str, body: StructureBody) -> Iterator[Tie]:
+    """Yield the couplings of the points of a structure that is free to move in one way."""
+    motions = body.data.rigid_motions
+    if motions.shape[1] != 1:
+        return
+    moves = {f"{name}.{one}": float(body.rows(one)[0] @ motions[:, 0]) for one in body.point_names()}
+    first = next((end for end, move in moves.items() if move), None)
+    for end, move in moves.items():
+        if first is not None and end != first:
+            yield Tie(f"bodies.{name}", first, end, move / moves[first])
+
+
+def _structure_part(name: str, body: StructureBody, speeds: Mapping[str, Any]) -> StructurePart:
+    """Matrices of a structure, and its rigid motion with the given speeds of its points."""
+    data = body.data
+    moving = np.zeros(data.size)
+    if data.rigid_motions.shape[1] == 1:
+        motion = data.rigid_motions[:, 0]
+        points = [(float(body.rows(one)[0] @ motion), float(speeds[f"{name}.{one}"])) for one in body.point_names()]
+        share, speed = max(points, key=lambda pair: abs(pair[0]))
+        moving = motion * (speed / share)
+    places = tuple(coordinate(name, i) for i in range(data.size))
+    return StructurePart(name, places, data.mass, body.damping_matrix(), data.stiffness, body.forces(), moving)
 
 
 def rigid_motion(known: Mapping[str, Any], ties: list[Tie]) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:

@@ -96,12 +96,37 @@ class ContactPort:
     loaded_by: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class StructurePart:
+    """A structure in a mechanism: coordinates of its degrees of freedom, and its matrices.
+
+    Attributes
+    ----------
+    name : str
+    coordinates : tuple of str
+        Names that rows use, one for every degree of freedom.
+    mass, damping, stiffness : ndarray (n, n)
+    force, speeds : ndarray (n,)
+        Constant forces, and speeds in steady sliding.
+    """
+
+    name: str
+    coordinates: tuple[str, ...]
+    mass: Any
+    damping: Any
+    stiffness: Any
+    force: Any
+    speeds: Any
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """Coordinates, elements and contacts of a rig.
 
     Attributes
     ----------
+    structures : tuple of StructurePart
+        Bodies given by matrices; only machines have them.
     velocity
         Velocity of the drive (m/s or rad/s).
     gain
@@ -117,3 +142,4 @@ class Mechanism:
     velocity: Any
     gain: Any = 0
     axial_share: Any = None
+    structures: tuple[StructurePart, ...] = ()

@@ -5,7 +5,8 @@ This folder depends on the methods of laws and rigs; it does not depend on kerne
 
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
-from steadyslip.model.sliding import SteadyContact, SteadyMachine, SteadySliding, steady_state, steady_states
+from steadyslip.model.sliding import steady_state, steady_states
+from steadyslip.model.steady_results import SteadyContact, SteadyMachine, SteadySliding
 
 __all__ = [
     "Model",

@@ -9,6 +9,7 @@ from typing import Any
 
 import sympy as sp
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import checked
 from steadyslip.core.records import Address, parameters, shape_of, with_values
 from steadyslip.core.symbols import Letters
@@ -18,6 +19,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
+from steadyslip.model.numeric import by_matrices
 
 RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 """Letters that the equations use, which parameters cannot have."""
@@ -68,6 +70,11 @@ def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
 
 def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model:
     """Build the Model without checks; `drive` is `MOVED`, `PULLED` or `EITHER`."""
+    if by_matrices(rig):
+        raise NotAvailable(
+            "this is not offered for a machine with a structure, whose equations are matrices; offered are analyze, "
+            "eigenvalues, growth_rate, stability, boundary, margins, modes and steady_state"
+        )
     kept = frozenset(present)
     key = (shape_of(rig), kept, drive)
     return _build_cached(_Structure(key, rig, kept, drive))

@@ -199,7 +199,7 @@ def operating_point(
     """
     if not (vary or present or scan or drive != MOVED):
         return _cached_point(rig, branch)
-    arrays = _checked_arrays(rig, vary or {})
+    arrays = checked_arrays(rig, vary or {})
     varied = arrays.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
     return _make_point(model_of(rig, [*structural, *present], drive), rig, arrays, branch, scan)
@@ -208,7 +208,7 @@ def operating_point(
 @lru_cache(maxsize=256)
 def _cached_point(rig: Rig, branch: int) -> OperatingPoint:
     """Cached point of a rig without varied parameters, with the cached results of earlier calls."""
-    return _make_point(model_of(rig), rig, _checked_arrays(rig, {}), branch, False)
+    return _make_point(model_of(rig), rig, checked_arrays(rig, {}), branch, False)
 
 
 def _make_point(model: Model, rig: Rig, arrays: BroadcastArrays, branch: int, scan: bool) -> OperatingPoint:
@@ -241,7 +241,7 @@ def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
     return lambda values: function(*(values[name] for name in names))[0]
 
 
-def _checked_arrays(rig: Rig, vary: Vary) -> BroadcastArrays:
+def checked_arrays(rig: Rig, vary: Vary) -> BroadcastArrays:
     """Check and broadcast varied values, by full dotted name."""
     known, problems = rig.parameters(), []
     checked: dict[str, Any] = {}

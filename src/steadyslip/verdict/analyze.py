@@ -23,7 +23,8 @@ from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.sliding import SteadySliding, steady_states
+from steadyslip.model.sliding import steady_states
+from steadyslip.model.steady_results import SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
 from steadyslip.verdict.checks import critical_check, edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import as_dict

@@ -32,7 +32,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import in_range
-from steadyslip.model.sliding import SteadyMachine
+from steadyslip.model.steady_results import SteadyMachine
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from steadyslip.linear.search import Boundary
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.model.sliding import SteadyMachine, SteadySliding
+from steadyslip.model.steady_results import SteadyMachine, SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset
 
 if TYPE_CHECKING:

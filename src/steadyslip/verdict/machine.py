@@ -10,24 +10,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.errors import NoSteadySliding, ParameterError
+from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
 from steadyslip.linear.coupling import is_undamped
-from steadyslip.linear.modes import Mode, mode_of
+from steadyslip.linear.matrix_route import require_matrices
+from steadyslip.linear.modes import Mode, matrix_mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND
+from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
-from steadyslip.model.sliding import SteadyMachine, steady_machine
+from steadyslip.model.sliding import steady_machine
+from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
 from steadyslip.verdict.causes import why_delay_is_ill_posed
 from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, finite, onset_dict
 from steadyslip.verdict.findings import MachineFindings
+from steadyslip.verdict.matrix_checks import is_on_edge, matrix_checks, matrix_edge_checks, matrix_numbers
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
 from steadyslip.verdict.words import (
@@ -114,6 +118,8 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
     """Verdict on a machine; see `steadyslip.analyze`."""
     from steadyslip import __version__
 
+    if by_matrices(machine):
+        return _analyze_by_matrices(machine, kicks)
     with np.errstate(all="ignore"):
         point = operating_point(machine)
         require_range(point)
@@ -149,6 +155,35 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
             version=__version__,
             **numbers,
         )
+    return replace(found, reason=_reason(found))
+
+
+def _analyze_by_matrices(machine: Machine, kicks: Sequence[str]) -> MachineAnalysis:
+    """Verdict on a machine whose equations are matrices: as of others, without the kind of onset."""
+    from steadyslip import __version__
+
+    if kicks:
+        raise NotAvailable("kicks are not offered for a machine with a structure, whose equations are matrices")
+    with np.errstate(all="ignore"):
+        point = require_matrices(machine)
+        try:
+            steady = steady_machine(machine)
+        except NoSteadySliding as error:
+            why = str(error).removeprefix("no steady sliding: ")
+            return MachineAnalysis(rig=machine, stable=None, reason=why, margins=margins(machine), version=__version__)
+        numbers, edged = matrix_numbers(point), is_on_edge(point)
+        checks = matrix_checks(point, numbers["stable"], edged)
+        if doubt := undecided(checks):
+            return MachineAnalysis(
+                rig=machine, stable=None, reason=doubt, margins=(), checks=checks, version=__version__
+            )
+        distances, of_edges = matrix_edge_checks(point, margins(machine))
+        leading = next(iter(numbers.get("eigenvalues", ())), None)
+        found = MachineAnalysis(
+            rig=machine, reason="", steady=steady, on_edge=edged, margins=distances, version=__version__,
+            mode=None if leading is None else matrix_mode(point, complex(leading.real, abs(leading.imag))),
+            warnings=_warnings(machine, steady), checks=(*checks, *of_edges), **numbers,
+        )  # fmt: skip
     return replace(found, reason=_reason(found))
 
 
@@ -188,7 +223,8 @@ PHRASES = {
 def _reason(found: MachineAnalysis) -> str:
     """Sentence that explains a machine's verdict: what grows, and the nearest edge of all parameters."""
     if found.growth_rate == math.inf:
-        return why_delay_is_ill_posed(operating_point(found.rig)) or PHRASES["are ill-posed"]
+        late = "" if by_matrices(found.rig) else why_delay_is_ill_posed(operating_point(found.rig))
+        return late or PHRASES["are ill-posed"]
     first = next((one for one in found.margins if one.edge is not None), None)
     hint = "" if first is None else f"; {_nearest(found, first)}"
     if found.on_edge:

@@ -62,7 +62,14 @@ def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
     eigenvalues = numbers["eigenvalues"]
     if eigenvalues and eigenvalues[-1].imag > 0:  # a list of some of infinitely many ends between two of a pair
         eigenvalues = numbers["eigenvalues"] = (*eigenvalues, eigenvalues[-1].conjugate())
-    numbers["growth_rate"] = rate
+    return numbers | rates_of(eigenvalues, rate)
+
+
+def rates_of(eigenvalues: tuple[complex, ...], rate: float | None) -> dict[str, Any]:
+    """Growth rate, times to halve or double, period and damping ratio of eigenvalues (1/s) with the largest real part
+    `rate`.
+    """
+    numbers: dict[str, Any] = {"growth_rate": rate}
     if rate is not None and math.isfinite(rate) and rate != 0:
         numbers["time_to_halve" if rate < 0 else "time_to_double"] = math.log(2) / abs(rate)
     oscillation = next((s for s in eigenvalues if s.imag != 0), None)

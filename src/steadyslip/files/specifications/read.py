@@ -40,6 +40,7 @@ from steadyslip.files.specifications.layout import (
 )
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import NotToml, Table, key_lines, line_of, tables_of
+from steadyslip.files.structures.tables import with_structures
 from steadyslip.machine.ends import unknown_ends
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine
@@ -261,6 +262,7 @@ def read_tables(
     if complete is not None and changed:  # laws that were changed have parameters of their own
         complete(tables)
     tolerances, faults = taken_out(tables)
+    reader.tables = with_structures(tables, source)
     found_rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
     protocol = reader.protocol(found_rig if isinstance(found_rig, Machine) else None)
     found = {section.name: reader.settings(section) for section in further}

@@ -11,7 +11,8 @@ class Compliant(ContactLaw, name="compliant"):
     """Surfaces with a normal stiffness and damping: σ = −k_n u − c_n u̇ with u their distance (theory 11).
 
     For bodies of a machine that move away from the surface (`PlanarBody`), so that normal and tangential vibration
-    couple. The steady normal force follows from the balance of forces.
+    couple. The steady normal force follows from the balance of forces, or is given where it is known (a clamping force
+    measured in service): then the distance counts from where it is in steady sliding.
     """
 
     normal_stiffness: float = parameter("Pa/m", positive, "normal stiffness k_n", kind="stiffness", letter="k_n")
@@ -19,8 +20,15 @@ class Compliant(ContactLaw, name="compliant"):
         "Pa s/m", nonnegative, "normal damping c_n", default=0.0, structural=True, letter="c_n"
     )
 
+    steady_normal_stress: float | None = parameter(
+        "Pa", positive, "normal stress σss in steady sliding, if that is known", default=None, kind="normal stress"
+    )
+
     def load(self) -> Expression | None:
-        return 0
+        return 0 if self.steady_normal_stress is None else None
+
+    def steady_stress(self) -> Expression | None:
+        return self.steady_normal_stress
 
     def coupling(self, motion: ContactInputs) -> Expression:
         return -self.normal_stiffness * motion.separation - self.normal_damping * motion.separation_rate

@@ -1,0 +1,218 @@
+"""Growing eigenvalues of a machine under changes of one parameter, from one scalar response of the unchanged machine.
+
+With P(s) = s E − A and a parameter that changes it by U B(s) Vᵀ of low rank, Δ(s) = det(1 + Vᵀ P(s)⁻¹ U B(s)) is the
+ratio of the characteristic functions. The resolvent is computed once over frequencies, for all values of the parameter;
+turns of Δ around 0 tell how many more roots grow (theory 13).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.core.arrays import Array
+from steadyslip.model.numeric.pencil import ComplexArray, Pencil
+
+_RANK = 1e-12  # size relative to the largest below which a direction of a change is rounding
+_LINEAR = 1e-9  # relative difference of slopes that counts as rounding of assembly and elimination
+_SKETCH = 24  # random directions in which changes are looked at; a parameter changes fewer rows or columns
+_AROUND = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # places at each pole, in units of its distance from the axis
+_PER_DECADE = 24  # places between poles
+_BEYOND = 1e3  # factor beyond the slowest and fastest root up to which places are as dense
+_FAR = 1e12  # factor up to which frequencies are followed: a changed machine may be that much slower or faster
+_SPARSE = 6  # places per decade there
+_TURN = 1.2  # rad; largest change of the argument between two places that counts as followed
+_ROUNDS = 24  # of halving between places until the argument is followed
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Changes of a pencil in a few directions: s E − A + U (s Be − Ba) Vᵀ.
+
+    Attributes
+    ----------
+    own : Pencil
+    into, out : ndarray (N, k)
+        U, and V.
+    """
+
+    own: Pencil
+    into: Array
+    out: Array
+    rows: Array
+    columns: Array
+
+    def core(self, other: Pencil) -> tuple[Array, Array]:
+        """Be and Ba (k, k) of another pencil."""
+        return tuple(
+            self.rows.T @ (new - old) @ self.columns for new, old in ((other.e, self.own.e), (other.a, self.own.a))
+        )
+
+    def response(self, omega: Array) -> ComplexArray:
+        """Vᵀ (iω E − A)⁻¹ U at frequencies (p,), (p, k, k)."""
+        return self.own.resolvent(1j * omega, self.out, self.into)
+
+    def ratio(self, omega: Array, response: ComplexArray, core: tuple[Array, Array]) -> ComplexArray:
+        """Δ at frequencies (p,)."""
+        by = 1j * omega[:, None, None] * core[0] - core[1]
+        found: ComplexArray = np.linalg.det(np.eye(len(core[0])) + response @ by)
+        return found
+
+
+def change_between(own: Pencil, others: list[Pencil]) -> Change | None:
+    """Directions in which other pencils differ from one; None if they do not differ."""
+    rows, columns = own.scale
+    chance = np.random.default_rng(0)
+    size = len(own.e)
+    left, right = [], []
+    for other in others:
+        for new, old in ((other.e, own.e), (other.a, own.a)):
+            change = rows[:, None] * (new - old) * columns
+            largest = np.max(np.abs(change))
+            if largest > 0:
+                left.append(change @ chance.standard_normal((size, min(_SKETCH, size))) / largest)
+                right.append(change.T @ chance.standard_normal((size, min(_SKETCH, size))) / largest)
+    if not left:
+        return None
+    u, v = (_directions(np.hstack(side)) for side in (left, right))
+    width = max(u.shape[1], v.shape[1])
+    u, v = (np.pad(side, ((0, 0), (0, width - side.shape[1]))) for side in (u, v))
+    return Change(own, u / rows[:, None], v / columns[:, None], rows[:, None] * u, columns[:, None] * v)
+
+
+def _directions(sketch: Array) -> Array:
+    found, sizes, _ = np.linalg.svd(sketch, full_matrices=False)
+    kept: Array = found[:, sizes > _RANK * sizes[0]]
+    return kept
+
+
+def frequencies(own: Pencil, further: tuple[float, ...] = ()) -> Array:
+    """Frequencies (rad/s) at which the response of a machine is followed: dense at its poles."""
+    poles = own.eigenvalues
+    size = np.abs(poles[np.abs(poles) > 0])
+    sizes = np.append(size, further) if len(size) or further else np.ones(1)
+    low, high = np.min(sizes) / _BEYOND, np.max(sizes) * _BEYOND
+    even = np.geomspace(low, high, int(_PER_DECADE * np.log10(high / low)) + 2)
+    decades = np.arange(_SPARSE * np.log10(_FAR / _BEYOND), 0, -1) / _SPARSE
+    even = np.concatenate([low * 10**-decades, even, high * 10 ** decades[::-1]])
+    width = np.maximum(np.abs(poles.real), 1e-9 * np.abs(poles))
+    near = (np.abs(poles.imag)[:, None] + width[:, None] * np.array(_AROUND)).ravel()
+    return np.unique(np.concatenate([even, near[(near > low) & (near < high)]]))
+
+
+class Turns:
+    """How many more eigenvalues grow under changes of one parameter."""
+
+    def __init__(self, change: Change) -> None:
+        self.change = change
+        self.omega = frequencies(change.own)
+        self.response = change.response(self.omega)
+
+    def more_growing(self, other: Pencil) -> int | None:
+        """Number of growing roots of another pencil minus those of the own; None if a root is too near the axis."""
+        core = self.change.core(other)
+        omega, response = self.omega, self.response
+        ratio = self.change.ratio(omega, response, core)
+        for _ in range(_ROUNDS):
+            turn = np.angle(ratio[1:] * np.conj(ratio[:-1]))
+            steep = np.flatnonzero(~(np.abs(turn) <= _TURN))
+            if not steep.size:
+                whole = (np.sum(turn) + self._ends(core, ratio)) / np.pi
+                return -round(float(whole)) if abs(whole - round(float(whole))) < 0.25 else None
+            middle = np.sqrt(omega[steep] * omega[steep + 1])
+            fresh = self.change.response(middle)
+            omega = np.insert(omega, steep + 1, middle)
+            response = np.insert(response, steep + 1, fresh, axis=0)
+            ratio = np.insert(ratio, steep + 1, self.change.ratio(middle, fresh, core))
+        return None
+
+    def _ends(self, core: tuple[Array, Array], ratio: ComplexArray) -> float:
+        """Turns (rad) below the first and beyond the last frequency, where Δ is nearly real."""
+
+        def to_axis(one: complex) -> float:
+            angle = float(np.angle(one))
+            return angle - np.pi * round(angle / np.pi)
+
+        return to_axis(complex(ratio[0])) - to_axis(complex(ratio[-1]))
+
+    def nearest(self, other: Pencil) -> float:
+        """Frequency (rad/s) at which Δ comes nearest to 0, where a root crosses the axis."""
+        ratio = self.change.ratio(self.omega, self.response, self.change.core(other))
+        return float(self.omega[int(np.argmin(np.abs(ratio)))])
+
+
+def rank_one(change: Change, steps: list[float], others: list[Pencil]) -> tuple[Array, Array] | None:
+    """Be and Ba for a unit of the parameter if all changes are proportional to it and of rank one; None otherwise.
+
+    `steps` are the changes of the parameter, from its own value, that lead to `others`.
+    """
+    cores = [[own / step for own in change.core(other)] for step, other in zip(steps, others, strict=True)]
+    units = []
+    for several in zip(*cores, strict=True):
+        largest = max(float(np.max(np.abs(one))) for one in several)
+        if any(np.max(np.abs(one - several[0])) > _LINEAR * largest for one in several[1:]):
+            return None
+        units.append(several[0] / (largest or 1.0))
+    if all(_rank(stacked) > 1 for stacked in (np.hstack(units), np.vstack(units))):
+        return None
+    return cores[0][0], cores[0][1]
+
+
+def _rank(matrix: Array) -> int:
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(sizes > _LINEAR * sizes[0]))
+
+
+def scalar_response(change: Change, omega: Array, response: ComplexArray, unit: tuple[Array, Array]) -> ComplexArray:
+    """h(iω) of 1 + θ h = Δ for a change of rank one, at frequencies (p,)."""
+    by = 1j * omega[:, None, None] * unit[0] - unit[1]
+    found: ComplexArray = np.trace(response @ by, axis1=1, axis2=2)
+    return found
+
+
+def real_crossings(change: Change, turns: Turns, unit: tuple[Array, Array]) -> tuple[Array, Array]:
+    """All steps θ at which a root lies on the imaginary axis, 1 + θ h(iω) = 0, and their frequencies (rad/s).
+
+    These are the frequencies where h is real: changes of sign of its imaginary part, narrowed to rounding. Dips of that
+    part towards zero between two places are looked into.
+    """
+    omega, values = turns.omega, scalar_response(change, turns.omega, turns.response, unit)
+    extra = _dips(omega, values.imag)
+    for _ in range(4):  # rounds of looking into dips, each eight times finer
+        if not extra.size:
+            break
+        fresh = scalar_response(change, extra, change.response(extra), unit)
+        order = np.argsort(np.concatenate([omega, extra]), kind="stable")
+        omega, values = np.concatenate([omega, extra])[order], np.concatenate([values, fresh])[order]
+        extra = _dips(omega, values.imag)
+    at = np.flatnonzero(np.sign(values.imag[1:]) * np.sign(values.imag[:-1]) < 0)
+    low, high = omega[at], omega[at + 1]
+    below = values.imag[at]
+    for _ in range(60):  # halvings to rounding; secants would stick at the poles
+        middle = 0.5 * (low + high)
+        now = scalar_response(change, middle, change.response(middle), unit).imag
+        same = np.sign(now) == np.sign(below)
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    found = 0.5 * (low + high)
+    at_zero = change.own.resolvent(np.zeros(1, dtype=complex), change.out, change.into)
+    static = scalar_response(change, np.zeros(1), at_zero, unit).real
+    h = np.concatenate([static, scalar_response(change, found, change.response(found), unit).real])
+    with np.errstate(divide="ignore"):
+        steps = -1 / h
+    places = np.concatenate([[0.0], found])
+    good: NDArray[np.bool_] = np.isfinite(steps)
+    return steps[good], places[good]
+
+
+def _dips(omega: Array, imaginary: Array) -> Array:
+    """Places inside brackets where the size of the imaginary part has a minimum without a change of sign."""
+    size = np.abs(imaginary)
+    inner = (size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])
+    alike = (np.sign(imaginary[:-2]) == np.sign(imaginary[1:-1])) & (np.sign(imaginary[2:]) == np.sign(imaginary[1:-1]))
+    at = np.flatnonzero(inner & alike) + 1
+    shares = np.array([0.125, 0.25, 0.5, 0.75])
+    left = omega[at - 1, None] + (omega[at] - omega[at - 1])[:, None] * shares
+    right = omega[at, None] + (omega[at + 1] - omega[at])[:, None] * shares
+    return np.unique(np.concatenate([left.ravel(), right.ravel()]))

@@ -1,0 +1,241 @@
+"""Linearised machine given by matrices: E z' = A z, its eigenvalues, and its resolvent.
+
+The states z are displacements q, velocities q', memory variables, states of contact laws, and the integral of a
+controller. Stresses of contacts are eliminated contact by contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.core.arrays import Array
+from steadyslip.model.numeric.assembly import MachineMatrices, Site
+from steadyslip.model.numeric.balance import Balance, state_of
+from steadyslip.model.numeric.contact_laws import Slopes
+
+ComplexArray = NDArray[np.complex128]
+
+_MASSLESS = 1e-12  # eigenvalue of the scaled inertia matrix, relative to the largest, that counts as no inertia
+_INFINITE = 1e-9  # 1/eigenvalue of a pencil in units of its own frequencies below which it is infinite; QZ loses half
+_TRUSTED = 1e-8  # relative error of the resolvent by eigenvectors, above which equations are solved instead
+_BATCH = 2**22  # complex numbers of matrices that are solved at once, 64 MiB
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """E z' = A z of one machine.
+
+    Attributes
+    ----------
+    e, a : ndarray (N, N)
+    size : int
+        Number of coordinates n; z has n displacements, then n velocities.
+    posed : bool
+        False if a contact's own equations answer with a sign that any small lag turns into growth (ill-posed).
+    """
+
+    e: Array
+    a: Array
+    size: int
+    posed: bool
+
+    @cached_property
+    def scale(self) -> tuple[Array, Array]:
+        """Factors of rows and of columns that make the pencil even: displacements times a frequency as velocities."""
+        return _even(self.e, self.a, self.size)
+
+    @cached_property
+    def inertial(self) -> bool:
+        """True if E can be inverted: every coordinate has inertia."""
+        rows, columns = self.scale
+        sizes = np.linalg.svd(self.e * rows[:, None] * columns, compute_uv=False)
+        return bool(sizes[-1] > _MASSLESS * sizes[0])
+
+    @cached_property
+    def _standard(self) -> tuple[Array, Array, Array]:
+        """State matrix in modal coordinates, and matrices from its states to z and from the rows of E to its rates."""
+        basis, left = _modal_basis(self.e, self.a, self.size)
+        inverse = np.linalg.inv(left @ self.e @ basis)
+        left = inverse @ left
+        return left @ self.a @ basis, basis, left
+
+    @cached_property
+    def eigenvalues(self) -> ComplexArray:
+        """Finite eigenvalues (1/s), by falling real part."""
+        found = np.linalg.eigvals(self._standard[0]) + 0j if self.inertial else _finite_eigenvalues(self)
+        return found[np.lexsort((-found.imag, -found.real))]
+
+    @cached_property
+    def _decomposed(self) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:
+        """Eigenvalues, right vectors in z and left vectors in rows of E, if these reproduce the resolvent."""
+        if not self.inertial:
+            return None
+        state, basis, left = self._standard
+        values, vectors = np.linalg.eig(state)
+        try:
+            other = np.linalg.inv(vectors)
+        except np.linalg.LinAlgError:
+            return None
+        right, rows = basis @ vectors, other @ left
+        probe = np.linspace(-1.0, 1.0, len(state))
+        for s in (1j * np.median(np.abs(values)), 0.1j * np.max(np.abs(values))):
+            fast, slow = right @ ((rows @ probe) / (s - values)), np.linalg.solve(s * self.e - self.a, probe)
+            if not np.allclose(fast * 1, slow, rtol=0, atol=_TRUSTED * np.max(np.abs(slow))):
+                return None
+        return values, right, rows
+
+    def mode(self, s: complex) -> ComplexArray:
+        """Right null vector of s E − A, (N,), for an eigenvalue s (1/s)."""
+        rows, columns = self.scale
+        shifted = rows[:, None] * (s * self.e - self.a) * columns
+        return np.asarray(np.linalg.svd(shifted)[2][-1].conj() * columns)
+
+    def error(self, s: complex) -> float:
+        """Distance (1/s) of `s` from an eigenvalue, by one step of inverse iteration on the matrices themselves.
+
+        Independent of how the eigenvalue was found; from the singular vectors of least value.
+        """
+        rows, columns = self.scale
+        e = rows[:, None] * self.e * columns
+        shifted = s * e - rows[:, None] * self.a * columns
+        left, sizes, right = np.linalg.svd(shifted)
+        slope = abs(left[:, -1].conj() @ e @ right[-1].conj())
+        return float(sizes[-1] / slope) if slope else np.inf
+
+    def resolvent(self, s: ComplexArray, out: Array, into: Array) -> ComplexArray:
+        """`out`ᵀ (s E − A)⁻¹ `into` at places s (p,), for `out` (N, k) and `into` (N, m): (p, k, m)."""
+        known = self._decomposed
+        if known is not None:
+            values, right, rows = known
+            left, tail = out.T @ right, rows @ into
+            return np.asarray((left / (s[:, None, None] - values)) @ tail)
+        found = np.empty((len(s), out.shape[1], into.shape[1]), dtype=complex)
+        step = max(_BATCH // self.a.size, 1)
+        for start in range(0, len(s), step):
+            part = s[start : start + step, None, None] * self.e - self.a
+            found[start : start + step] = out.T @ np.linalg.solve(part, np.broadcast_to(into, (len(part), *into.shape)))
+        return found
+
+
+def _even(e: Array, a: Array, size: int) -> tuple[Array, Array]:
+    """Factors of rows and columns: one frequency for all displacements, then every row and column of size one."""
+    rows, columns = np.ones(len(e)), np.ones(len(e))
+    inertia, springs = np.abs(np.diag(e)[size : 2 * size]), np.abs(np.diag(a[size : 2 * size, :size]))
+    some = (inertia > 0) & (springs > 0)
+    omega = float(np.sqrt(np.median(springs[some] / inertia[some]))) if np.any(some) else 1.0
+    both = np.abs(e) * omega + np.abs(a)
+    for _ in range(4):  # sweeps; each halves what is left of the differences
+        rows /= np.sqrt(np.maximum(np.max(both * rows[:, None] * columns, axis=1), 1e-300))
+        columns /= np.sqrt(np.maximum(np.max(both * rows[:, None] * columns, axis=0), 1e-300))
+    return rows, columns
+
+
+def _modal_basis(e: Array, a: Array, size: int) -> tuple[Array, Array]:
+    """Matrices from modal states to z, and from rows of the pencil to modal rows.
+
+    In modes of the symmetric parts of stiffness and inertia, with velocities beside displacements times frequency, a
+    structure's lowest mode keeps its digits beside the highest. Without such modes the pencil is only made even.
+    """
+    mass, stiffness = (0.5 * (m + m.T) for m in (e[size : 2 * size, size : 2 * size], -a[size : 2 * size, :size]))
+    rows, columns = _even(e, a, size)
+    try:
+        from scipy.linalg import eigh  # slow to import
+
+        squares, shapes = eigh(stiffness, mass)
+    except np.linalg.LinAlgError:
+        return np.diag(columns), np.diag(rows)
+    own = np.sqrt(np.abs(squares))
+    omega = np.where(own > 1e-6 * np.max(own), own, 1e-6 * np.max(own) or 1.0)  # rigid motions
+    basis, left = np.zeros((2, *e.shape))
+    basis[:size, :size], basis[size : 2 * size, size : 2 * size] = shapes / omega, shapes
+    left[:size, :size] = omega[:, None] * (shapes.T @ mass)
+    left[size : 2 * size, size : 2 * size] = shapes.T
+    rest = range(2 * size, len(e))
+    inside = np.abs(a[2 * size :] @ basis).max(axis=1, initial=0.0)
+    outside = np.abs(left @ a[:, 2 * size :]).max(axis=0, initial=0.0)
+    both = np.where((inside > 0) & (outside > 0), np.sqrt(inside / np.where(outside > 0, outside, 1.0)), 1.0)
+    basis[rest, rest], left[rest, rest] = both, 1 / both
+    return basis, left
+
+
+def _finite_eigenvalues(pencil: Pencil) -> ComplexArray:
+    """Finite eigenvalues of a pencil whose E is singular, by QZ after the bodies without inertia are eliminated."""
+    from scipy.linalg import eig  # slow to import
+
+    rows, columns = pencil.scale
+    e, a = (rows[:, None] * m * columns for m in (pencil.e, pencil.a))
+    alpha, beta = eig(a, e, right=False, homogeneous_eigvals=True)
+    finite = np.abs(beta) > _INFINITE * np.abs(alpha) * np.max(np.abs(e)) / np.max(np.abs(a))
+    return np.asarray(alpha[finite] / beta[finite])
+
+
+# --- from matrices and laws ------------------------------------------------------------------------------------------
+
+
+def linearised(machine: MachineMatrices, found: Balance) -> Pencil:
+    """Pencil of a machine at steady sliding."""
+    n = len(machine.names)
+    kept = [len(site.laws.memory) + len(site.laws.states) for site in machine.sites]
+    size = 2 * n + sum(kept) + machine.integrates
+    e, a = np.eye(size), np.zeros((size, size))
+    at, moving = slice(0, n), slice(n, 2 * n)
+    e[moving, moving] = machine.mass
+    a[at, moving] = np.eye(n)
+    a[moving, at], a[moving, moving] = -machine.stiffness, -machine.damping
+    if machine.integrates:
+        a[moving, -1], a[-1, at] = -machine.integral_acts, machine.integral_senses
+    posed, start = True, 2 * n
+    for i, (site, count) in enumerate(zip(machine.sites, kept, strict=True)):
+        slopes = site.laws.slopes(site.own, *state_of(site, found, i, machine.speeds))
+        posed &= _add_contact(e, a, site, slopes, n, slice(start, start + count), machine.integrates)
+        start += count
+    sign, _ = np.linalg.slogdet(e[moving, moving])
+    return Pencil(e, a, n, posed and bool(sign >= 0))
+
+
+def _add_contact(e: Array, a: Array, site: Site, slopes: Slopes, n: int, own: slice, integrates: bool) -> bool:
+    """Add the forces and memories of one contact to a pencil; False if its own equations are ill-posed.
+
+    τ = s_v v + s_σ σ + s_τ τ + s_m m and σ = n_x x + ... + n_τ τ are solved for both stresses first.
+    """
+    friction, normal = np.zeros(len(a)), np.zeros(len(a))
+    many = len(site.laws.memory)
+    memory, states = slice(own.start, own.start + many), slice(own.start + many, own.stop)
+    at, moving = slice(0, n), slice(n, 2 * n)
+
+    def of_motion(row: Array) -> Array:
+        """Combination of states by slopes with x, v, v̇ (left out), T, τ (left out), distance and its rate."""
+        found = np.zeros(len(a))
+        found[at] = row[0] * site.slip + row[3] * site.pull + row[5] * site.apart
+        found[moving] = row[1] * site.slip + row[3] * site.pull_rate + row[6] * site.apart
+        found[states] = row[7:]
+        if integrates:
+            found[-1] += row[3] * site.pull_integral
+        return found
+
+    friction[moving], friction[memory] = slopes.strength[0] * site.slip, slopes.strength[3:]
+    normal = of_motion(slopes.normal)
+    loop = np.array([[1 - slopes.strength[2], -slopes.strength[1]], [-slopes.normal[4], 1.0]])
+    determinant = float(np.linalg.det(loop))
+    if not determinant:
+        return False
+    inverse = np.linalg.inv(loop)
+    tau, sigma = inverse @ np.array([friction, normal])  # rows over z
+    lagged = inverse @ np.array([0.0, slopes.normal[2]])  # with the acceleration of slip
+    force = site.area * (np.outer(site.apart, sigma) - np.outer(site.slip, tau))
+    a[moving] += force
+    if lagged.any():
+        e[moving, moving] -= site.area * np.outer(site.apart * lagged[1] - site.slip * lagged[0], site.slip)
+    for place, row in zip(range(memory.start, memory.stop), slopes.rates, strict=True):
+        a[place, moving] += row[0] * site.slip
+        a[place, memory] += row[3:]
+        a[place] += row[1] * sigma + row[2] * tau
+        e[place, moving] -= (row[1] * lagged[1] + row[2] * lagged[0]) * site.slip
+    for place, row in zip(range(states.start, states.stop), slopes.state_rates, strict=True):
+        a[place] += of_motion(row) + row[4] * tau
+        e[place, moving] -= (row[2] + row[4] * lagged[0]) * site.slip
+    return determinant > 0

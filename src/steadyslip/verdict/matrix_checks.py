@@ -1,0 +1,123 @@
+"""Numbers and checks of the verdict on a machine given by matrices.
+
+- Steady sliding: the laws themselves, and the matrices, leave forces in balance.
+- Eigenvalues: the matrices are singular at the rightmost ones; turns of the contacts' return difference, with the
+  machine sliding without friction and contact as reference, tell as many that grow (theory 13).
+- Edges: eigenvalues on both sides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.checks import Check, check
+from steadyslip.linear.boundary import Margin, without_edges
+from steadyslip.linear.matrix_route import STABLE_WORD, stability_word
+from steadyslip.linear.pencil import GOOD
+from steadyslip.linear.search import Boundary
+from steadyslip.linear.status import ON_THE_EDGE
+from steadyslip.model.numeric.change import Turns, change_between
+from steadyslip.model.numeric.machine_point import MachinePoint
+from steadyslip.model.numeric.pencil import linearised
+from steadyslip.verdict.checks import BALANCE_TOLERANCE, SIDE_OFFSETS
+from steadyslip.verdict.numbers import rates_of
+
+_CHECKED = 8  # rightmost eigenvalues whose matrix is looked at: a decomposition each
+
+
+def matrix_numbers(point: MachinePoint) -> dict[str, Any]:
+    """Fields of a verdict from the eigenvalues."""
+    pencil = point.pencil
+    if not pencil.posed:
+        return {"stable": False} | rates_of((), math.inf)
+    found = tuple(complex(s) for s in pencil.eigenvalues)
+    return {"stable": stability_word(point) == STABLE_WORD, "eigenvalues": found} | rates_of(found, found[0].real)
+
+
+def is_on_edge(point: MachinePoint) -> bool:
+    """True if an eigenvalue neither grows nor decays to 9 digits, and no other grows."""
+    found = point.pencil.eigenvalues
+    near = np.abs(found.real) <= ON_THE_EDGE * np.abs(found)
+    return bool(np.any(near) and not np.any(found.real[~near] > 0))
+
+
+def matrix_checks(point: MachinePoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
+    """Checks of steady sliding, eigenvalues and how many grow."""
+    steady = check(
+        "steady sliding", "forces by the laws and the matrices added up", _imbalance(point), BALANCE_TOLERANCE
+    )
+    if not point.pencil.posed:
+        return (steady,)
+    first = [s for s in point.pencil.eigenvalues if s.imag >= 0][:_CHECKED]
+    errors = [point.pencil.error(complex(s)) / max(abs(s), 1e-300) for s in first]
+    values = check("eigenvalues", "least singular value of the machine's own matrices", max(errors, default=0.0), GOOD)
+    growing = _growing_by_turns(point)
+    right = growing is None or on_edge or (growing == 0) == stable
+    if growing is None:
+        return steady, values
+    counted = Check("growing roots", "turns of the contacts' return difference", float(not right), 0.0, right)
+    return steady, values, counted
+
+
+def _growing_by_turns(point: MachinePoint) -> int | None:
+    """Number of growing roots from those of the machine without contact forces; None if these lie on the axis."""
+    sites = tuple(replace(site, area=0.0) for site in point.matrices.sites)
+    free = linearised(replace(point.matrices, sites=sites), point.balance)
+    roots = free.eigenvalues
+    if np.any(np.abs(roots.real) <= ON_THE_EDGE * np.abs(roots)):
+        return None
+    change = change_between(free, [point.pencil])
+    more = 0 if change is None else Turns(change).more_growing(point.pencil)
+    return None if more is None else int(np.sum(roots.real > 0)) + more
+
+
+def _imbalance(point: MachinePoint) -> float:
+    """Largest sum of forces on a coordinate, relative to the largest force on any, with the laws' own methods."""
+    matrices, found = point.matrices, point.balance
+    terms = [matrices.force, -matrices.damping @ matrices.speeds, -matrices.stiffness @ found.displacement]
+    terms += [-matrices.integral_acts * found.integral]
+    worst = 0.0
+    for i, site in enumerate(matrices.sites):
+        law = point.machine.contacts[site.name].friction
+        sigma, tau = float(found.sigma[i]), float(found.tau[i])
+        told = float(law.steady_strength(sp.Float(site.velocity), sp.Float(sigma)))
+        worst = max(worst, abs(told - tau) / max(abs(tau), sigma * BALANCE_TOLERANCE))
+        terms += [-site.area * site.slip * told, site.area * site.apart * sigma]
+    table = np.array(terms)
+    size = np.sum(np.abs(matrices.stiffness) @ np.abs(found.displacement)) + np.max(np.abs(table))
+    return max(worst, float(np.max(np.abs(np.sum(table, axis=0)), initial=0.0) / size))
+
+
+def matrix_edge_checks(point: MachinePoint, margins: Sequence[Margin]) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
+    """Margins without edges that fail their check, and a check for each: eigenvalues on both sides."""
+    lost, checks = [], []
+    for margin in margins:
+        for edge in margin.edges:
+            share = next((one for one in SIDE_OFFSETS if _sides_agree(point, margin, edge, one)), math.inf)
+            lost += [edge] if math.isinf(share) else []
+            where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
+            checks.append(
+                check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, max(SIDE_OFFSETS))
+            )
+    return without_edges(margins, lost), tuple(checks)
+
+
+def _sides_agree(point: MachinePoint, margin: Margin, edge: Boundary, share: float) -> bool:
+    """True if stability below and above an edge is what it says, at `share` of its value from it."""
+    size = abs(edge.value) or abs(margin.value) or margin.searched[1]
+    domain = point.machine.parameters()[edge.parameter].role.domain
+    words = []
+    for sign in (-1, 1):
+        value = edge.value + sign * share * size
+        other = point.varied(edge.parameter, value if domain.contains(np.array([value]))[0] else edge.value)
+        words.append(stability_word(other))
+    below, above = (word == STABLE_WORD for word in words)
+    if edge.stable == "neither":
+        return words[0] != words[1] and not below and not above
+    return bool(above and not below) if edge.stable == "above" else bool(below and not above)

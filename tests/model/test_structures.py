@@ -1,0 +1,311 @@
+"""Structures given by matrices or modes: theory 13's reed, limits that are known machines, and equations by hand."""
+
+import numpy as np
+import pytest
+from scipy import io
+from scipy.linalg import eigh
+
+import steadyslip as ss
+from steadyslip.machine import (
+    Machine,
+    PlanarBody,
+    Pull,
+    SlidingBody,
+    Spring,
+    StructureBody,
+    StructureData,
+    StructurePoint,
+    Surface,
+    reduced,
+)
+from structures_at_random import compared, random_structure, reed, reed_matrices
+
+ROCK = ss.laws.RateState(
+    a=0.010, b=0.016, d_c=20e-6, mu_ref=0.45, v_ref=0.05, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
+)
+
+
+# --- theory 13 --------------------------------------------------------------------------------------
+
+
+def test_modes_of_the_reed():
+    mass, _, stiffness = reed_matrices()
+    first = np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:3]) / (2 * np.pi)
+    np.testing.assert_allclose(first, [174.06596651, 1090.85502123, 3054.46923654], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("force", "root"), [
+    (20, 42.80557801517 + 12604.09945918j), (100, 12.4673358145 + 4565.039870161j),
+    (300, 3.084097771474 + 4548.158248864j), (1000, -57.27106796657 + 4480.542683177j),
+])  # fmt: skip
+def test_rightmost_root_of_the_reed(force, root):
+    found = ss.eigenvalues(reed(force))
+    assert abs(found[0] - root) < 1e-9 * abs(root)
+    assert ss.growth_rate(reed(force)) == found[0].real
+
+
+def test_edges_of_the_reed_and_none_where_a_second_pair_crosses():
+    low, high = ss.boundary(reed(), "steady_normal_stress", (1, 1e4))
+    np.testing.assert_allclose([low.value, high.value], [355.529682, 6297.80596], rtol=1e-9)
+    np.testing.assert_allclose([low.angular_frequency, high.angular_frequency], [4543.24791, 2316.02563], rtol=2e-9)
+    assert (low.stable, high.stable, low.kind) == ("above", "below", "oscillatory")
+
+
+def test_edges_lie_where_eigenvalues_cross_the_axis():
+    """Of parameters that enter by a term of rank one, and of others."""
+    machine = reed()
+    for name in ("friction.a", "normal_stiffness", "friction.d_c", "points.tip.angle"):
+        edges = ss.boundary(machine, name)
+        assert edges, name
+        for edge in edges:
+            at = ss.eigenvalues(machine, {name: edge.value})
+            nearest = at[np.argmin(np.abs(at - 1j * edge.angular_frequency))]
+            assert abs(nearest.real) < 1e-8 * (abs(nearest) + 100), edge  # a divergence has no size of its own
+            sides = ss.growth_rate(machine, {name: edge.value + 1e-5 * abs(edge.value) * np.array([-1, 1])})
+            assert (sides[0] < 0) == (edge.stable == "below"), edge
+            assert (sides[1] < 0) == (edge.stable == "above"), edge
+
+
+def test_verdict_on_the_reed_is_checked():
+    found = ss.analyze(reed())
+    assert found.stable is False
+    assert all(one.passed for one in found.checks), found.checks
+    assert {"steady sliding", "eigenvalues", "growing roots"} <= {one.what for one in found.checks}
+    assert found.mode.amplitudes.keys() == {"reed.tip", "reed.tip.normal"}
+    edges = {one.parameter: one.edge for one in found.margins}
+    assert edges["contacts.tip.contact.steady_normal_stress"].value == pytest.approx(355.529682, rel=1e-9)
+    assert "becomes stable" in str(found)
+
+
+# --- limits that are known machines -----------------------------------------------------------------
+
+
+def held_structure(mass, damping, stiffness, contacts, speed=0.05):
+    size = len(mass)
+    data = StructureData(mass, damping, stiffness, np.zeros((size, size)))
+    points = {f"p{i}": StructurePoint(x=i + 1) for i in range(size)}
+    surfaces = {
+        f"c{i}": Surface(body="drive", against=f"s.p{i}", friction=ROCK, contact=one) for i, one in contacts.items()
+    }
+    return Machine(bodies={"s": StructureBody(matrices=data, points=points)}, contacts=surfaces,
+                   drive=Pull(velocity=speed))  # fmt: skip
+
+
+def test_one_mode_is_the_slider():
+    contact = ss.laws.ConstantNormalStress(preload=100.0)
+    machine = held_structure([[0.7]], [[3.0]], [[4e4]], {0: contact})
+    slider = ss.Slider(friction=ROCK, contact=contact, stiffness=4e4, mass=0.7, damping=3.0,
+                       drive=ss.machine.SteadyDrive(0.05))  # fmt: skip
+    np.testing.assert_allclose(ss.eigenvalues(machine), ss.eigenvalues(slider), rtol=1e-12)
+    for name in ("friction.a", "friction.b", "preload"):
+        own, other = (tuple(edge.value for edge in ss.boundary(one, name)) for one in (machine, slider))
+        np.testing.assert_allclose(own, other, rtol=1e-9)
+
+
+def test_two_masses_are_the_machine():
+    """A row of two bodies on the drive as surface, once as bodies and links and once as matrices."""
+    load = {0: ss.laws.ConstantNormalStress(preload=90.0), 1: ss.laws.ConstantNormalStress(preload=40.0)}
+    stiffness, damping = np.array([[5e4, -2e4], [-2e4, 3e4]]), np.array([[4.0, -1.0], [-1.0, 2.5]])
+    machine = held_structure(np.diag([0.7, 0.3]), damping, stiffness, load)
+    bodies = {"p0": SlidingBody(mass=0.7), "p1": SlidingBody(mass=0.3)}
+    links = {"a": Spring(between=("ground", "p0"), stiffness=3e4, damping=3.0),
+             "b": Spring(between=("p0", "p1"), stiffness=2e4, damping=1.0),
+             "c": Spring(between=("ground", "p1"), stiffness=1e4, damping=1.5)}  # fmt: skip
+    contacts = {f"c{i}": Surface(body="drive", against=f"p{i}", friction=ROCK, contact=one) for i, one in load.items()}
+    row = Machine(bodies=bodies, links=links, contacts=contacts, drive=Pull(velocity=0.05))
+    np.testing.assert_allclose(ss.eigenvalues(machine), ss.eigenvalues(row), rtol=1e-12)
+    own, other = (ss.steady_state(one).contacts["c1"] for one in (machine, row))
+    assert own.friction_force == pytest.approx(other.friction_force, rel=1e-13)
+    edge, same = (ss.boundary(one, "c0.friction.b")[0] for one in (machine, row))
+    assert edge.value == pytest.approx(same.value, rel=1e-9)
+
+
+def test_a_free_structure_moves_with_what_pulls_it():
+    """Two masses and a spring between them, pulled by a link from the drive over the ground: a chain of bodies."""
+    load = ss.laws.ConstantNormalStress(preload=90.0)
+    pull = Spring(between=("drive", "s.p0"), stiffness=3e4, damping=2.0)
+    data = StructureData(np.diag([0.7, 0.3]), np.zeros((2, 2)), 2e4 * np.array([[1, -1], [-1, 1]]), np.zeros((2, 2)))
+    body = StructureBody(matrices=data, points={"p0": StructurePoint(x=1), "p1": StructurePoint(x=2)})
+    surface = Surface(body="s.p1", friction=ROCK, contact=load)
+    machine = Machine(bodies={"s": body}, links={"pull": pull}, contacts={"c": surface}, drive=Pull(velocity=0.05))
+    assert ss.steady_state(machine).speeds == pytest.approx({"s.p0": 0.05, "s.p1": 0.05})
+    bodies = {"p0": SlidingBody(mass=0.7), "p1": SlidingBody(mass=0.3)}
+    links = {"pull": Spring(between=("drive", "p0"), stiffness=3e4, damping=2.0),
+             "b": Spring(between=("p0", "p1"), stiffness=2e4)}  # fmt: skip
+    chain = Machine(bodies=bodies, links=links, contacts={"c": Surface(body="p1", friction=ROCK, contact=load)},
+                    drive=Pull(velocity=0.05))  # fmt: skip
+    np.testing.assert_allclose(ss.eigenvalues(machine), ss.eigenvalues(chain), rtol=1e-11)
+
+
+def test_a_pressed_structure_is_the_planar_body():
+    """Steady normal force from the balance of forces: a mass on two springs, pressed on the surface."""
+    along, across = 4e4, 2e5
+    data = StructureData(0.7 * np.eye(2), np.diag([3.0, 5.0]), np.diag([along, across]), np.zeros((2, 2)))
+    body = StructureBody(matrices=data, points={"p": StructurePoint(x=1, y=2, press=120.0)})
+    contact = ss.laws.Compliant(normal_stiffness=6e5, normal_damping=20.0)
+    machine, plane = (
+        Machine(bodies={"s": one}, links=links, drive=Pull(velocity=0.05),
+                contacts={"c": Surface(body="drive", against=end, friction=ROCK, contact=contact)})
+        for one, links, end in (
+            (body, {}, "s.p"),
+            (PlanarBody(mass=0.7, press=120.0),
+             {"x": Spring(between=("ground", "s"), stiffness=along, damping=3.0),
+              "y": Spring(between=("ground", "s"), stiffness=across, damping=5.0, direction="normal")}, "s"),
+        )
+    )  # fmt: skip
+    own, other = (ss.steady_state(one).contacts["c"].normal_force for one in (machine, plane))
+    assert own == pytest.approx(120.0 * 6e5 / 8e5, rel=1e-12)
+    assert own == pytest.approx(other, rel=1e-12)
+    np.testing.assert_allclose(ss.eigenvalues(machine), ss.eigenvalues(plane), rtol=1e-11)
+
+
+# --- equations by hand ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_structures_have_the_roots_of_equations_typed_by_hand(seed):
+    chance = np.random.default_rng(seed)
+    alike, growing, apart = compared(*random_structure(chance, int(chance.integers(20, 40)), 1 + seed))
+    assert alike
+    assert growing[0] == growing[1]
+    assert apart < 1e-9
+
+
+@pytest.mark.campaign
+def test_random_structures_of_up_to_200_degrees_of_freedom():
+    chance = np.random.default_rng(36)
+    for contacts in (1, 2, 3):
+        alike, growing, apart = compared(*random_structure(chance, 200, contacts))
+        assert (alike, growing[0]) == (True, growing[1])
+        assert apart < 1e-9
+
+
+@pytest.mark.parametrize(("modes", "root", "rate"), [(3, 4.1e-6, 4e-4), (5, 5.1e-7, 5e-5)])
+def test_reduction_of_the_reed_is_off_by_what_theory_says(modes, root, rate):
+    mass, damping, stiffness = reed_matrices()
+    small, error = reduced(StructureData(mass, damping, stiffness, 0 * mass), (58, 59), modes)
+    tip = StructurePoint(x=1, y=2, angle=np.radians(60))
+    own, right = (ss.eigenvalues(one)[0] for one in (
+        reed(body=StructureBody(matrices=small, points={"tip": tip})), reed()))  # fmt: skip
+    assert abs(own - right) == pytest.approx(root * abs(right), rel=0.05)
+    assert abs(own.real / right.real - 1) == pytest.approx(rate, rel=0.05)
+    assert 0 < error < 1e-2
+
+
+# --- files ------------------------------------------------------------------------------------------
+
+FILE = """
+[bodies.reed]
+kind = "structure"
+{key} = "{name}"
+[bodies.reed.points.tip]
+{place}
+angle = "60 deg"
+[contacts.tip]
+body = "drive"
+against = "reed.tip"
+[contacts.tip.friction]
+law = "rate-state"
+a = 0.010
+b = 0.016
+d_c = "20 um"
+mu_ref = 0.45
+v_ref = "50 mm/s"
+[contacts.tip.friction.normal_memory]
+law = "linker-dieterich"
+alpha = 0.3
+[contacts.tip.contact]
+law = "compliant"
+normal_stiffness = "5 MN/m"
+steady_normal_stress = "100 N"
+[drive]
+control = "steady"
+velocity = "50 mm/s"
+"""
+PLACE = "x = 58\ny = 59"
+
+
+def written(folder, name, place=PLACE, key="matrices"):
+    path = folder / "machine.toml"
+    path.write_text(FILE.format(name=name, place=place, key=key), encoding="utf-8")
+    return path
+
+
+def test_matrices_are_read_from_numpy_matlab_and_matrix_market(tmp_path):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    io.savemat(tmp_path / "reed.mat", {"M": mass, "C": damping, "K": stiffness})
+    for letter, one in (("M", mass), ("C", damping), ("K", stiffness)):
+        io.mmwrite(tmp_path / f"reed-{letter}.mtx", one, precision=17)
+    right = ss.eigenvalues(reed())
+    for name in ("reed.npz", "reed.mat", "reed-*.mtx"):
+        machine = ss.read_rig(written(tmp_path, name))
+        np.testing.assert_allclose(ss.eigenvalues(machine), right, rtol=1e-9)
+        again = ss.rig_to_text(machine)
+        assert f'matrices = "{name}"' in again
+
+
+def test_modes_are_read_from_a_table(tmp_path):
+    """All modes of the reed are the reed; with damping 1 + 2e-6 K as ratios of them."""
+    mass, _, stiffness = reed_matrices()
+    squares, shapes = eigh(stiffness, mass)
+    omega = np.sqrt(squares)
+    rows = np.column_stack([omega / (2 * np.pi), (2e-6 * omega + 1 / omega) / 2, shapes[-3], shapes[-2]])
+    np.savetxt(tmp_path / "reed.csv", rows, delimiter=",", header="frequency,damping,tip.x,tip.y", comments="",
+               fmt="%.17g")  # fmt: skip
+    machine = ss.read_rig(written(tmp_path, "reed.csv", "", "modes"))
+    assert abs(ss.eigenvalues(machine)[0] - (12.4673358145 + 4565.039870161j)) < 1e-9 * 4565
+
+
+@pytest.mark.parametrize(("name", "content", "said"), [
+    ("missing.npz", None, "no such file"), ("reed.txt", b"1", "allowed: .npz, .mat, .mtx"),
+    ("reed.npz", b"nonsense", "numpy.savez"), ("reed.mat", b"nonsense" * 40, "MATLAB"),
+    ("reed-*.mtx", b"nonsense", "Matrix Market"), ("reed.mtx", b"", "one file holds one matrix"),
+])  # fmt: skip
+def test_files_that_hold_no_matrices_are_refused(tmp_path, name, content, said):
+    if content is not None:
+        (tmp_path / name.replace("*", "M")).write_bytes(content)
+    with pytest.raises(ss.RigFileError, match=said) as error:
+        ss.read_rig(written(tmp_path, name))
+    assert "bodies.reed.matrices" in str(error.value)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda m, c, k: (m - 2 * np.diag(np.diag(m)), c, k), "not positive definite"),
+    (lambda m, c, k: (m, c, k[:-1, :-1]), "has shape"),
+    (lambda m, c, k: (m, c * np.nan, k), "no finite numbers"),
+    (lambda m, c, k: (m + np.triu(m), c, k), "not symmetric"),
+])  # fmt: skip
+def test_matrices_that_make_no_structure_are_refused(change, said):
+    mass, damping, stiffness = change(*reed_matrices())
+    with pytest.raises(ValueError, match=said):
+        StructureData(mass, damping, stiffness, np.zeros_like(mass))
+
+
+@pytest.mark.parametrize(("place", "said"), [
+    ("x = 61", "allowed: 1 to 60"), ("x = 0", "got 0"), ("", "give the degree of freedom"), ("z = 3", "unknown"),
+])  # fmt: skip
+def test_points_that_do_not_exist_are_refused(tmp_path, place, said):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    with pytest.raises(ss.RigFileError, match=said):
+        ss.read_rig(written(tmp_path, "reed.npz", place))
+
+
+def test_contacts_at_points_that_do_not_exist_are_refused(tmp_path):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    path = written(tmp_path, "reed.npz")
+    path.write_text(path.read_text().replace('against = "reed.tip"', 'against = "reed.top"'))
+    with pytest.raises(ss.RigFileError, match="tip"):
+        ss.read_rig(path)
+
+
+def test_what_needs_formulas_says_that_it_is_not_offered():
+    for call in (
+        lambda: ss.simulate(reed(), until=1.0),
+        lambda: ss.state_space(reed()),
+        lambda: ss.hopf(reed(), along="friction.a"),
+    ):
+        with pytest.raises(ss.NotAvailable, match="structure"):
+            call()

@@ -79,7 +79,12 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
         try:
             one.role.checked(end)
         except ParameterError as error:
-            raise ParameterError([Problem("", f"a tolerance too wide: {error.problems[0].message}")]) from error
+            width = tolerance.below if end == low else tolerance.above
+            share = f"{width.partition(' ')[0]} %"
+            hint = (
+                "" if width.endswith("%") else f"; it was read as {width!r}: for a share of the value write '± {share}'"
+            )
+            raise ParameterError([Problem("", f"a tolerance too wide: {error.problems[0].message}{hint}")]) from error
     return low, high
 
 

@@ -18,6 +18,9 @@ MOST_INTEGER = 2**63
 _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
 
+_COMMA = re.compile(r"^[^#\"'\n=]+=[ \t]*+([-+]?\d++),(\d++)[ \t]*+(?:#.*)?$", re.MULTILINE)
+"""A line that gives one number with a decimal comma, with its digits before and behind."""
+
 _TOO_LARGE = "it has an integer that does not fit into 64 bits; write such a number with a decimal point or exponent"
 
 
@@ -40,7 +43,10 @@ def tables_of(text: str) -> Table:
     except RecursionError:
         raise NotToml("lists or tables lie too deep in each other") from None
     except ValueError as error:  # Python's own error for integers of thousands of digits is no TOMLDecodeError
-        raise NotToml(str(error) if isinstance(error, tomllib.TOMLDecodeError) else _TOO_LARGE) from error
+        why = str(error) if isinstance(error, tomllib.TOMLDecodeError) else _TOO_LARGE
+        comma = _COMMA.search(text)
+        hint = f"; {comma[1]},{comma[2]} has a decimal comma: write {comma[1]}.{comma[2]}" if comma else ""
+        raise NotToml(f"{why}{hint}") from error
     _check(tables)
     return tables
 

@@ -11,7 +11,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
-from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_changes
+from steadyslip.experiments.fitting.input_tables import MeasuredInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.kernels.experiment import ExperimentProgram
 from steadyslip.kernels.runner import Runner

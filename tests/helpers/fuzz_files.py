@@ -38,7 +38,7 @@ from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.experiments.numerics.pooling import Pooled
 from steadyslip.files.sealed import seal, unseal, write_sealed
 from steadyslip.kernels import build
-from steadyslip.maps.store.layout import _seal
+from steadyslip.maps.store.store_layout import _seal
 from steadyslip.motion.store import RUN
 
 SECONDS, BYTES = 10, 2 * 2**30

@@ -27,6 +27,14 @@ def test_a_class_has_its_name_to_itself():
     assert not twice
 
 
+def test_no_three_folders_have_a_file_of_the_same_name():
+    """`commands.py` stood in five folders, so that a file's name did not say what is in it."""
+    folders = defaultdict(list)
+    for path in trees():
+        folders[path.name].append(str(path.parent))
+    assert {name: own for name, own in folders.items() if len(own) > 2 and name != "__init__.py"} == {}
+
+
 KNOWS_LAWS = ("laws", "machine", "testing", "reproduce")
 """Folders that may name a law; and the figure of the paper that is about one."""
 OF_THE_PAPER = {Path("figures/mass.py"), Path("figures/critical.py"), Path("linear/paper.py")}

@@ -13,7 +13,7 @@ from steadyslip.core.errors import ParameterError
 from steadyslip.core.format import display_units, format_quantity, format_range
 from steadyslip.model.point import operating_point
 from steadyslip.motion.status import remedy
-from steadyslip.nonlinear import commands
+from steadyslip.nonlinear import cycle_commands as commands
 from steadyslip.nonlinear.kicks.kicks import OF_MACHINES
 from steadyslip.nonlinear.kicks.threshold import Threshold
 from steadyslip.verdict.words import threshold_words

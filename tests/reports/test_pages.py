@@ -21,7 +21,7 @@ from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.files.standalone import write_page
 from steadyslip.motion.commands import write_history
-from steadyslip.nonlinear.commands import Thresholds
+from steadyslip.nonlinear.cycle_commands import Thresholds
 from steadyslip.reports.brief import _HIDDEN, DIMENSIONLESS, RESULT_UNIT, UNITS, brief, result_html, unit_of
 from steadyslip.reports.results import MAX_ROWS, _distinct_rows, protocol_table
 from steadyslip.reports.rig import input_table

@@ -10,7 +10,7 @@ import steadyslip as ss
 from command import run
 from dimensionless import unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
-from steadyslip.files.specifications.tolerances import rig_and_tolerances
+from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.verdict import Adjustment
 from toleranced import AXIS
 

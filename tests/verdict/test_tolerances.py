@@ -13,7 +13,7 @@ from command import run
 from machines import leading, same_block, two_mass
 from rigs_of_theory import SIGMA, rate_state, rig
 from steadyslip.core.tolerances import Tolerance
-from steadyslip.files.specifications.tolerances import rig_and_tolerances
+from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.verdict import Tolerances
 from steadyslip.verdict.spreads import GROUPS, spreads_of
 from toleranced import AXIS

@@ -305,7 +305,7 @@ def test_an_interrupted_run_is_what_there_is(times, tmp_path):
 
 
 def test_interrupted_thresholds_keep_those_found(monkeypatch, tmp_path):
-    from steadyslip.nonlinear import commands
+    from steadyslip.nonlinear import cycle_commands as commands
 
     def threshold(rig, kick, **options):
         if kick == "displacement":

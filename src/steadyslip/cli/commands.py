@@ -79,7 +79,7 @@ def analyze(
     fitted: Fitted = None,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
-    from steadyslip.files.specifications.tolerances import rig_and_tolerances
+    from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
     from steadyslip.files.specifications.unknowns import intervals_of
     from steadyslip.verdict import analyze as run, stable_within, tolerate
 
@@ -162,7 +162,7 @@ def cure(
 ) -> None:
     """What to change so that it slides stably with a chance, what that costs, and what would make it fail first."""
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications.tolerances import rig_and_tolerances
+    from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
     from steadyslip.files.standalone import write_page
     from steadyslip.verdict import cure as run
 
@@ -222,7 +222,7 @@ def fit(
         return
     from steadyslip.core.errors import ParameterError, Problem
     from steadyslip.experiments import bootstrap as resample, fit_files, population_files, step_table
-    from steadyslip.experiments.commands import (
+    from steadyslip.experiments.fit_commands import (
         ENDINGS,
         TABLES,
         as_json as plain,
@@ -291,7 +291,7 @@ def fit(
 
 def _fit_speeds(files: Sequence[Path], law: str, changes: Sequence[str], output: Sequence[Path], as_json: bool) -> None:
     """Fit a law to a table of speeds, and write the rig."""
-    from steadyslip.experiments.commands import SPEED_ENDINGS, write_speeds
+    from steadyslip.experiments.fit_commands import SPEED_ENDINGS, write_speeds
     from steadyslip.experiments.from_speeds import fit_speed_files
     from steadyslip.files.output import check_output
 
@@ -342,7 +342,7 @@ def report(
     """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
     from steadyslip.files.output import check_output
     from steadyslip.files.specifications import named_value
-    from steadyslip.files.specifications.tolerances import rig_and_tolerances
+    from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
     from steadyslip.reports import report as run
 
     if output is not None:
@@ -420,7 +420,7 @@ def cycles(
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.commands import ENDINGS, cycles_of_file, write_branch
+    from steadyslip.nonlinear.cycle_commands import ENDINGS, cycles_of_file, write_branch
 
     check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings)
@@ -451,7 +451,7 @@ def threshold(
 ) -> None:
     """How large a kick does steady sliding survive? Ctrl-C keeps what there is."""
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.commands import KICKED, thresholds_of_file, write_thresholds
+    from steadyslip.nonlinear.cycle_commands import KICKED, thresholds_of_file, write_thresholds
 
     check_output(output or (), KICKED)
     found = thresholds_of_file(rig, changes or (), kick or (), reverse, reference, at)
@@ -489,7 +489,7 @@ def response(
 ) -> None:  # fmt: skip
     """Gain and phase of steady sliding under an input that swings: exact for small amplitudes, simulated for large."""
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.commands import ANSWERED, response_of_file, write_answers
+    from steadyslip.nonlinear.cycle_commands import ANSWERED, response_of_file, write_answers
 
     check_output(files or (), ANSWERED)
     found = response_of_file(rig, changes or (), periods, points, amplitudes or (), swings, answers, on, limits)
@@ -508,7 +508,7 @@ def verdicts(
 ) -> None:
     """Is it stable at every moment of a protocol of slow changes, and when does motion depart?"""
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.commands import ANSWERED, verdicts_of_file, write_answers
+    from steadyslip.nonlinear.cycle_commands import ANSWERED, verdicts_of_file, write_answers
 
     check_output(output or (), ANSWERED)
     found = verdicts_of_file(rig, changes or (), pieces or (), until, rtol)
@@ -537,7 +537,7 @@ def map_(
 ) -> None:
     """Any analysis over many rigs, kept on disk; the same command again goes on after an interruption."""
     from steadyslip.maps import refine as refined
-    from steadyslip.maps.commands import STORE, map_file, write_map
+    from steadyslip.maps.map_commands import STORE, map_file, write_map
 
     figure: dict[str, Any] = {"x": x, "y": y, "show": show, "facet": facet}
     about: dict[str, Any] = {"of": of, "level": level}
@@ -575,7 +575,7 @@ def sensitivity(
 ) -> None:
     """Which parameters decide? Sobol indices over the ranges of the file's [map]."""
     from steadyslip.files.output import check_output
-    from steadyslip.maps.commands import SHARES, sensitivity_file, write_sensitivity
+    from steadyslip.maps.map_commands import SHARES, sensitivity_file, write_sensitivity
 
     check_output(output or (), SHARES)
     found = sensitivity_file(rig, changes or (), of or (), points)

@@ -28,7 +28,7 @@ from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 from steadyslip.figures.style import journal, save_with_footer
-from steadyslip.figures.tolerances import tolerances
+from steadyslip.figures.tolerance_bars import tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History

@@ -28,7 +28,7 @@ from steadyslip.core.palette import (
 )
 from steadyslip.figures.style import add_legend_above, axis_label, display_unit, parameter_label
 from steadyslip.maps.view.cut import FAILING, View
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 
 Array = np.ndarray
 LOG_RATIO = 100.0  # highest over lowest value from which on a scale is logarithmic: two decades

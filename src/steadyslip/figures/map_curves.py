@@ -21,7 +21,7 @@ from steadyslip.figures.style import AREAS, OUT_OF_RANGE, axis_label
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import without_number
 from steadyslip.maps.view.cut import View, own_value
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 
 Array = np.ndarray
 

@@ -37,7 +37,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
 Array = np.ndarray

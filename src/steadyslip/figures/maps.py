@@ -16,7 +16,7 @@ from steadyslip.figures.map_curves import draw_curve, draw_scatter
 from steadyslip.figures.map_plane import colour_scale, draw_plane
 from steadyslip.figures.style import axes_or_new
 from steadyslip.maps.view.cut import View, axes_of, take
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 
 MAX_FACETS = 6  # panels of one figure: two rows of three
 

@@ -14,7 +14,7 @@ from steadyslip.maps.plan.map_file import map_from_text, read_map
 from steadyslip.maps.plan.measures import Events, KickThreshold, Measure, measure
 from steadyslip.maps.refine import Refined, refine
 from steadyslip.maps.sensitivity import Sensitivity, sensitivity
-from steadyslip.maps.view.result import MapResult, open_map
+from steadyslip.maps.view.map_result import MapResult, open_map
 from steadyslip.maps.work.run import run_map
 
 __all__ = [

@@ -29,7 +29,7 @@ from steadyslip.files.specifications.layout import find_law
 from steadyslip.maps.plan.axes import SAMPLE
 from steadyslip.maps.plan.map import AnyMeasure, Map
 from steadyslip.maps.plan.measures import Measure
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 from steadyslip.maps.work.run import run_map
 
 Array = np.ndarray

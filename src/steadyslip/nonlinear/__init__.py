@@ -15,8 +15,8 @@ How a cycle is found, and gets its period (`cycles`, one file per step):
    stability (Floquet multipliers), into a `Cycle` (`orbits/cycle.py`).
 
 Besides in `orbits/`: `special.py` locates bifurcations, `end_reasons.py` decides where a piece ends, `cut_segments.py`
-divides unstable cycles, `search.py` and `cycle_from_motion.py` find cycles by simulation, `at_value.py` computes those
-at one value of the parameter, `ranges.py` the stable ranges; `branch.py` is the result.
+divides unstable cycles, `cycle_search.py` and `cycle_from_motion.py` find cycles by simulation, `at_value.py` computes
+those at one value of the parameter, `ranges.py` the stable ranges; `branch.py` is the result.
 
 How the smallest kick not survived is found (`threshold`): `kicks/threshold.py` searches over sizes, `kicks/kicks.py`
 makes a motion of each, `kicks/settled.py` solves for the steady sliding it may return to, `kicks/outcomes.py` decides

@@ -26,9 +26,9 @@ from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
 from steadyslip.motion.events import ContactSlip
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
-from steadyslip.nonlinear.commands import Thresholds
+from steadyslip.nonlinear.cycle_commands import Thresholds
 from steadyslip.protocol import Protocol
-from steadyslip.reports import machine as machine_report, rig as rig_report
+from steadyslip.reports import machine_parts as machine_report, rig as rig_report
 from steadyslip.reports.brief import result_html, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table

@@ -1,6 +1,6 @@
 """Figures and numbers of Dupont & Bapna (1994), recomputed with this package.
 
-`rig.py` has the rig of the paper, `drawings.py` its figures (list `FIGURES`), `numbers.py` its numbers beside ours.
+`drawings.py` has the rig and the figures of the paper (list `FIGURES`), `paper_numbers.py` its numbers beside ours.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.progress import progress_bar
 from steadyslip.figures import style
 from steadyslip.reproduce.drawings import D_C, FIGURES, V0, PaperFigure, paper_rig
-from steadyslip.reproduce.numbers import PaperNumber, PaperTable, paper_table
+from steadyslip.reproduce.paper_numbers import PaperNumber, PaperTable, paper_table
 
 __all__ = [
     "D_C",

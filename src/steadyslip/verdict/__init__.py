@@ -3,7 +3,7 @@
 Knows no maps, figures or documents.
 """
 
-from steadyslip.files.specifications.tolerances import Adjustment, Tolerances, read_tolerances
+from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances, read_tolerances
 from steadyslip.verdict.analyze import Analysis, analyze
 from steadyslip.verdict.compare import Difference, RigComparison, compare_rigs
 from steadyslip.verdict.cures import Cures, Window, cure

@@ -174,7 +174,7 @@ def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | N
 def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold, ...]:
     if not kinds:
         return ()
-    from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
+    from steadyslip.nonlinear.cycle_commands import thresholds_shown  # compiles; only where asked for
 
     return thresholds_shown(rig, kinds, branch=branch).found
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array, valid_together
-from steadyslip.files.specifications.tolerances import Tolerances
+from steadyslip.files.specifications.tolerance_tables import Tolerances
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import STABLE, status
 from steadyslip.machine.machine import Machine

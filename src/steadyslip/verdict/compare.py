@@ -17,7 +17,7 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.records import FrozenRecord
-from steadyslip.files.specifications.tolerances import Tolerances, rig_and_tolerances
+from steadyslip.files.specifications.tolerance_tables import Tolerances, rig_and_tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.analyze import analyze

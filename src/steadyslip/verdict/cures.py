@@ -16,7 +16,7 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
-from steadyslip.files.specifications.tolerances import Adjustment, Tolerances
+from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
 from steadyslip.linear.boundary import boundary, margins
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

@@ -197,7 +197,7 @@ def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
     """Thresholds of kicks given as text such as ``force at table``."""
     if not kinds:
         return ()
-    from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
+    from steadyslip.nonlinear.cycle_commands import thresholds_shown  # compiles; only where asked for
     from steadyslip.nonlinear.kicks.kicks import kick_problems
 
     asked = [(kick.strip(), at.strip() or None) for kick, _, at in (words.partition(" at ") for words in kinds)]

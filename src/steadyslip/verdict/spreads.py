@@ -18,7 +18,7 @@ from steadyslip.core.records import Address
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance, read_tolerance
 from steadyslip.files.specifications.deviations import ends_of
-from steadyslip.files.specifications.tolerances import Tolerances
+from steadyslip.files.specifications.tolerance_tables import Tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 

@@ -15,7 +15,7 @@ from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.files.specifications.tolerances import Tolerances
+from steadyslip.files.specifications.tolerance_tables import Tolerances
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
@@ -198,7 +198,7 @@ class Tolerated(ReadOnly):
         return self.rig.area_of(self.along) if self.along else None
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the safety factor or growth rate over each tolerance; see `steadyslip.figures.tolerances`."""
+        """Draw the safety factor or growth rate over each tolerance; see `steadyslip.figures.tolerance_bars`."""
         return draw(self, ax=ax)
 
 

@@ -14,9 +14,9 @@ from steadyslip.nonlinear.continuation import turned_round
 from steadyslip.nonlinear.orbits import at_value, tracer
 from steadyslip.nonlinear.orbits.at_value import tracer_of
 from steadyslip.nonlinear.orbits.cycle import End
+from steadyslip.nonlinear.orbits.cycle_search import seed_at
 from steadyslip.nonlinear.orbits.follow import _branch, _go_on, doubled_pieces
 from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
-from steadyslip.nonlinear.orbits.search import seed_at
 from steadyslip.nonlinear.orbits.tracer import orbit_of
 
 

@@ -53,7 +53,7 @@ def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(EndRules, "finished", broken)
-        patched.setattr(sys.modules["steadyslip.nonlinear.orbits.search"], "cycle_near", stop)
+        patched.setattr(sys.modules["steadyslip.nonlinear.orbits.cycle_search"], "cycle_near", stop)
         partial = ss.cycles(damped.rig, between=between)
     assert (len(partial) > 3, partial.end, partial.gaps) == (True, "interrupted by the user", ())
 
@@ -78,7 +78,7 @@ def test_no_small_cycle_at_the_edge_is_no_traceback(damped, monkeypatch):
     branch = ss.cycles(damped.rig, between=(0.4 * damped.onset.value, 1.1 * damped.onset.value))
     (cycle,), (same,) = branch.at(0.5 * damped.onset.value), damped.at(0.5 * damped.onset.value)
     assert cycle.period == pytest.approx(same.period, rel=1e-9)
-    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.orbits.search"], "cycle_near", lambda *_: None)
+    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.orbits.cycle_search"], "cycle_near", lambda *_: None)
     nothing = ss.cycles(damped.rig)
     assert (len(nothing), nothing.at(damped.onset.value)) == (0, ())
     assert "no small cycle was found" in nothing.end

@@ -14,7 +14,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.forward import Forward, InputTable
-from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp
+from steadyslip.experiments.fitting.input_tables import MeasuredInputs, ProtocolInputs, Sharp
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record

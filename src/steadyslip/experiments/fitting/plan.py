@@ -24,7 +24,7 @@ from steadyslip.experiments.fitting.comparison import (
 )
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
-from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
+from steadyslip.experiments.fitting.input_tables import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
 from steadyslip.experiments.loading.loading import Loading, resting_rate

@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, Unknow
 from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.records import Address, parameters
-from steadyslip.experiments.fitting.inputs import MIN_RATE_STEP
+from steadyslip.experiments.fitting.input_tables import MIN_RATE_STEP
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import FitSettings, faults
 from steadyslip.experiments.loading.loading import Loading, resting_rate

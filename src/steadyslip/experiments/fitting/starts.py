@@ -19,7 +19,7 @@ from steadyslip.core.questions import question
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs, time_windows
 from steadyslip.experiments.fitting.comparison import RecordPart
-from steadyslip.experiments.fitting.inputs import ProtocolInputs
+from steadyslip.experiments.fitting.input_tables import ProtocolInputs
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.loading.loading import resting_rate

@@ -8,7 +8,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, WORDS, status, without_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.maps.view.cut import View
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
 ASKED = 12  # points analysed for an explanation, evenly chosen; chosen by trial

@@ -22,7 +22,7 @@ from steadyslip.core.quantities import parse
 from steadyslip.core.results import ReadOnly
 from steadyslip.linear.status import STABLE
 from steadyslip.maps.plan.axes import SAMPLE
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.view.map_result import MapResult
 
 Array = np.ndarray
 MOST = 500  # points along an axis: more than a figure resolves

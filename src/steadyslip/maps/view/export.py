@@ -13,7 +13,7 @@ from xarray.core import indexing
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.files.output import whole_file
-from steadyslip.maps.store.arrays import Store
+from steadyslip.maps.store.map_store import Store
 
 Read = Callable[..., np.ndarray]
 """Function that reads an array of a store, or a region of it, by name."""

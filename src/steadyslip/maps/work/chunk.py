@@ -20,7 +20,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Generated
 from steadyslip.maps.plan.map import AnyMeasure, Map, evaluate
-from steadyslip.maps.store.arrays import Store, cannot_write
+from steadyslip.maps.store.map_store import Store, cannot_write
 from steadyslip.protocol import Protocol
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.maps.store.arrays import Store
+from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
 LOCAL = "local"

@@ -14,9 +14,9 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.maps.plan.map import Map
-from steadyslip.maps.store.arrays import Store, cannot_write, check_path, open_or_create
-from steadyslip.maps.store.layout import versions
-from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.store.map_store import Store, cannot_write, check_path, open_or_create
+from steadyslip.maps.store.store_layout import versions
+from steadyslip.maps.view.map_result import MapResult
 from steadyslip.maps.work.chunk import Done, job_of
 from steadyslip.maps.work.cluster import run_cluster
 from steadyslip.maps.work.local import run_here, run_local

@@ -22,10 +22,10 @@ from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
+from steadyslip.nonlinear.orbits.cycle_search import cut_back, met, search_on
 from steadyslip.nonlinear.orbits.end_reasons import ENDS
 from steadyslip.nonlinear.orbits.flow import Flow
 from steadyslip.nonlinear.orbits.ranges import is_open, is_undecided
-from steadyslip.nonlinear.orbits.search import cut_back, met, search_on
 from steadyslip.nonlinear.orbits.special import MET, SMALL, log_features
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, BranchPiece, Tracer, orbit_of
 

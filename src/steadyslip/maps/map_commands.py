@@ -16,8 +16,8 @@ from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.map_file import read_map
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import POINTS, Sensitivity, default_results, sensitivity
-from steadyslip.maps.store.arrays import check_path
-from steadyslip.maps.view.result import MapResult, open_map
+from steadyslip.maps.store.map_store import check_path
+from steadyslip.maps.view.map_result import MapResult, open_map
 from steadyslip.maps.work.run import run_map
 
 STORE = ".zarr"

@@ -30,7 +30,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE
 from steadyslip.maps.plan.map import Map, differences
-from steadyslip.maps.store.layout import coordinates, lay_out, read_layout
+from steadyslip.maps.store.store_layout import coordinates, lay_out, read_layout
 
 _CHECKSUM_OFFSET = 1 << 32  # added to every checksum, so that none is zero, the fill value
 _MARK = 8  # bytes of a mark

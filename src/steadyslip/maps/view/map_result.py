@@ -18,7 +18,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.store.arrays import Store
+from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.view import export
 
 BLOCK = 2**22  # values read at a time: 32 MiB

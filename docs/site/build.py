@@ -24,18 +24,18 @@ ROOT = HERE.parents[1]
 PROJECT = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CODE_OF_CONDUCT.md", "LICENSE", "CITATION.cff")
 """Files of the checkout's top that pages lead to; they are pages of the folder `project`."""
 CONTENTS = {
-    "Start": "start/*",
-    "Tutorial": "tutorial/*",
-    "How to": "how-to/*",
-    "Notebooks": "notebooks/*",
-    "Explanation": "explanation/*",
-    "Reference": "reference/*",
-    "Python": "api/*",
-    "Gallery": "gallery/*",
-    "Data": "examples/data/*",
-    "Project": "project/*",
+    "start": "Start",
+    "tutorial": "Tutorial",
+    "how-to": "How to",
+    "notebooks": "Notebooks",
+    "explanation": "Explanation",
+    "reference": "Reference",
+    "api": "Python",
+    "gallery": "Gallery",
+    "project": "Project",
+    "examples/data": "Data",
 }
-"""Parts of the site by title, in the order of its navigation."""
+"""Titles of the site's folders, in the order of its navigation."""
 SOUGHT = dict.fromkeys(("hunting", "judder", "squeal", "stick-slip", "slow slip"), "start/data-sheet")
 """Pages that the search must find for words of users."""
 API_HEAD = """Every example begins with `import steadyslip as ss`, in a folder beside the examples, where
@@ -151,13 +151,16 @@ def write_gallery(source: Path, extra: Path, quick: bool) -> None:
 
 
 def write_contents(source: Path) -> None:
-    """Put the navigation behind the index, one list of pages for each part."""
-    lines = [(source / "index.md").read_text(encoding="utf-8")]
-    for title, pattern in CONTENTS.items():
-        pages = sorted(path.relative_to(source).with_suffix("").as_posix() for path in source.glob(f"{pattern}.md"))
+    """Put a list of its pages into each folder, and the navigation through the folders behind the index."""
+    listed = []
+    for folder, title in CONTENTS.items():
+        pages = sorted(page.stem for page in (source / folder).glob("*.md"))
         if pages:
-            lines += ["```{toctree}", ":hidden:", f":caption: {title}", "", *pages, "```", ""]
-    (source / "index.md").write_text("\n".join(lines), encoding="utf-8")
+            text = "\n".join([f"# {title}", "", "```{toctree}", *pages, "```", ""])
+            (source / folder / "index.md").write_text(text, encoding="utf-8")
+            listed.append(f"{folder}/index")
+    with open(source / "index.md", "a", encoding="utf-8") as index:
+        index.write("\n".join(["", "```{toctree}", ":hidden:", "", *listed, "```", ""]))
 
 
 def not_found(site: Path, sought: dict[str, str]) -> list[str]:

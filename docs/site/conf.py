@@ -22,6 +22,7 @@ html_show_sphinx = False
 html_extra_path = ["../extra"]
 html_theme_options = {
     "show_prev_next": False,
+    "header_links_before_dropdown": 9,
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],

@@ -36,6 +36,11 @@ def test_it_has_every_public_name(build, tmp_path):
 def test_every_page_is_in_its_contents(build, tmp_path):
     for step in ("copy_sources", "write_api", "write_contents"):
         build[step](tmp_path)
-    listed = set(re.findall(r"(?m)^[\w./-]+$", (tmp_path / "index.md").read_text(encoding="utf-8")))
+    listed = {"index"}
+    for index in (tmp_path / "index.md", *tmp_path.rglob("*/index.md")):
+        pages = re.search(r"(?s)```\{toctree\}\n(?::hidden:\n\n)?(.*?)```", index.read_text(encoding="utf-8"))[
+            1
+        ].split()
+        listed |= {(index.parent / page).relative_to(tmp_path).as_posix() for page in pages}
     made = {page.relative_to(tmp_path).with_suffix("").as_posix() for page in tmp_path.rglob("*.md")}
-    assert made - listed == {"index"}
+    assert made == listed

@@ -18,9 +18,9 @@ from steadyslip.linear.roots import Array
 from steadyslip.linear.search import Boundary, natural_size
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.machine.machine import Machine
-from steadyslip.model.numeric.change import Change, Turns, change_between, rank_one, real_crossings
+from steadyslip.model.numeric.change import LowRankChange, Turns, change_between, rank_one, real_crossings
 from steadyslip.model.numeric.machine_point import MachinePoint, absence, machine_point
-from steadyslip.model.numeric.pencil import Pencil
+from steadyslip.model.numeric.pencil import StatePencil
 
 _SHARE = 4  # samples are fewer than those of a small machine by this factor: 10 per decade
 _HALVINGS = 26  # of a bracket by counting, from a tenth of a decade to 1e-9; then Newton's method
@@ -40,7 +40,7 @@ class MatrixSearch:
         address = machine.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
         self.own = machine_point(machine)
-        self.known: dict[float, tuple[int, Pencil | None]] = {}
+        self.known: dict[float, tuple[int, StatePencil | None]] = {}
 
     takes_long = False
     """As of `Search`: no parameter is left out."""
@@ -73,7 +73,7 @@ class MatrixSearch:
 
     # -- the machine along the parameter
 
-    def _at(self, value: float) -> tuple[bool, Pencil | None]:
+    def _at(self, value: float) -> tuple[bool, StatePencil | None]:
         """True with steady sliding, and the pencil there; without one where conditions of laws are broken."""
         point = self.own if value == self.value else self.own.varied(self.name, value)
         try:
@@ -86,14 +86,14 @@ class MatrixSearch:
         """Status at a value: ABSENT, STABLE, UNSTABLE."""
         return self._judged(value)[0]
 
-    def _judged(self, value: float) -> tuple[int, Pencil | None]:
+    def _judged(self, value: float) -> tuple[int, StatePencil | None]:
         if value not in self.known:
             exists, pencil = self._at(value)
             found = ABSENT if not exists or pencil is None else STABLE if self.growing(pencil) == 0 else UNSTABLE
             self.known[value] = found, pencil
         return self.known[value]
 
-    def growing(self, pencil: Pencil) -> int:
+    def growing(self, pencil: StatePencil) -> int:
         """Number of growing roots; −1 if ill-posed."""
         if not pencil.posed or not np.all(np.isfinite(pencil.a)):
             return -1
@@ -105,7 +105,7 @@ class MatrixSearch:
         return self.own.growing + more
 
     @cached_property
-    def _probes(self) -> tuple[list[float], list[Pencil]]:
+    def _probes(self) -> tuple[list[float], list[StatePencil]]:
         """Steps from the own value, and pencils there."""
         size = abs(self.value) or self._sizes[0]
         values = [self.value + size * (f - 1) if self.value == 0 else self.value * f for f in _PROBES]
@@ -117,7 +117,7 @@ class MatrixSearch:
         return [step for step, _ in kept], [pencil for _, pencil in kept]
 
     @cached_property
-    def change(self) -> Change | None:
+    def change(self) -> LowRankChange | None:
         """Directions in which the parameter changes the pencil; None if it changes nothing."""
         return change_between(self.own.pencil, self._probes[1])
 
@@ -138,7 +138,7 @@ class MatrixSearch:
             return self._scanned(between) if unit is None else self._linear(self.change, self.turns, unit, between)
 
     def _linear(
-        self, change: Change, turns: Turns, unit: tuple[Array, Array], between: tuple[float, float] | None
+        self, change: LowRankChange, turns: Turns, unit: tuple[Array, Array], between: tuple[float, float] | None
     ) -> tuple[Boundary, ...]:
         """Edges of a parameter that enters by a term of rank one."""
         low, high = self.searched if between is None else between
@@ -226,7 +226,7 @@ class MatrixSearch:
         )
 
 
-def _followed(here: Pencil, there: Pencil, near: complex, step: float) -> tuple[complex, complex]:
+def _followed(here: StatePencil, there: StatePencil, near: complex, step: float) -> tuple[complex, complex]:
     """Eigenvalue of a pencil nearest to a place, and its slope along the parameter (first-order perturbation)."""
     at = near
     e, a = here.e, here.a

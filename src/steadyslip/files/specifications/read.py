@@ -40,7 +40,7 @@ from steadyslip.files.specifications.layout import (
 )
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import NotToml, Table, key_lines, line_of, tables_of
-from steadyslip.files.structures.tables import with_structures
+from steadyslip.files.structures.named_files import with_structures
 from steadyslip.machine.ends import unknown_ends
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine

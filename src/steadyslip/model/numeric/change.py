@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
-from steadyslip.model.numeric.pencil import ComplexArray, Pencil
+from steadyslip.model.numeric.pencil import ComplexArray, StatePencil
 
 _RANK = 1e-12  # size relative to the largest below which a direction of a change is rounding
 _LINEAR = 1e-9  # relative difference of slopes that counts as rounding of assembly and elimination
@@ -28,23 +28,23 @@ _ROUNDS = 24  # of halving between places until the argument is followed
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class LowRankChange:
     """Changes of a pencil in a few directions: s E − A + U (s Be − Ba) Vᵀ.
 
     Attributes
     ----------
-    own : Pencil
+    own : StatePencil
     into, out : ndarray (N, k)
         U, and V.
     """
 
-    own: Pencil
+    own: StatePencil
     into: Array
     out: Array
     rows: Array
     columns: Array
 
-    def core(self, other: Pencil) -> tuple[Array, Array]:
+    def core(self, other: StatePencil) -> tuple[Array, Array]:
         """Be and Ba (k, k) of another pencil."""
         return tuple(
             self.rows.T @ (new - old) @ self.columns for new, old in ((other.e, self.own.e), (other.a, self.own.a))
@@ -61,7 +61,7 @@ class Change:
         return found
 
 
-def change_between(own: Pencil, others: list[Pencil]) -> Change | None:
+def change_between(own: StatePencil, others: list[StatePencil]) -> LowRankChange | None:
     """Directions in which other pencils differ from one; None if they do not differ."""
     rows, columns = own.scale
     chance = np.random.default_rng(0)
@@ -79,7 +79,7 @@ def change_between(own: Pencil, others: list[Pencil]) -> Change | None:
     u, v = (_directions(np.hstack(side)) for side in (left, right))
     width = max(u.shape[1], v.shape[1])
     u, v = (np.pad(side, ((0, 0), (0, width - side.shape[1]))) for side in (u, v))
-    return Change(own, u / rows[:, None], v / columns[:, None], rows[:, None] * u, columns[:, None] * v)
+    return LowRankChange(own, u / rows[:, None], v / columns[:, None], rows[:, None] * u, columns[:, None] * v)
 
 
 def _directions(sketch: Array) -> Array:
@@ -88,7 +88,7 @@ def _directions(sketch: Array) -> Array:
     return kept
 
 
-def frequencies(own: Pencil, further: tuple[float, ...] = ()) -> Array:
+def frequencies(own: StatePencil, further: tuple[float, ...] = ()) -> Array:
     """Frequencies (rad/s) at which the response of a machine is followed: dense at its poles."""
     poles = own.eigenvalues
     size = np.abs(poles[np.abs(poles) > 0])
@@ -105,12 +105,12 @@ def frequencies(own: Pencil, further: tuple[float, ...] = ()) -> Array:
 class Turns:
     """How many more eigenvalues grow under changes of one parameter."""
 
-    def __init__(self, change: Change) -> None:
+    def __init__(self, change: LowRankChange) -> None:
         self.change = change
         self.omega = frequencies(change.own)
         self.response = change.response(self.omega)
 
-    def more_growing(self, other: Pencil) -> int | None:
+    def more_growing(self, other: StatePencil) -> int | None:
         """Number of growing roots of another pencil minus those of the own; None if a root is too near the axis."""
         core = self.change.core(other)
         omega, response = self.omega, self.response
@@ -137,13 +137,13 @@ class Turns:
 
         return to_axis(complex(ratio[0])) - to_axis(complex(ratio[-1]))
 
-    def nearest(self, other: Pencil) -> float:
+    def nearest(self, other: StatePencil) -> float:
         """Frequency (rad/s) at which Δ comes nearest to 0, where a root crosses the axis."""
         ratio = self.change.ratio(self.omega, self.response, self.change.core(other))
         return float(self.omega[int(np.argmin(np.abs(ratio)))])
 
 
-def rank_one(change: Change, steps: list[float], others: list[Pencil]) -> tuple[Array, Array] | None:
+def rank_one(change: LowRankChange, steps: list[float], others: list[StatePencil]) -> tuple[Array, Array] | None:
     """Be and Ba for a unit of the parameter if all changes are proportional to it and of rank one; None otherwise.
 
     `steps` are the changes of the parameter, from its own value, that lead to `others`.
@@ -165,25 +165,25 @@ def _rank(matrix: Array) -> int:
     return int(np.sum(sizes > _LINEAR * sizes[0]))
 
 
-def scalar_response(change: Change, omega: Array, response: ComplexArray, unit: tuple[Array, Array]) -> ComplexArray:
+def scalar_response(omega: Array, response: ComplexArray, unit: tuple[Array, Array]) -> ComplexArray:
     """h(iω) of 1 + θ h = Δ for a change of rank one, at frequencies (p,)."""
     by = 1j * omega[:, None, None] * unit[0] - unit[1]
     found: ComplexArray = np.trace(response @ by, axis1=1, axis2=2)
     return found
 
 
-def real_crossings(change: Change, turns: Turns, unit: tuple[Array, Array]) -> tuple[Array, Array]:
+def real_crossings(change: LowRankChange, turns: Turns, unit: tuple[Array, Array]) -> tuple[Array, Array]:
     """All steps θ at which a root lies on the imaginary axis, 1 + θ h(iω) = 0, and their frequencies (rad/s).
 
     These are the frequencies where h is real: changes of sign of its imaginary part, narrowed to rounding. Dips of that
     part towards zero between two places are looked into.
     """
-    omega, values = turns.omega, scalar_response(change, turns.omega, turns.response, unit)
+    omega, values = turns.omega, scalar_response(turns.omega, turns.response, unit)
     extra = _dips(omega, values.imag)
     for _ in range(4):  # rounds of looking into dips, each eight times finer
         if not extra.size:
             break
-        fresh = scalar_response(change, extra, change.response(extra), unit)
+        fresh = scalar_response(extra, change.response(extra), unit)
         order = np.argsort(np.concatenate([omega, extra]), kind="stable")
         omega, values = np.concatenate([omega, extra])[order], np.concatenate([values, fresh])[order]
         extra = _dips(omega, values.imag)
@@ -192,13 +192,13 @@ def real_crossings(change: Change, turns: Turns, unit: tuple[Array, Array]) -> t
     below = values.imag[at]
     for _ in range(60):  # halvings to rounding; secants would stick at the poles
         middle = 0.5 * (low + high)
-        now = scalar_response(change, middle, change.response(middle), unit).imag
+        now = scalar_response(middle, change.response(middle), unit).imag
         same = np.sign(now) == np.sign(below)
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     found = 0.5 * (low + high)
     at_zero = change.own.resolvent(np.zeros(1, dtype=complex), change.out, change.into)
-    static = scalar_response(change, np.zeros(1), at_zero, unit).real
-    h = np.concatenate([static, scalar_response(change, found, change.response(found), unit).real])
+    static = scalar_response(np.zeros(1), at_zero, unit).real
+    h = np.concatenate([static, scalar_response(found, change.response(found), unit).real])
     with np.errstate(divide="ignore"):
         steps = -1 / h
     places = np.concatenate([[0.0], found])

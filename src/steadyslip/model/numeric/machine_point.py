@@ -14,7 +14,7 @@ from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.assembly import MachineMatrices, assemble
 from steadyslip.model.numeric.balance import Balance, balance
-from steadyslip.model.numeric.pencil import Pencil, linearised
+from steadyslip.model.numeric.pencil import StatePencil, linearised
 from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine
 
 
@@ -35,7 +35,7 @@ class MachinePoint(Keeper):
         return balance(self.matrices)
 
     @cached_property
-    def pencil(self) -> Pencil:
+    def pencil(self) -> StatePencil:
         """Linearised equations; requires steady sliding."""
         return linearised(self.matrices, self.balance)
 

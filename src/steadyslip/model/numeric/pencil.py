@@ -26,7 +26,7 @@ _BATCH = 2**22  # complex numbers of matrices that are solved at once, 64 MiB
 
 
 @dataclass(frozen=True, eq=False)
-class Pencil:
+class StatePencil:
     """E z' = A z of one machine.
 
     Attributes
@@ -162,7 +162,7 @@ def _modal_basis(e: Array, a: Array, size: int) -> tuple[Array, Array]:
     return basis, left
 
 
-def _finite_eigenvalues(pencil: Pencil) -> ComplexArray:
+def _finite_eigenvalues(pencil: StatePencil) -> ComplexArray:
     """Finite eigenvalues of a pencil whose E is singular, by QZ after the bodies without inertia are eliminated."""
     from scipy.linalg import eig  # slow to import
 
@@ -176,7 +176,7 @@ def _finite_eigenvalues(pencil: Pencil) -> ComplexArray:
 # --- from matrices and laws ------------------------------------------------------------------------------------------
 
 
-def linearised(machine: MachineMatrices, found: Balance) -> Pencil:
+def linearised(machine: MachineMatrices, found: Balance) -> StatePencil:
     """Pencil of a machine at steady sliding."""
     n = len(machine.names)
     kept = [len(site.laws.memory) + len(site.laws.states) for site in machine.sites]
@@ -194,7 +194,7 @@ def linearised(machine: MachineMatrices, found: Balance) -> Pencil:
         posed &= _add_contact(e, a, site, slopes, n, slice(start, start + count), machine.integrates)
         start += count
     sign, _ = np.linalg.slogdet(e[moving, moving])
-    return Pencil(e, a, n, posed and bool(sign >= 0))
+    return StatePencil(e, a, n, posed and bool(sign >= 0))
 
 
 def _add_contact(e: Array, a: Array, site: Site, slopes: Slopes, n: int, own: slice, integrates: bool) -> bool:

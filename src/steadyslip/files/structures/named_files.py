@@ -9,7 +9,7 @@ from typing import Any
 from steadyslip.core.errors import ParameterError
 from steadyslip.files.inputs import UnreadableFile
 from steadyslip.files.structures.matrices import read_matrices
-from steadyslip.files.structures.modes import read_modes
+from steadyslip.files.structures.modal_table import read_modes
 from steadyslip.machine.structures import StructureBody, Unread
 
 _READERS = {"matrices": read_matrices, "modes": read_modes}

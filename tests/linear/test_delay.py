@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from itertools import pairwise
 
 import numpy as np
@@ -396,7 +397,7 @@ def test_what_is_not_offered_with_delay_says_so(tmp_path):
 @np.errstate(all="ignore")  # as where it is used
 def test_roots_followed_through_their_crossings_are_those_that_are_counted(monkeypatch):
     """With several delays: what stands right between two values of a gain follows from which way each root goes."""
-    chance, counts, cells, asked = np.random.default_rng(3), windows.count_right, 0, []
+    chance, counts, cells, asked = np.random.default_rng(3), windows.count_right_if_feasible, 0, []
     while cells < 50:
         p, q = chance.normal(size=(2, 3, 4)) * 10.0 ** chance.uniform(-1, 1, size=(2, 3, 4))
         p[0, -1] = abs(p[0, -1])
@@ -409,7 +410,7 @@ def test_roots_followed_through_their_crossings_are_those_that_are_counted(monke
         ends = np.concatenate([[0.2], found[0], [5.0]])
         each = p, q, h, apart(3), *found, np.sqrt(ends[:-1] * ends[1:])
         own = windows._count_each(*each)
-        monkeypatch.setattr(windows, "count_right", lambda c, *h: (asked.append(len(c)), counts(c, *h))[1])
+        monkeypatch.setattr(windows, "count_right_if_feasible", lambda c, *h: (asked.append(len(c)), counts(c, *h))[1])
         assert np.array_equal(windows._count_by_crossings(*each), own)
         monkeypatch.undo()
         cells += len(own)
@@ -525,6 +526,37 @@ def test_two_late_blocks_side_by_side_are_as_stable_as_each():
     for machine in (one, two):
         (edge,) = ss.boundary(machine, "links.rod0.damping")
         assert (edge.kind, edge.stable, edge.value) == ("ill-posed", "above", pytest.approx(0.9, rel=1e-9))
+
+
+def test_edges_that_take_too_long_are_named(monkeypatch):
+    """Of each parameter an edge, none, or its name among what is not decided; those that are told are the same."""
+    machine = replace(
+        lagging(10.0), drive=ss.machine.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.machine.Spring(between=("ground", "block"), damping=0.4)},
+    )  # fmt: skip
+    asked = import_module("steadyslip.linear.boundary")
+    monkeypatch.setattr(asked, "_TERMS", 3_000_000)
+    found, late = asked.margins_and_missing(machine)
+    whole = {one.parameter: one.edge for one in found}
+    monkeypatch.setattr(asked, "_TERMS", 60_000)
+    verdict = ss.analyze(machine)
+    (failed,) = (one for one in verdict.checks if not one.passed)
+    missing = failed.what.removeprefix("edges of ").split(", ")
+    assert failed.what in " ".join(str(verdict).split())
+    assert verdict.stable
+    assert {*missing, *(one.parameter for one in verdict.margins)} == {*whole, *late}
+    assert len(late) < len(missing)
+    for one in verdict.margins:
+        assert one.edge == whole[one.parameter]
+
+
+def test_a_root_off_the_line_that_was_counted_is_not_taken(monkeypatch):
+    """Newton's method may end at a root further left or right; the list ends before it."""
+    c, h = operating_quasi(operating_point(late_axis("0.1 s")))
+    found = quasi.rightmost(c, h, apart(len(c)), 3)
+    assert np.all(np.isfinite(found))
+    monkeypatch.setattr(quasi, "_root_on", lambda c, h, sets, real, known: complex(real - 0.01, 1.0))
+    assert np.all(np.isnan(quasi.rightmost(c, h, apart(len(c)), 3)))
 
 
 def late_twice(kd):

@@ -96,7 +96,7 @@ def test_an_edge_that_is_none_is_left_out():
     (margin,) = [one for one in known if one.parameter == "friction.b"]
     wrong = replace(margin.edges[0], value=margin.edges[0].value * 1.001)
     shifted = replace(margin, edges=(wrong,), edge=wrong)
-    kept, found = edge_checks(held, [shifted if one is margin else one for one in known], 0)
+    kept, found = edge_checks(held, [shifted if one is margin else one for one in known], (), 0)
     assert [one.parameter for one in kept if one.edge is None and one.parameter == "friction.b"] == ["friction.b"]
     assert [one.passed for one in found if "friction.b" in one.what] == [False]
     assert all(one.passed for one in found if "friction.b" not in one.what)
@@ -109,7 +109,7 @@ def test_an_edge_of_a_parameter_that_hardly_moves_the_root_is_kept():
     values |= {"contacts.c1.friction.mu_ref": 0.81207, "drive.kp": 169.11}
     machine, name = at_random(100)[0].with_values(values), "links.l4.damping"
     (margin,) = [one for one in margins(machine) if one.parameter == name]
-    kept, found = edge_checks(machine, [margin], 0)
+    kept, found = edge_checks(machine, [margin], (), 0)
     assert kept == (margin,)
     assert all(one.passed for one in found)
     sides = [ss.stability(machine.with_values({name: factor * margin.edge.value})) for factor in (0.99, 1.01)]
@@ -129,11 +129,11 @@ def test_where_the_growth_rate_touches_zero_it_is_said_to_touch():
     assert [edge.stable for edge in margin.edges] == ["below", "above"]
     touched = replace(margin.edges[0], value=float(found.x))
     told = [replace(margin, edges=(touched,), edge=touched)]
-    kept, (one,) = edge_checks(held.with_values({"slider.stiffness": -found.fun}), told, 0)
+    kept, (one,) = edge_checks(held.with_values({"slider.stiffness": -found.fun}), told, (), 0)
     assert one.passed
     assert in_words([one]) == f"checked: drive.velocity touches an edge at {found.x:.6g} m/s"
     assert kept[0].edge is None
-    _, (one,) = edge_checks(held.with_values({"slider.stiffness": -found.fun * 1.001}), told, 0)
+    _, (one,) = edge_checks(held.with_values({"slider.stiffness": -found.fun * 1.001}), told, (), 0)
     assert in_words([one]).startswith("not decided: edge of drive.velocity")
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.linear.allowance import at_a_time, may_take
 from steadyslip.linear.neutral import Sets, argument_at, bound_on_axis, highest, leads
 from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly
 
@@ -98,7 +99,7 @@ class SumsOnAxis:
     def resolved_pieces(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
         """Pieces on which the change of argument is known, with the index of the dominant term, −1 where none is.
 
-        For a rig that needs too many pieces, the last ones come with `UNKNOWN` instead.
+        For a rig that needs too many pieces, or more than are allowed, the last ones come with `UNKNOWN` instead.
         """
         pieces = self.whole()
         while pieces.row.size:
@@ -113,7 +114,9 @@ class SumsOnAxis:
             row = pieces.row
             done |= led | (pieces.length <= _NEAR * pieces.omega[1])
             yield pieces.where(done), np.where(led, leader, -1)[done]
-            few = np.bincount(row[~done], minlength=len(self.c)) <= _MOST // len(self.c)
+            terms = self.c.shape[1]
+            few = np.bincount(row[~done], minlength=len(self.c)) <= at_a_time(_MOST * terms) // self.c[..., 0].size
+            few &= may_take(np.count_nonzero(~done & few[row]) * terms)
             yield pieces.where(~done & ~few[row]), np.full(np.count_nonzero(~done & ~few[row]), UNKNOWN)
             pieces = self.cut(pieces.where(~done & few[row]))
 

@@ -13,6 +13,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
+from steadyslip.linear.allowance import at_most
 from steadyslip.linear.coupling import search_for
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
@@ -23,6 +24,8 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_digits, require_range
+
+_TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
 
 
 @dataclass(frozen=True)
@@ -120,8 +123,8 @@ def _kept(rig: Rig, name: str) -> tuple[str, ...]:
 def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first.
 
-    Without those that do not enter linearly if bodies without mass are acted on under several delays so strongly that
-    counting roots at many values would take minutes; `boundary` does so for one parameter.
+    Without those whose edges take too long to find, as delays may make it: all together are looked for in some ten
+    seconds. `boundary` takes its time for one parameter; `analyze` names those that are missing.
 
     Raises
     ------
@@ -135,23 +138,37 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     >>> nearest.parameter, round(nearest.relative, 4)
     ('friction.b', -0.0647)
     """
+    return margins_and_missing(rig, branch)[0]
+
+
+def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], tuple[str, ...]]:
+    """What `margins` gives, and the names of the parameters whose edges took too long to find."""
     if by_matrices(rig):
         require_matrices(rig)
     else:
         _require_answers(rig, branch)
     present = present_zeros(rig)
-    found = []
-    for name, address in rig.parameters().items():
-        if address.role.gauge or address.value is None:
-            continue
-        if address.value == 0 and address.role.structural and name not in present:
-            continue
-        search = MatrixSearch(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
-        if search.takes_long:
-            continue
-        edges = search.boundaries(None)
-        found.append(_margin(name, address.role.unit, float(address.value), edges, search.searched))
-    return tuple(sorted(found, key=_urgency))
+    asked = [
+        (name, address)
+        for name, address in rig.parameters().items()
+        if not address.role.gauge
+        and address.value is not None
+        and (address.value != 0 or not address.role.structural or name in present)
+    ]
+    found, share, left = [], 0, _TERMS
+    while asked and left // len(asked) > share:  # those that took too long again, with what the others did not need
+        missing, share = [], left // len(asked)
+        for name, address in asked:
+            with at_most(share) as allowance:
+                search = MatrixSearch(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
+                edges = search.boundaries(None)
+            left -= share - allowance.left
+            if allowance.spent or search.hides:
+                missing.append((name, address))
+            else:
+                found.append(_margin(name, address.role.unit, search.value, edges, search.searched))
+        asked = missing
+    return tuple(sorted(found, key=_urgency)), tuple(name for name, _ in asked)
 
 
 def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Margin, ...]:

@@ -42,8 +42,8 @@ class MatrixSearch:
         self.own = machine_point(machine)
         self.known: dict[float, tuple[int, StatePencil | None]] = {}
 
-    takes_long = False
-    """As of `Search`: no parameter is left out."""
+    hides = False
+    """As of `Search`: no edge lies where roots cannot be counted."""
 
     @cached_property
     def searched(self) -> tuple[float, float]:

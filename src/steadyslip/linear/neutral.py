@@ -22,6 +22,7 @@ Sets = NDArray[np.bool_]
 """Table (m, d): True where term j is delayed by delay i."""
 _SWEEPS = 30  # rounds over all delays; by trial: the smallest value found changes by less than 1e-6 in the last
 _STARTS = 24  # sets of phases from which P is made smaller, beside all of 0 and π, where it is real
+_SETTLED = 1e-9  # relative change in a round below which the smallest value has been found
 _SURE = 0.5  # share of the smallest value found that is used as a lower bound: another start could find a smaller one
 _STEPS = 257  # places between x = 0 and its value at which the argument of P is followed
 
@@ -53,28 +54,37 @@ def least_size(c: Array, sets: Sets) -> Array:
     """
     found = np.asarray(np.abs(c[:, 0]) - np.sum(np.abs(c[:, 1:]), axis=-1))
     several = np.any(c[:, np.sum(sets, axis=1) > 1] != 0, axis=-1)
-    for row in np.flatnonzero((found <= 0) & several & (c[:, 0] != 0)):
-        found[row] = _SURE * _smallest(c[row], sets)
+    rows = np.flatnonzero((found <= 0) & several & (c[:, 0] != 0))
+    if rows.size:
+        size = np.abs(c[rows, 0])
+        shapes, same = np.unique(c[rows] / size[:, None], axis=0, return_inverse=True)  # a scan repeats few
+        found[rows] = _SURE * size * _smallest(shapes, sets)[same.ravel()]
     return found
 
 
-def _smallest(c: Array, sets: Sets) -> float:
-    """Smallest |P| found, for coefficients c (m,) of one rig; 0 if P vanishes."""
+def _smallest(c: Array, sets: Sets) -> Array:
+    """Smallest |P| found (rows,), for coefficients c (rows, m); 0 where P vanishes."""
     count = sets.shape[1]
     phases = 2 * np.pi * np.random.default_rng(0).random((_STARTS, count))
-    x = np.vstack([_signs(count), np.exp(1j * phases)])
-    least = np.inf
+    starts = np.vstack([_signs(count), np.exp(1j * phases)])
+    found = np.full(len(c), np.inf)
+    rows = np.arange(len(c))
+    x = np.repeat(starts[None], len(c), axis=0)  # (rows, starts, delays)
     for _ in range(_SWEEPS):
+        before = found[rows]
         for i in range(count):
-            terms = c * np.prod(np.where(sets & (np.arange(count) != i), x[:, None, :], 1.0), axis=-1)
-            with_it, without = np.sum(terms[:, sets[:, i]], axis=-1), np.sum(terms[:, ~sets[:, i]], axis=-1)
-            left = np.abs(without) - np.abs(with_it)
-            if np.any(left <= 0):
-                return 0.0
-            least = min(least, float(np.min(left)))
+            others = np.where(sets & (np.arange(count) != i), x[:, :, None, :], 1.0)
+            terms = c[rows, None, :] * np.prod(others, axis=-1)
+            with_it, without = np.sum(terms[..., sets[:, i]], axis=-1), np.sum(terms[..., ~sets[:, i]], axis=-1)
+            left = np.min(np.abs(without) - np.abs(with_it), axis=1)
+            found[rows] = np.maximum(np.minimum(found[rows], left), 0.0)
             opposite = -without * np.conj(with_it)
-            x[:, i] = np.where(opposite != 0, opposite / np.abs(opposite), x[:, i])
-    return least
+            x[..., i] = np.where(opposite != 0, opposite / np.abs(opposite), x[..., i])
+        going = (found[rows] > 0) & (before - found[rows] > _SETTLED * found[rows])
+        rows, x = rows[going], x[going]
+        if not rows.size:
+            break
+    return found
 
 
 def _signs(count: int) -> Array:

@@ -22,7 +22,7 @@ from steadyslip.linear.digits import matrix_entries, precise_eigenvalues, precis
 from steadyslip.linear.neutral import can_vanish
 from steadyslip.linear.quasipolynomial import nondimensional
 from steadyslip.linear.roots import Array, ComplexArray
-from steadyslip.linear.spectrum import spectrum
+from steadyslip.linear.spectrum import counts, spectrum
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows, is_written_out
 from steadyslip.model.point import OperatingPoint
@@ -145,6 +145,8 @@ def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
 
 def _count(point: OperatingPoint) -> int:
     """Number of growing roots by the argument principle; −1 where counting takes too long."""
+    if len(point.model.delays) > 1:  # counted so anyway
+        return max(int(counts(point)), -1)
     (c, h), sets = quasipolynomial(point), delays_in_terms(point.model)
     with np.errstate(all="ignore"):
         scaled, own, _ = nondimensional(c[None], h[None])

@@ -37,7 +37,8 @@ _QUICK = (
 )
 _TOLD = 1e-3  # relative error up to which that line is told as the rate of the slowest decay
 _SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
-_ON_THE_LINE = 1e-3  # relative distance of the real part of a root that is one of several on a line
+_ON_THE_LINE = 1e-3  # relative distance from a line of the real part of a root that is one of those on it
+_BISECTED = 1e-7  # the same where the line is the axis, in units of `nondimensional`: rounding of a double root
 _BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
 
 
@@ -178,16 +179,16 @@ def _too_long(turns: float) -> NotAvailable:
 def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     """Rightmost roots, (..., count), by falling real part.
 
-    NaN where infinitely many lie right of the axis or, of several rigs, where they cannot be counted; and beyond those
+    NaN where infinitely many lie right of the axis, or where those right of a line cannot be counted; beyond those
     that lie right of `_line_of_many`, or so close to it that they are not told from the infinitely many there. Real
-    parts are bisected on the number of roots right of a line; Newton's method then refines each root.
+    parts are bisected on the number of roots right of a line; Newton's method then refines each root. The list ends
+    before a line on which it finds none.
     """
     flat = c.reshape(-1, *c.shape[-2:])
     delays = np.broadcast_to(h, (*c.shape[:-2], h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full((len(flat), count), np.nan + 0j, dtype=complex)
     scaled, own, rate = nondimensional(flat, delays)
-    count_of_all = count_right if len(flat) == 1 else count_right_if_feasible
-    right = count_of_all(scaled, own, sets)
+    right = count_right_if_feasible(scaled, own, sets)
     for row in np.flatnonzero((right < INFINITE) & (right != UNKNOWN) & np.all(np.isfinite(scaled), axis=(-2, -1))):
         found[row] = rate[row] * _rightmost_of_one(scaled[row], own[row], sets, count)
     return found.reshape(*c.shape[:-2], count)
@@ -207,7 +208,10 @@ def _rightmost_of_one(c: Array, h: Array, sets: Sets, count: int) -> ComplexArra
     low = -np.ones(len(numbers)) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave floating point
     low = np.maximum(low, left)
     for _ in range(60):
-        short = count_right(c, h, sets, low) < numbers
+        right = count_right_if_feasible(c, h, sets, low)
+        if np.any(right == UNKNOWN):
+            return np.full(count, np.nan + 0j)
+        short = right < numbers
         if not np.any(short):
             break
         high = np.where(short, low, high)
@@ -216,14 +220,20 @@ def _rightmost_of_one(c: Array, h: Array, sets: Sets, count: int) -> ComplexArra
         if np.all(high - low < 1e-9 * (np.abs(low) + np.abs(high)) + 1e-12):
             break
         middle = 0.5 * (low + high)
-        enough = count_right(c, h, sets, middle) >= numbers
+        right = count_right_if_feasible(c, h, sets, middle)
+        if np.any(right == UNKNOWN):
+            return np.full(count, np.nan + 0j)
+        enough = right >= numbers
         low, high = np.where(enough, middle, low), np.where(enough, high, middle)
     found: list[complex] = []
     for real in 0.5 * (low + high):
         if found and abs(found[-1].real - real) < 1e-6 * (abs(real) + 1e-3) and found[-1].imag > 0:
             found.append(found[-1].conjugate())
         else:
-            found.append(_root_on(c, h, sets, float(real), found))
+            root = _root_on(c, h, sets, float(real), found)
+            if not abs(root.real - real) <= _ON_THE_LINE * abs(real) + _BISECTED:
+                break
+            found.append(root)
     return np.append(np.array(found, dtype=complex), np.full(count - len(found), np.nan + 0j))
 
 

@@ -30,14 +30,13 @@ from steadyslip.linear.polynomials import StableSet
 from steadyslip.linear.roots import Array
 from steadyslip.linear.spectrum import (
     can_be_counted,
+    counts,
     crossing_frequency,
     is_ill_posed,
     nearness,
     static_sum,
-    takes_long_to_count,
-    unstable_roots,
 )
-from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral, on_edge, status
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral, on_edge, status_where_counted
 from steadyslip.linear.stiffness import STIFFNESS, set_of_one
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -57,6 +56,7 @@ _CHANGES = 64  # changes of kind above which only changes of the status are narr
 _MORE = 8  # changes that a round may find beyond those of the round before
 SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # largest number of growing roots (with delay) at which a dip between two samples is examined
+_NEAR = 100.0  # factor from the own value within which all samples must be counted, or an edge may be missed
 _SCARCE = 6  # factor by which samples are fewer with several delays: their roots are counted rig by rig
 
 
@@ -112,17 +112,6 @@ class Boundary(Displayed):
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
 
 
-def _status_where_counted(point: OperatingPoint) -> NDArray[np.int64]:
-    """Status of rigs (n,); UNKNOWN where roots under a delay cannot be counted."""
-    known = np.broadcast_to(can_be_counted(point), point.shape)
-    if np.all(known):
-        return status(point)
-    found = np.full(point.shape, UNKNOWN)
-    if np.any(known):
-        found[known] = status(point.part(np.flatnonzero(known)))
-    return found
-
-
 Sample = tuple[float, int]
 """A value of the parameter and its status."""
 
@@ -136,6 +125,7 @@ class Search:
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
         self.own = operating_point(rig, None, self.present, branch)
         self.share = _SCARCE if len(self.own.model.delays) > 1 else 1
+        self.hides = False  # whether an edge lies, or may lie near, where roots under delays cannot be counted
 
     def values(self, x: float | Array) -> OperatingPoint:
         return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
@@ -188,21 +178,16 @@ class Search:
         total = isinstance(self.rig, Machine) and self.rig.area_of(self.name) is None
         return natural_size(self.role.unit, total, self.own.sigmas, self.own.drive, _decay_rate(self.own), self.value)
 
-    @cached_property
-    def takes_long(self) -> bool:
-        """Whether edges are not exact, and counting roots at every sample takes long (`takes_long_to_count`)."""
-        return takes_long_to_count(self.own) and self._exact(None) is None
-
     # -- status of sliding along the parameter
 
     def status(self, x: Array) -> NDArray[np.int64]:
         """Status (stable, unstable, ...) at values (n,); UNKNOWN where roots under a delay cannot be counted."""
-        return _status_where_counted(self.values(x))
+        return status_where_counted(self.values(x))
 
     def kinds(self, x: Array) -> NDArray[np.int64]:
         """Status at values (n,), plus 4 where the static stiffness is positive, plus 8 where it is ill-posed."""
         point = self.values(x)
-        return _kinds(point, _status_where_counted(point))
+        return _kinds(point, status_where_counted(point))
 
     def measures(self, x: Array) -> Array:
         """Two measures (2, n) that change sign at an edge: damping of pairs, and of single eigenvalues."""
@@ -245,7 +230,9 @@ class Search:
         below, above = kind[at] % _BESIDE, kind[at + 1] % _BESIDE
         real = (below != above) & (below != UNKNOWN) & (above != UNKNOWN)
         if low.size and self.own.model.delays:  # a change to samples where nothing can be counted is no edge
-            real &= ~np.any(self.status(np.concatenate([low, high])).reshape(2, -1) == UNKNOWN, axis=0)
+            hidden = np.any(self.status(np.concatenate([low, high])).reshape(2, -1) == UNKNOWN, axis=0)
+            self.hides |= bool(np.any(real & hidden))
+            real &= ~hidden
         if self.role.domain.low == 0:
             real &= low != 0  # zero itself is the end of the domain, no edge
         return [
@@ -262,10 +249,9 @@ class Search:
         valid = np.broadcast_to(point.valid, grid.shape)
         outside = grid[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
         here, point = (grid, point) if np.all(valid) else (grid[valid], self.values(grid[valid]))
-        if not np.all(known := can_be_counted(point)):
-            here, point = here[known], self.values(here[known])
-        own = status(point)
-        certain = ~on_edge(point)
+        own, known = status_where_counted(point), can_be_counted(point)
+        self.hides |= bool(np.any(~known & (here > self.value / _NEAR) & (here < self.value * _NEAR)))
+        certain = known & ~on_edge(point)
         found = here[certain], _kinds(point, own)[certain]
         return _merged(found, outside, self._certain(self._hidden_windows(here, own, point)))
 
@@ -279,15 +265,13 @@ class Search:
         if not np.all(valid):
             outside = x[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
             return _merged(outside, self._certain(x[valid]))
-        if not np.all(known := can_be_counted(point)):
-            return self._certain(x[known])
         try:
-            certain = ~on_edge(point)
+            certain = can_be_counted(point) & ~on_edge(point)
         except NotAvailable:  # beside an edge, roots under a delay may turn too often to be told
             if len(x) == 1:
                 return np.empty(0), np.empty(0, dtype=np.int64)
             return _merged(self._certain(x[: len(x) // 2]), self._certain(x[len(x) // 2 :]))
-        return x[certain], _kinds(point, status(point))[certain]
+        return x[certain], _kinds(point, status_where_counted(point))[certain]
 
     def _hidden_windows(self, grid: Array, status: NDArray[np.int64], point: OperatingPoint) -> Array:
         """Samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
@@ -295,7 +279,7 @@ class Search:
         same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:])
         same &= (status[1:-1] == STABLE) | (status[1:-1] == UNSTABLE)
         if point.model.delays:
-            same &= unstable_roots(point)[1:-1] <= _FEW
+            same &= counts(point)[1:-1] <= _FEW
         extra = [np.empty(0)]
         for which, measure in enumerate(measures):
             size = np.abs(measure)

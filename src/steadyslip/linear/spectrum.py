@@ -10,7 +10,6 @@ from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasipolynomial as with_delays
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.digits import precise_eigenvalues
-from steadyslip.linear.neutral import leads
 from steadyslip.linear.polynomials import columns, damping_measures, is_hurwitz
 from steadyslip.linear.roots import Array, ComplexArray, quietly, roots
 from steadyslip.model.eigenvalues import digits_lost, eigenvalues_of
@@ -30,8 +29,7 @@ def spectrum(point: OperatingPoint) -> ComplexArray:
     """
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else _of_state_matrix(point)
-    c, h = quasipolynomial(point)
-    return with_delays.rightmost(c, h, delays_in_terms(point.model), c.shape[-1] - 1)
+    return _rightmost(point)
 
 
 @quietly
@@ -52,6 +50,12 @@ def growth(point: OperatingPoint) -> Array:
 
 
 @question
+def _rightmost(point: OperatingPoint) -> ComplexArray:
+    c, h = quasipolynomial(point)
+    return with_delays.rightmost(c, h, delays_in_terms(point.model), c.shape[-1] - 1)
+
+
+@question
 def _of_state_matrix(point: OperatingPoint) -> ComplexArray:
     found, lost = eigenvalues_of(point), digits_lost(point)
     if not np.any(lost):
@@ -62,10 +66,14 @@ def _of_state_matrix(point: OperatingPoint) -> ComplexArray:
     return np.append(better, np.full(max(found.shape[-1] - len(better), 0), np.nan + 0j))
 
 
-def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where all roots lie left of the imaginary axis and the equations are well posed."""
+def is_stable(point: OperatingPoint, unless_long: bool = False) -> NDArray[np.bool_]:
+    """True where all roots lie left of the imaginary axis and the equations are well posed.
+
+    With `unless_long` False where roots cannot be counted (`can_be_counted`), which is refused else.
+    """
     if point.model.delays:
-        return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
+        right = counts(point) if unless_long else unstable_roots(point)
+        return np.asarray((right == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
     if is_written_out(point.model):
         return is_hurwitz(characteristic(point), spare_powers(point))
     s = spectrum(point)
@@ -75,18 +83,6 @@ def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
 def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where roots right of the axis can be counted: always, except with several very long delays."""
     return np.asarray(counts(point) != UNKNOWN) if point.model.delays else np.ones(point.shape, dtype=bool)
-
-
-@question
-def takes_long_to_count(point: OperatingPoint) -> bool:
-    """True where of a highest derivative the terms under several delays are together as large as what acts at once.
-
-    Then no term leads at high frequency, and a count follows every turn of each up to the bound of frequencies.
-    """
-    if len(point.model.delays) < 2:
-        return False
-    c, _ = quasipolynomial(point)
-    return not np.all(leads(c.reshape(-1, *c.shape[-2:])))
 
 
 @question
@@ -171,7 +167,7 @@ def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
         s = spectrum(point)
         with np.errstate(invalid="ignore"):
             return np.asarray(np.any((s.imag != 0) & (np.abs(s.real) <= _negligible(s, share)), axis=-1))
-    return np.asarray((np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING))
+    return np.asarray((np.abs(nearness(point)[0]) <= share) & (counts(point) <= _ONE_CROSSING))
 
 
 def _negligible(s: ComplexArray, share: float) -> Array:

@@ -14,7 +14,7 @@ from steadyslip.core.questions import question
 from steadyslip.linear import matrix_route
 from steadyslip.linear.crossing import share_left
 from steadyslip.linear.response import has_closed_form, response_numbers
-from steadyslip.linear.spectrum import is_near_edge, is_stable, outgrown, static_sum
+from steadyslip.linear.spectrum import can_be_counted, is_near_edge, is_stable, outgrown, static_sum
 from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -84,9 +84,18 @@ def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
 def status(point: OperatingPoint) -> NDArray[np.int64]:
     """Status of rigs (...): ABSENT (no steady sliding), STABLE, UNSTABLE (also ill-posed), UNKNOWN (out of range)."""
     with np.errstate(all="ignore"):
-        verdict = np.where(is_stable(point), STABLE, UNSTABLE)
-        found = np.where(point.exists, verdict, ABSENT)
-        return np.where(in_range(point) & point.valid, found, UNKNOWN)
+        return _status(point, is_stable(point))
+
+
+def status_where_counted(point: OperatingPoint) -> NDArray[np.int64]:
+    """As `status`; UNKNOWN also where roots under delays cannot be counted, which `status` refuses."""
+    with np.errstate(all="ignore"):
+        return np.where(can_be_counted(point), _status(point, is_stable(point, unless_long=True)), UNKNOWN)
+
+
+def _status(point: OperatingPoint, stable: NDArray[np.bool_]) -> NDArray[np.int64]:
+    found = np.where(point.exists, np.where(stable, STABLE, UNSTABLE), ABSENT)
+    return np.where(in_range(point) & point.valid, found, UNKNOWN)
 
 
 def decided_by_rounding(point: OperatingPoint) -> bool:
@@ -104,7 +113,7 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     others = point.with_arguments(arguments, (LAST_DIGITS,))
     if static_sum(point) == 0 and not np.all(outgrown(others, True, ON_THE_EDGE)):  # a root of zero, and none grows
         return True
-    return bool(np.any(status(others) != status(point)))
+    return bool(np.any((status_where_counted(others) != status(point)) & can_be_counted(others)))
 
 
 @question

@@ -26,7 +26,7 @@ from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.linear.roots import Array, ComplexArray, quietly
-from steadyslip.linear.spectrum import growth, is_ill_posed, spectrum
+from steadyslip.linear.spectrum import growth, is_ill_posed, spectrum, unstable_roots
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -161,6 +161,8 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
     found = in_chunks(point, kernel)
     if point.model.delays and np.any(lost := np.all(np.isnan(found), axis=-1)):
+        if point.single:
+            unstable_roots(point)  # refused where it cannot be counted
         _warn_of_delays(int(np.count_nonzero(lost & is_ill_posed(point) & point.exists)), point.size)
     return point.wrap(found, "eigenvalues", "1/s", ("mode",))
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.linear.allowance import may_take
 from steadyslip.linear.roots import Array, ComplexArray, evaluate
 
 _EPS = float(np.finfo(float).eps)
@@ -89,7 +90,7 @@ def _enclosed(f: Waves) -> tuple[Array, Array, Array] | None:
     left, right = ends[:-1], ends[1:]
     kept: list[tuple[Array, Array, Array]] = []
     while len(left):
-        if len(left) > _MOST:
+        if len(left) > _MOST or not may_take(3 * len(left) * len(f.shift)):
             return None
         m, r = 0.5 * (left + right), 0.5 * (right - left)
         value, steep, most = f(m), slope(m), bend.largest(right)

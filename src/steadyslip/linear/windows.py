@@ -18,7 +18,6 @@ from steadyslip.linear.crossing import is_ill_posed
 from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish, corners
 from steadyslip.linear.polynomials import StableSet, columns
 from steadyslip.linear.quasipolynomial import (
-    count_right,
     count_right_if_feasible,
     crossing_delays,
     list_crossing_delays,
@@ -64,7 +63,9 @@ def delay_set_among(c: Array, h: Array, sets: Sets, late: NDArray[np.bool_], spa
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
     if can_vanish(scaled, sets) or np.sum(c[:, 0]) == 0 or c[0, top] <= 0 or top < c.shape[1] - 1 - spare:
         return empty_set()
-    start = int(count_right(scaled, others, sets))
+    start = int(count_right_if_feasible(scaled, others, sets))
+    if start == UNKNOWN:
+        return None
     parts = [(scaled[which], others[which]) for which in (~late, late)]
     zeros = difference_of_squares(*parts[0], *parts[1]).zeros(float(bound_on_axis(scaled[None], sets)[0]))
     if zeros is None:

@@ -17,7 +17,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.linear import formula as linear_formula
-from steadyslip.linear.boundary import Margin, margins, present_zeros
+from steadyslip.linear.boundary import Margin, margins, margins_and_missing, present_zeros
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.machine import Machine
@@ -133,7 +133,7 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
         checks = verdict_checks(rig, values, numbers["stable"], on_the_edge)
         if doubt := undecided(checks):
             return Analysis(rig=rig, stable=None, reason=doubt, margins=(), checks=checks, version=__version__)
-        distances, of_edges = edge_checks(rig, margins(rig, branch=branch), branch)
+        distances, of_edges = edge_checks(rig, *margins_and_missing(rig, branch), branch)
         checks += of_edges
         if numbers.get("critical_angular_frequency") is not None:
             checks += (critical_check(values, numbers["critical_stiffness"], numbers["critical_angular_frequency"]),)

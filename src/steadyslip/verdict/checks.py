@@ -21,11 +21,12 @@ from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.laws.friction.law import FrictionLaw
+from steadyslip.linear.allowance import at_most
 from steadyslip.linear.boundary import Margin, present_zeros, without_edges
 from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum, takes_long_to_count
+from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -55,6 +56,7 @@ moves a double root by 1e-8; at the least of `SIDE_OFFSETS` growth is some 1e-5.
 NEUTRAL = 4
 """Status, beside those of `steadyslip.linear.status`, of undamped rigs of which no root grows."""
 
+_TERMS = 3_000_000  # evaluated on the imaginary axis to count roots under delays beside edges: one to two seconds
 _DECIDING = ("steady sliding", "growing roots")  # checks that must pass for a verdict
 _STEP = 1e-3  # change of ln velocity, ln stress and ln memory by which the typical size of a memory rate is found
 _ROUNDING = 8 * float(np.finfo(float).eps)  # relative, of velocity and memory after a few operations
@@ -205,21 +207,28 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
 # -- edges
 
 
-def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Margins without the edges that fail their check, and one check per edge: roots on both sides of it."""
+def edge_checks(
+    rig: Rig, margins: Sequence[Margin], missing: Sequence[str], branch: int
+) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
+    """Margins without the edges that fail their check, and one check per edge: roots on both sides of it.
+
+    One check more, which fails, names the parameters that are `missing` among the margins.
+    """
     edges = [(margin, edge) for margin in margins for edge in margin.edges]
     checks = []
-    if takes_long_to_count(operating_point(rig, branch=branch)):  # `margins` leaves parameters out
-        checks.append(Check("edges of other parameters", "counts of roots under several delays", np.inf, 0.0, False))
+    if missing:
+        how = "counts of roots under delays, which would take too long; steadyslip boundary looks for one at a time"
+        checks.append(Check(f"edges of {', '.join(missing)}", how, np.inf, 0.0, False))
     if not edges:
         return tuple(margins), tuple(checks)
     shares, touching = np.full(len(edges), np.inf), np.full(len(edges), np.inf)
-    _find_sides(rig, edges, shares, SIDE_OFFSETS, branch)
-    lost = np.flatnonzero(np.isinf(shares))
-    touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
-    alone = [_room(*one) > max(FURTHER_OFFSETS) for one in edges]
-    slow = [edge.kind == "ill-posed" for _, edge in edges] | ((touching <= AXIS_TOLERANCE) & alone)
-    _find_sides(rig, edges, shares, FURTHER_OFFSETS, branch, slow)
+    with at_most(_TERMS):
+        _find_sides(rig, edges, shares, SIDE_OFFSETS, branch)
+        lost = np.flatnonzero(np.isinf(shares))
+        touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
+        alone = [_room(*one) > max(FURTHER_OFFSETS) for one in edges]
+        slow = [edge.kind == "ill-posed" for _, edge in edges] | ((touching <= AXIS_TOLERANCE) & alone)
+        _find_sides(rig, edges, shares, FURTHER_OFFSETS, branch, slow)
     lost = np.flatnonzero(np.isinf(shares))
     for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
         where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")

@@ -14,7 +14,7 @@ from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
 from steadyslip.linear import formula as linear_formula
-from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
+from steadyslip.linear.boundary import Margin, margins, margins_and_missing, oscillatory_edge
 from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.modes import Mode, matrix_mode, mode_of
@@ -135,7 +135,7 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
             return MachineAnalysis(
                 rig=machine, stable=None, reason=doubt, margins=(), checks=checks, version=__version__
             )
-        distances, of_edges = edge_checks(machine, margins(machine), 0)
+        distances, of_edges = edge_checks(machine, *margins_and_missing(machine), 0)
         undamped = bool(is_undamped(point))
         posed = numbers["growth_rate"] not in (math.inf, None)
         leading = next(iter(numbers["eigenvalues"] if posed else ()), None)

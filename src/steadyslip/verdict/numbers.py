@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.linear.allowance import at_most
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.polynomials import routh_column
 from steadyslip.linear.quasipolynomial import INFINITE
@@ -15,6 +16,8 @@ from steadyslip.linear.spectrum import growth, is_ill_posed, is_stable, spectrum
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import relative_errors
+
+_TERMS = 4_000_000  # evaluated on the imaginary axis for the roots of a rig with delays: two to four seconds
 
 
 def _without_delay(values: OperatingPoint) -> dict[str, Any]:
@@ -46,8 +49,21 @@ def _with_delays(values: OperatingPoint) -> dict[str, Any]:
 
 
 def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
-    """Fields of a verdict by name, from the characteristic equation; eigenvalues that fail their check are left out."""
+    """Fields of a verdict by name, from the characteristic equation; eigenvalues that fail their check are left out.
+
+    Raises
+    ------
+    NotAvailable
+        If growing roots under delays cannot be counted, so that there is no verdict.
+    """
     require_range(values)
+    if values.model.delays:
+        unstable_roots(values)
+    with at_most(_TERMS):
+        return _numbers(values)
+
+
+def _numbers(values: OperatingPoint) -> dict[str, Any]:
     numbers = _with_delays(values) if values.model.delays else _without_delay(values)
     rate: float | None = math.inf
     if not is_ill_posed(values):

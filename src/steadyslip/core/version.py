@@ -40,7 +40,7 @@ def _files(folder: str, above: str) -> list[str]:
         for entry in entries:
             if entry.name.endswith(KINDS) and not entry.name.startswith("."):
                 names.append(above + entry.name)
-            elif entry.is_dir() and entry.name != "__pycache__":
+            elif entry.is_dir() and entry.name not in ("__pycache__", "examples"):  # the wheel holds examples too
                 names += _files(entry.path, f"{above}{entry.name}/")
     return names
 

@@ -286,6 +286,15 @@ def reduced(structure: StructureData, kept: Sequence[int], modes: int) -> tuple[
     ------
     ParameterError
         If a degree of freedom does not exist or is named twice, or there are fewer modes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> chain = 2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
+    >>> structure = ss.machine.StructureData(np.eye(4), 0.01 * chain, 1e6 * chain, np.zeros((4, 4)))
+    >>> small, error = ss.machine.reduced(structure, kept=(4,), modes=2)
+    >>> small.size, error < 0.1
+    (3, True)
     """
     size = structure.size
     inside = np.array(kept, dtype=np.int64) - 1

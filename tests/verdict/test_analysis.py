@@ -246,3 +246,10 @@ def test_only_rigs_are_judged():
     with pytest.raises(ss.ParameterError, match="allowed: a Slider"):
         ss.analyze("rig.toml")
     assert repr(ss.analyze(PLAIN)).startswith("<Analysis: UNSTABLE")
+
+
+@pytest.mark.parametrize("path", ["examples/slow-axis.toml", "examples/machines/geared-servo.toml"])
+def test_an_unstable_rig_names_the_command_that_shows_what_it_does(path):
+    found = ss.analyze(ss.read_rig(path))
+    assert found.stable is False
+    assert "steadyslip simulate shows what it does instead" in str(found)

@@ -36,6 +36,7 @@ from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
 from steadyslip.verdict.words import (
     BEYOND,
+    JUDDERS,
     QUIET,
     beyond,
     disturbance,
@@ -108,9 +109,11 @@ def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
 
 
 def machine_meaning(found: MachineAnalysis) -> list[str]:
-    """Lines on the limits of a verdict "stable"; empty for other verdicts."""
-    if not found.stable or found.on_edge:
+    """Lines on the limits of a verdict "stable", and on what to ask next of an unstable machine."""
+    if found.stable is None or found.on_edge:
         return []
+    if not found.stable:
+        return [] if found.growth_rate == math.inf else [JUDDERS]
     return ["Stable means: small disturbances die out. A large enough kick may still start an oscillation."]
 
 

@@ -75,6 +75,10 @@ def verdict_text(analysis: Verdict, known: list[tuple[str, str]], edges: list[st
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
 
 
+JUDDERS = "steadyslip simulate shows what it does instead: how often it slips, how far, and with what force."
+"""Line on an unstable rig whose motion mass or damping limits."""
+
+
 def meaning(analysis: Findings) -> list[str]:
     """Lines on the limits of the verdict: large kicks if stable, growth without bound if unstable."""
     if analysis.stable is None or analysis.on_edge:
@@ -90,7 +94,7 @@ def meaning(analysis: Findings) -> list[str]:
             "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
             "steadyslip simulate shows which.",
         ]
-    return []
+    return [] if analysis.growth_rate == math.inf else [JUDDERS]
 
 
 def _limited(rig: Slider) -> bool:

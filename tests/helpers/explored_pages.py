@@ -60,10 +60,10 @@ class Visit:
         return self.page.inner_text("h1")
 
     def field(self, name):
-        return self.page.get_by_label(re.compile(rf"^{re.escape(name)}: .*value with unit$"))
+        return self.page.locator(f'input[type=text][data-name="{name}"]')
 
     def slider(self, name):
-        return self.page.locator(f'input[type=range][aria-label^="{name}: "]')
+        return self.page.locator(f'input[type=range][data-name="{name}"]')
 
     def type(self, name, text):
         self.field(name).fill(text)
@@ -83,7 +83,8 @@ class Visit:
 
 def edges_of(visit):
     """The list of nearest edges as it is read: name and value."""
-    return dict(re.findall(r"([\w.-]+) → (\S+)", " ".join(visit.page.locator(".edges button").all_text_contents())))
+    told = "all => all.map((one) => [one.dataset.name, one.textContent.split(' → ')[1].split('\\u00a0')[0]])"
+    return dict(visit.page.locator(".edges button").evaluate_all(told))
 
 
 def middle(element):

@@ -126,7 +126,7 @@ def test_a_report_says_everything_about_a_rig():
     analysis, found = ss.analyze(OWN_RIG), ss.report(OWN_RIG, title="A rig")
     text = words(found.html)
     for part in ("Unstable: steady sliding at 1 µm/s", "Will this rig slide steadily", "The rig", "slider.stiffness",
-                 "6 GPa/m", "How far is the edge?", "friction.b", "doubles in", "What to keep in mind", ss.__version__,
+                 "6 GPa/m", "How far is the edge?", "friction.b", "doubles in", "Assumptions", ss.__version__,
                  hashlib.sha256(ss.rig_to_text(OWN_RIG).encode()).hexdigest()):  # fmt: skip
         assert part in text, part
     assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text

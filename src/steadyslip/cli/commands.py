@@ -24,6 +24,7 @@ from steadyslip.cli.options import (
     RigFile,
     Until,
     outputs,
+    pair_of,
     refuse_branch,
 )
 
@@ -77,12 +78,16 @@ def analyze(
         ),
     ] = None,
     fitted: Fitted = None,
+    output: Annotated[list[Path] | None, outputs("write .html, .png, .svg or .pdf")] = None,
+    journal: Annotated[bool, typer.Option("--journal", help="draw figures 85 mm wide, a column of a journal")] = False,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
+    from steadyslip.files.output import FIGURES, check_output
     from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
     from steadyslip.files.specifications.unknowns import intervals_of
     from steadyslip.verdict import analyze as run, stable_within, tolerate
 
+    check_output(output or (), (".html", *FIGURES))
     formula = formula or along is not None
     if fitted is not None:
         _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, along, branch)
@@ -94,6 +99,11 @@ def analyze(
     result = run(read, branch=branch, kick=kick or ())
     within = tolerate(read, tolerances) if tolerances else None
     anywhere = stable_within(read, unknown) if unknown else None
+    if output:
+        from steadyslip.reports.verdict_files import write_verdict
+
+        for path in output:
+            write_verdict(result, within, path, rig, journal)
     if as_json:
         data = result.to_dict()
         if within is not None:
@@ -338,8 +348,16 @@ def report(
             "--tolerance", metavar="NAME=VALUE", help="how far a value may be off, such as stiffness='5 %'; repeatable"
         ),
     ] = None,
+    chart: Annotated[
+        list[str] | None,
+        typer.Option("--chart", metavar="X,Y", help="draw stability over these two, as angle,stiffness; repeatable"),
+    ] = None,
+    project: Annotated[str, typer.Option(help="project, for the title block")] = "",
+    author: Annotated[str, typer.Option(help="author, for the title block")] = "",
+    revision: Annotated[str, typer.Option(help="revision, for the title block")] = "",
+    approval: Annotated[str, typer.Option(help="who approved it, for the title block")] = "",
 ) -> None:
-    """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
+    """A printable document about a rig: answer, recommendation, inputs, edges, charts, motion, formula, provenance."""
     from steadyslip.files.output import check_output
     from steadyslip.files.specifications import named_value
     from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
@@ -352,7 +370,8 @@ def report(
     given: Any = dict(map(named_value, tolerance or ()))
     if written:
         given = replace(written, values=dict(written.values) | {read.resolve(name): one for name, one in given.items()})
-    options: dict[str, Any] = {"branch": branch, "tolerances": given}
+    options: dict[str, Any] = {"branch": branch, "tolerances": given, "charts": list(map(pair_of, chart or ()))}
+    options |= {"project": project, "author": author, "revision": revision, "approval": approval}
     if fitted is not None:
         from steadyslip.experiments import load_fit
 

@@ -61,3 +61,19 @@ def refuse_branch(fitted: Path | None, branch: int) -> None:
     if fitted is not None and branch:
         message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
         raise ParameterError([Problem("--branch", message)])
+
+
+def pair_of(text: str) -> tuple[str, str]:
+    """Two names from a text such as ``angle,stiffness``.
+
+    Raises
+    ------
+    ParameterError
+        If there are not two.
+    """
+    from steadyslip.core.errors import ParameterError, Problem
+
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or not all(names):
+        raise ParameterError([Problem("--chart", f"got {text!r}; allowed: two parameters, such as angle,stiffness")])
+    return names[0], names[1]

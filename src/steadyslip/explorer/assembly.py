@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.palette import DARK, FORCED, LIGHT
 from steadyslip.core.records import Address
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
@@ -31,6 +32,7 @@ from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.search import Search
 from steadyslip.linear.status import STABLE, UNSTABLE, status
+from steadyslip.machine.letters import letter_of, said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -45,7 +47,8 @@ from steadyslip.verdict.words import BEYOND, HEADLINES, REMOTE
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
-    "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view", "leaving", "page",
+    "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view", "leaving", "stories",
+    "page",
 )  # fmt: skip
 """Modules of the page in `web/`, each after those that it imports."""
 DEFAULTS = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
@@ -78,8 +81,18 @@ def document(title: str, styles: str, body: str) -> str:
 
 
 def style() -> str:
-    """Style sheet of a `fragment`, minified."""
-    return minify_css(_read_web("style.css"))
+    """Style sheet of a `fragment`, minified, with the colours of `core.palette` as variables."""
+    light, dark, forced = (
+        "; ".join(f"--{role}: {colour}" for role, colour in roles.items()) for roles in (LIGHT, DARK, FORCED)
+    )
+    themes = (
+        f".steadyslip {{ color-scheme: light; {light}; }}\n"
+        f'@media screen {{ .steadyslip[data-theme="dark"] {{ color-scheme: dark; {dark}; }} }}\n'
+        '@media screen and (prefers-color-scheme: dark) { .steadyslip:not([data-theme="light"]) '
+        f"{{ color-scheme: dark; {dark}; }} }}\n"
+        f"@media (forced-colors: active) {{ .steadyslip.steadyslip.steadyslip {{ {forced}; }} }}\n"
+    )
+    return minify_css(themes + _read_web("style.css"))
 
 
 def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
@@ -230,11 +243,12 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     domain, value = one.role.domain, float(one.value or 0.0)
     factor, unit = display_unit(rig, one.role.unit)
     natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
-    group, label = _group(rig, name)
+    group = _group(rig, name)
     found = {
         "name": name,
         "group": group,
-        "label": label,
+        "title": said(rig, name),
+        "letter": letter_of(rig, name),
         "doc": one.role.doc,
         "unit": unit,
         "factor": factor,
@@ -253,21 +267,10 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
 _MEMBERS = {"bodies": "body", "links": "link", "contacts": "contact"}
 
 
-def _group(rig: Slider | Machine, name: str) -> tuple[str, str]:
-    """Heading of a parameter on the page, and its label below that heading."""
+def _group(rig: Slider | Machine, name: str) -> str:
+    """Heading of a parameter on the page."""
     kind, _, rest = name.partition(".")
-    if isinstance(rig, Machine) and kind in _MEMBERS:
-        member, _, own = rest.partition(".")
-        return f"{_MEMBERS[kind]} {member}", own
-    return kind, _label(name, rig.parameters())
-
-
-def _label(name: str, names: Iterable[str]) -> str:
-    """Label of a parameter below the heading of its part: last word of its name, or all of it if not unique."""
-    part, _, rest = name.partition(".")
-    last = name.rpartition(".")[2]
-    alike = [one for one in names if one.partition(".")[0] == part and one.rpartition(".")[2] == last]
-    return last if len(alike) == 1 else rest
+    return f"{_MEMBERS[kind]} {rest.partition('.')[0]}" if isinstance(rig, Machine) and kind in _MEMBERS else kind
 
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:

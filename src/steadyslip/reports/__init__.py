@@ -11,21 +11,27 @@ from typing import Any
 
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.reports import lab  # noqa: F401 -- registers documents of fits
 from steadyslip.reports.brief import brief
-from steadyslip.reports.document import Report, document_html
+from steadyslip.reports.document import Report, document_html, source_text
 from steadyslip.reports.results import parts_of
 
 __all__ = ["Report", "brief", "report"]
 
 
-@checked(title=NAME)
+@checked(title=NAME, project=NAME, author=NAME, revision=NAME, approval=NAME)
 def report(
     result: Any,
     *,
     title: str = "steadyslip report",
     explorer: bool = True,
     source: str | PathLike[str] | None = None,
+    project: str = "",
+    author: str = "",
+    revision: str = "",
+    approval: str = "",
     **options: Any,
 ) -> Report:
     """Printable HTML document about a rig or a result.
@@ -40,8 +46,12 @@ def report(
         If True, the explorer of the rig is at the end.
     source : path, optional
         File that the result was computed from; the document has its hash.
+    project, author, revision, approval : str, optional
+        Entries of the title block, which stands at the top if one of them is given.
     **options
-        For a rig: ``branch``, index of the steady state where there are several; ``fit``, a Fit whose friction is used,
+        For a rig: ``charts``, pairs of parameters over which stability is drawn, instead of those with the
+        nearest edges; ``branch``, index of the steady state where there are several; ``fit``, a Fit whose
+        friction is used,
         and ``tolerances``, as for `steadyslip.tolerate`, for the uncertainty of the verdict. For a fit: ``comparison``,
         a LawComparison, and ``draws``, its Draws.
 
@@ -62,9 +72,11 @@ def report(
     >>> rig = ss.read_rig("examples/inclined-spring.toml")
     >>> ss.report(rig, explorer=False).save("report.html")
     """
-    return Report(
-        document_html(parts_of(result, **options), title, explorer, None if source is None else Path(source)), title
-    )
+    path = None if source is None else Path(source)
+    block = {"project": project, "author": author, "revision": revision, "approval": approval}
+    if isinstance(result, Slider | Machine):
+        options["source"] = source_text(path)
+    return Report(document_html(parts_of(result, **options), title, explorer, path, block), title)
 
 
 def _whole(result: Any, **options: Any) -> str:

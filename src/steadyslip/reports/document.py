@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 
 from steadyslip.core.errors import NotAvailable, ParameterError, RigFileError
 from steadyslip.explorer.assembly import document, fragment, style
@@ -29,7 +30,12 @@ body { background: #fff; }
 @media (max-width: 600px) {
   .report.steadyslip-told.steadyslip-told td, .report.steadyslip-told.steadyslip-told th { padding-right: 7px; }
 }
-@page { size: A4; margin: 16mm; }
+.report { counter-reset: figure table; }
+.report figcaption::before { counter-increment: figure; content: "Figure " counter(figure) ". "; font-weight: 650; }
+.report caption { counter-increment: table; text-align: left; color: #566173; font-size: 13px; padding-bottom: 3px; }
+.report caption::before { content: "Table " counter(table) ". "; font-weight: 650; }
+.report .block { border: 1px solid #1b2430; padding: 4px 10px; margin: 0 0 14px; }
+@page { size: A4; margin: 16mm; @bottom-right { content: counter(page) " / " counter(pages); font: 9pt sans-serif; } }
 @media print {
   .report { padding: 0; }
   .report figure svg, .report figure img { max-height: 150mm; }
@@ -80,17 +86,20 @@ class Parts:
             return repr(self.rig) if self.protocol is None else f"{self.rig!r}\n[protocol]\n{self.protocol!r}"
 
 
-def document_html(parts: Parts, title: str, explorer: bool, source: Path | None) -> str:
-    """HTML text of a document; `source` is the file that the result was computed from."""
+def document_html(
+    parts: Parts, title: str, explorer: bool, source: Path | None, block: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """HTML text of a document; `source` is the file that the result was computed from, `block` its title block."""
     live, still = "", ""
     if explorer and parts.rig is not None:
         try:
-            live = fragment(parts.rig, title, parts.branch, _source_text(source))
+            live = fragment(parts.rig, title, parts.branch, source_text(source))
         except NotAvailable as refused:
             still = paragraph(f"There is no explorer at the end: {refused}.", "small")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
         '<article class="report steadyslip-told" role="region" aria-label="report">'
+        f"{_title_block(block)}"
         f'<p class="kind">{html_text(title)}</p><h1>{html_text(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
         f"{''.join(parts.body)}{_provenance(_rig_listing(parts, source), source)}{still}"
@@ -99,7 +108,15 @@ def document_html(parts: Parts, title: str, explorer: bool, source: Path | None)
     return document(f"{title} – steadyslip", _DOCUMENT_STYLE + STYLE + (style() if live else ""), article + live)
 
 
-def _source_text(source: Path | None) -> str:
+def _title_block(block: Mapping[str, str]) -> str:
+    """HTML table of project, author, revision and approval; empty if none of them is given."""
+    rows = [(name, text or "\u2014") for name, text in block.items()]
+    given = any(block.values())
+    date = ("date", f"{datetime.now(UTC):%Y-%m-%d}")
+    return f'<div class="block">{table([*rows, date])}</div>' if given else ""
+
+
+def source_text(source: Path | None) -> str:
     """Text of the rig file at `source`; empty if it is another kind of file, such as a table of results."""
     try:
         return "" if source is None or source.suffix != ".toml" else text_of(source)
@@ -109,7 +126,7 @@ def _source_text(source: Path | None) -> str:
 
 def _rig_listing(parts: Parts, source: Path | None) -> str:
     """Text of a file of the rig: that of the user, with comments and units, if it has the same rig and protocol."""
-    own, text = _source_text(source), parts.rig_file
+    own, text = source_text(source), parts.rig_file
     try:
         same = own and text and _rig_and_protocol(own) == _rig_and_protocol(text)
     except ParameterError:  # a law that no file can name

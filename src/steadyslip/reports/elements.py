@@ -38,7 +38,7 @@ STYLE = """
 .steadyslip-told figure { margin: 10px 0; break-inside: avoid; }
 .steadyslip-told figure svg, .steadyslip-told figure img { max-width: 100%; height: auto; }
 .steadyslip-told figcaption, .steadyslip-told .small { color: #566173; font-size: 13px; }
-.steadyslip-told .warning { background: #fff3d6; border-left: 5px solid #e08a00; padding: 6px 12px; margin: 8px 0; }
+.steadyslip-told .warning { background: #fff3d6; border-left: 5px solid #d97f12; padding: 6px 12px; margin: 8px 0; }
 .steadyslip-told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
   white-space: pre-wrap; overflow-wrap: anywhere; }
 .steadyslip-told math { font-size: 17px; }
@@ -70,8 +70,12 @@ def heading(text: str, level: int = 2) -> str:
     return f"<h{level}>{html_text(text)}</h{level}>"
 
 
-def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = True) -> str:
-    """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of a row is its header."""
+def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = True, caption: str = "") -> str:
+    """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of a row is its header.
+
+    Tables with a caption are numbered by the style sheet of a document, as figures are.
+    """
+    above = f"<caption>{html_text(caption)}</caption>" if caption else ""
     top = f"<thead><tr>{''.join(f'<th scope=col>{html_text(cell)}</th>' for cell in head)}</tr></thead>" if head else ""
     lines = []
     for row in rows:
@@ -79,7 +83,11 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
         side = f"<th scope=row>{_breakable(first)}</th>" if left else f"<td>{first}</td>"
         cells = (f"<td{_nowrap_class(cell)}>{cell}</td>" for cell in rest)
         lines.append(f"<tr>{side}{''.join(cells)}</tr>")
-    return f'<div class="wide" tabindex="0"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>' if lines else ""
+    return (
+        f'<div class="wide" tabindex="0"><table>{above}{top}<tbody>{"".join(lines)}</tbody></table></div>'
+        if lines
+        else ""
+    )
 
 
 def _breakable(name: str) -> str:

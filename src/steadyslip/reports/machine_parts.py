@@ -11,25 +11,29 @@ from steadyslip.figures.machine_verdict import undrawn_edges
 from steadyslip.reports import rig as rig_report
 from steadyslip.reports.brief import result_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import figure, heading, paragraph, table
+from steadyslip.reports.elements import figure, heading, table
+from steadyslip.reports.sections import assumptions, motion, recommendation, references
 from steadyslip.verdict import MachineAnalysis, Tolerated
 from steadyslip.verdict.machine import machine_facts
 from steadyslip.verdict.words import headline
 
 
-def verdict_parts(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Parts:
+def verdict_parts(
+    analysis: MachineAnalysis, tolerated: Tolerated | None = None, order: rig_report.Order = rig_report.ORDER
+) -> Parts:
     """Contents of the document of a verdict on a machine, with tolerances if given."""
     machine = analysis.rig
     drive = machine.parameters()["drive.velocity"]
     speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
     body = [
+        *recommendation(analysis, tuple(order.adjustable)),
+        *assumptions(machine, analysis.warnings, rig_report.VALIDITY),
         heading("The machine"), result_html(machine),
         heading("The verdict"), *_verdict_section(analysis),
         heading("How far is the edge?"), _verdict_figure(analysis),
         *rig_report.edge_table(analysis), *rig_report.checks_line(analysis),
         *rig_report.tolerance_section(tolerated),
-        heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
-        paragraph(rig_report.VALIDITY),
+        *motion(analysis), *references(machine),
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."

@@ -148,23 +148,30 @@ def _sensitivity(result: Sensitivity) -> Parts:
 
 @parts_of.register
 def _rig(
-    result: Slider, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None
+    result: Slider, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None,
+    charts: Sequence[tuple[str, str]] = (), source: str = "",
 ) -> Parts:  # fmt: skip
     found = None
     if fit is not None:
         found = predict(result, fit)
         result = found.rig
     within = tolerate(result, tolerances) if tolerances else None
-    return rig_report.verdict_parts(analyze(result, branch=branch), found, within)
+    order = rig_report.Order(charts, getattr(tolerances, "adjust", ()), source)
+    return rig_report.verdict_parts(analyze(result, branch=branch), found, within, order)
 
 
 @parts_of.register
 def _machine(
-    result: Machine, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None
+    result: Machine, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None,
+    charts: Sequence[tuple[str, str]] = (), source: str = "",
 ) -> Parts:  # fmt: skip
-    if branch or fit is not None:
-        raise NotAvailable("a machine has one steady sliding, and fits are of a slider; leave branch and fit out")
-    return machine_report.verdict_parts(analyze(result), tolerate(result, tolerances) if tolerances else None)
+    if branch or fit is not None or charts:
+        raise NotAvailable(
+            "a machine has one steady sliding, and fits and charts are of a slider; leave branch, fit and charts out"
+        )
+    within = tolerate(result, tolerances) if tolerances else None
+    order = rig_report.Order((), getattr(tolerances, "adjust", ()), source)
+    return machine_report.verdict_parts(analyze(result), within, order)
 
 
 @parts_of.register

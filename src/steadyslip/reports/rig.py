@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
 
 from steadyslip import figures
 from steadyslip.core.areas import stress_name
@@ -14,11 +16,21 @@ from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
+from steadyslip.machine.letters import said
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import Markup, figure, heading, inline_math, math, paragraph, table
+from steadyslip.reports.sections import (
+    assumptions,
+    letters,
+    motion,
+    notes_of,
+    recommendation,
+    references,
+    tolerances_of,
+)
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.words import edge_rows, facts, headline, meaning
@@ -29,44 +41,64 @@ VALIDITY = (
 )
 
 
+@dataclass(frozen=True)
+class Order:
+    """What a document was asked for: charts over pairs of parameters, what can be changed, text of the rig's file."""
+
+    charts: Sequence[tuple[str, str]] = ()
+    adjustable: Collection[str] = ()
+    source: str = ""
+
+
+ORDER = Order()
+
+
 def verdict_parts(
-    analysis: Analysis, prediction: Prediction | None = None, tolerated: Tolerated | None = None
+    analysis: Analysis, prediction: Prediction | None = None, tolerated: Tolerated | None = None, order: Order = ORDER
 ) -> Parts:
     """Contents of the document of a verdict on a slider, with its uncertainty from a fit or tolerances if given."""
     rig = analysis.rig
     speed = format_quantity(rig.drive.velocity, "m/s")
     body = [
-        heading("The rig"), figure(sketch(rig)), input_table(rig),
+        *recommendation(analysis, tuple(order.adjustable)), *assumptions(rig, analysis.warnings, VALIDITY),
+        heading("The rig"), figure(sketch(rig)), input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
         *_confidence_section(prediction), *tolerance_section(tolerated),
         heading("How far is the edge?"), *edge_table(analysis), *checks_line(analysis),
-        *_chart_section(analysis),
-        heading("The formulas"), *formula_section(analysis),
-        heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
-        paragraph(VALIDITY),
+        *_chart_section(analysis, order), *motion(analysis),
+        heading("The formulas"), *formula_section(analysis), letters(rig), *references(rig),
     ]  # fmt: skip
     question = f"Will this rig slide steadily at {speed}, what would make it, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
     return Parts(headline(analysis, capitals=False), lead, question, body, rig, branch=analysis.branch)
 
 
-def input_table(rig: Slider) -> str:
-    """HTML table of the parameters of a slider: name, symbol, value (totals if it has an area), meaning."""
-    symbols = build_model(rig).parameters
+def input_table(
+    rig: Slider, tolerances: Mapping[str, str] = MappingProxyType({}), notes: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """HTML table of the parameters of a slider: name, symbol, value (totals if it has an area), meaning.
+
+    With its tolerance if one is given, and where it comes from: the comment behind it in the rig file, if there is one.
+    """
+    model = build_model(rig)
+    symbols = model.parameters
     rows = []
     for name, one in rig.parameters().items():
         if one.value is None:
             continue
-        known = inline_math(symbols[name]) if name in symbols else Markup("")
+        known = inline_math(model.written(symbols[name])) if name in symbols else Markup("")
         rows.append(
             (
                 name,
                 known,
                 format_quantity(one.value, one.role.unit, 6, rig.area_of(name)),
                 stress_name(one.role.doc, rig.area_of(name)),
+                *((tolerances.get(name, ""),) if tolerances else ()),
+                *((notes[name] or "rig file" if name in notes else "default",) if notes else ()),
             )
         )
-    return table(rows, ("parameter", "letter", "value", "meaning"))
+    more = (*(("tolerance",) if tolerances else ()), *(("source",) if notes else ()))
+    return table(rows, ("parameter", "letter", "value", "meaning", *more), caption="Inputs.")
 
 
 def edge_table(analysis: Verdict) -> Iterator[str]:
@@ -75,7 +107,7 @@ def edge_table(analysis: Verdict) -> Iterator[str]:
     if rows:
         head = ("parameter", "now", "edge", "change", "beyond it")
         yield paragraph("The nearest edge in each parameter, the others unchanged.")
-        yield table(rows, head)
+        yield table(rows, head, caption="Nearest edges.")
     if without:
         yield paragraph(f"No edge within range: {', '.join(without)}.", "small")
 
@@ -86,12 +118,14 @@ def checks_line(analysis: Verdict) -> Iterator[str]:
         yield paragraph(in_words(analysis.checks), "small")
 
 
-def _chart_section(analysis: Analysis) -> Iterator[str]:
+def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
     near = [one.parameter for one in analysis.margins if one.edge is not None and one.parameter != stiffness]
-    for name in near[:2]:
-        words = f"Where sliding is stable over {name} and {stiffness}; the dot is this rig."
-        chart = figure_html(lambda name=name: figures.stability_chart(rig, name, stiffness, points=101), words, 6.0)  # type: ignore[misc]
+    near = [name for name in near if name in order.adjustable] or near
+    for x, y in order.charts or [(name, stiffness) for name in near[:2]]:
+        over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
+        words = f"Where sliding is stable over {over}; the dot is this rig."
+        chart = figure_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words, 6.0)  # type: ignore[misc]
         yield figure(chart, words)
     if analysis.stable is not None:
         locus = figure_html(lambda: figures.root_locus(rig), "root locus", 6.0)

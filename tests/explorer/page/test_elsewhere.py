@@ -23,7 +23,7 @@ COMPLETE = """return new Promise((done) => {
   look();
 });"""
 
-MOVE = """const slider = document.querySelector('input[type=range][aria-label^="slider.stiffness: "]');
+MOVE = """const slider = document.querySelector('input[type=range][data-name="slider.stiffness"]');
 slider.value = "1000";
 slider.dispatchEvent(new Event("input"));
 slider.dispatchEvent(new Event("change"));

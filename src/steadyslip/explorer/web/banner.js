@@ -35,10 +35,12 @@ export class Banner {
     this.bar = make("div", { className: "bar", role: "img" }, svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, ...this.paths), this.marks, this.labels);
     this.notice = make("p", { className: "notice", role: "status" });
     if (differs.length) this.notice.textContent = `This browser computes otherwise than Python did (${differs.slice(0, 3).join("; ")}): do not rely on this page.`;
-    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: String(i), textContent: one.name, selected: i === page.rig.bar })));
-    this.choice.addEventListener("change", () => page.tell(Number(this.choice.value)));
-    this.values = make("p", { className: "values" }, make("label", {}, "stable values of ", this.choice));
-    this.box = make("section", { className: "verdict", "aria-label": "verdict" }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice);
+    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: one.name, textContent: one.title, selected: i === page.rig.bar })));
+    this.choice.addEventListener("change", () => page.tell(this.choice.selectedIndex));
+    this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar ", this.choice));
+    const ask = (kind) => make("button", { type: "button", textContent: kind, onclick: () => page.guessed(kind) });
+    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ask("unstable"));
+    this.box = make("section", { className: "verdict", "aria-label": "verdict", tabIndex: -1 }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice, guess);
   }
 
   show(answer) {
@@ -62,7 +64,7 @@ export class Banner {
   /** Update what depends on edges: the reason for the verdict on a machine, and the bar. @param {any} answer @param {any} [first] */
   follow(answer, first) {
     if (this.data.phrases) tell(this.reason, this.told(answer, first));
-    this.choice.value = String(this.page.rig.bar);
+    this.choice.selectedIndex = this.page.rig.bar;
     this.showBar(answer);
   }
 
@@ -121,7 +123,7 @@ export class Banner {
     placed(this.labels, [...this.fitted(scale.map((v) => ["tick", x(v), value(v)])), ...this.fitted([["now", x(own), `${words}now ${value(own)}`]]), ...this.fitted(labels)], "span");
     const starts = (low) => low > (whole || phrases ? gain : -Infinity) && low > -Infinity; // otherwise the interval begins at the lowest possible value
     const said = intervals.map(({ low, high }) => (high < Infinity ? (starts(low) ? `${value(low)} to ${value(high)}` : `below ${value(high)}`) : starts(low) ? `above ${value(low)}` : "any"));
-    const what = whole ? (gain > 0 ? `stiffness and gain together, of which the gain is ${value(gain)}` : "stiffness") : `values of ${parameters[bar].name}`;
+    const what = whole ? (gain > 0 ? `stiffness and gain together, of which the gain is ${value(gain)}` : "stiffness") : `values of ${parameters[bar].title}`;
     put(this.bar, "aria-label", `stable ${what}: ${said.join(", or ") || "none"}`);
   }
 

@@ -4,7 +4,7 @@ import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
 export const CLASSES = { [ABSENT]: "none", [STABLE]: "stable", [UNSTABLE]: "unstable", [UNKNOWN]: "unknown" };
 
 /**
- * SVG paths of the regions and of the outlines between them.
+ * SVG paths of the regions, of the outlines between them (`lost` where there is no steady sliding on one side), and places for words.
  * @param {(x: number, y: number) => number} status of positions from 0 to 1
  * @param {number} rows
  */
@@ -21,7 +21,7 @@ export function regions(status, rows, width, height) {
   };
   for (let j = 0; j <= rows; j++) grid.push(Array.from({ length: columns + 1 }, (_, i) => status(i / columns, j / rows)));
   const top = (y) => ((1 - y) * height).toFixed(1), left = (x) => (x * width).toFixed(1);
-  let outline = "";
+  let outline = "", lost = "";
   const acrossRow = (j, i) => cut((x) => status(x, j / rows), i / columns, (i + 1) / columns, grid[j][i]);
   const upColumn = (j, i) => cut((y) => status(i / columns, y), j / rows, (j + 1) / rows, grid[j][i]);
   for (let j = 0; j < rows; j++) {
@@ -35,7 +35,11 @@ export function regions(status, rows, width, height) {
       if (a !== d) points.push([i / columns, upColumn(j, i)]);
       const mean = (which) => points.reduce((sum, point) => sum + point[which], 0) / points.length; // more than two crossings: regions meet in the middle
       const ends = points.length === 3 ? points.flatMap((point) => [point, [mean(0), mean(1)]]) : points;
-      for (let k = 0; k + 1 < ends.length; k += 2) outline += `M${left(ends[k][0])} ${top(ends[k][1])}L${left(ends[k + 1][0])} ${top(ends[k + 1][1])}`;
+      for (let k = 0; k + 1 < ends.length; k += 2) {
+        const piece = `M${left(ends[k][0])} ${top(ends[k][1])}L${left(ends[k + 1][0])} ${top(ends[k + 1][1])}`;
+        if ([a, b, c, d].includes(ABSENT)) lost += piece;
+        else outline += piece;
+      }
     }
   }
   const fine = 2 * rows;
@@ -60,5 +64,25 @@ export function regions(status, rows, width, height) {
     }
     bar(from, 1, code);
   }
-  return { paths, outline };
+  return { paths, outline, lost, places: widest(grid, width / columns, height / rows) };
+}
+
+const HALF_LINE = 11, HALF_LETTER = 4.2; // half the height of a line and half the width of a letter of words in areas, SVG units
+
+/** Places for the words of the areas: where they are furthest from all outlines, if there is room. @param {number[][]} grid of statuses */
+function widest(grid, dx, dy) {
+  const rows = grid.length, columns = grid[0].length;
+  return [...new Set(grid.flat())].flatMap((code) => {
+    const name = CLASSES[code], across = dx / (HALF_LETTER * (name === "none" ? 17 : 9)), up = dy / HALF_LINE, away = grid.map((row) => row.map((one) => (one === code ? Infinity : 0)));
+    const near = (j, i) => (j < 0 || i < 0 || j >= rows || i >= columns ? 0 : away[j][i]);
+    for (let j = 0; j < rows; j++) for (let i = 0; i < columns; i++) away[j][i] = Math.min(away[j][i], near(j, i - 1) + across, near(j - 1, i) + up);
+    let best = 1, at = null;
+    for (let j = rows - 1; j >= 0; j--) {
+      for (let i = columns - 1; i >= 0; i--) {
+        away[j][i] = Math.min(away[j][i], near(j, i + 1) + across, near(j + 1, i) + up);
+        if (away[j][i] > best) [best, at] = [away[j][i], { name, x: i * dx, y: (rows - 1 - j) * dy }];
+      }
+    }
+    return at ? [at] : [];
+  });
 }

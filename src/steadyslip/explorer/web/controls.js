@@ -5,6 +5,7 @@ import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
 import { named } from "./words.js";
 
+const EDGE = "1.5px", HATCH = 0.02; // EDGE: width of the mark of an edge; HATCH: period of the hatching, share of the track
 const THIN = 0.006; // least share of a track for a visible colour
 const ROOM = 15; // letters that fit into a field
 const STEPS = 1000, NEAR = 0.005, FAR = 0.05;
@@ -14,7 +15,7 @@ export class Controls {
   /** @param {import("./page.js").Page} page */
   constructor(page) {
     this.page = page;
-    this.box = make("section", { className: "controls", "aria-label": "parameters" }, make("p", { className: "hint", textContent: "Type a value with its unit, as 2.5 kN; a bare number counts in the unit that stands in its field." }));
+    this.box = make("section", { className: "controls", "aria-label": "parameters" }, make("p", { className: "invites", textContent: "Drag a slider and watch the verdict; or type a value with its unit, as 2.5 kN." }));
     let group = "";
     this.rows = page.rig.data.parameters.map((one, i) => {
       if (one.group !== group) this.box.append(make("h2", { textContent: one.group }));
@@ -26,9 +27,9 @@ export class Controls {
   }
 
   row(one, i) {
-    const label = `${one.name}: ${named(one.doc, one.unit)}`, { page } = this, id = `taken-${Math.random().toString(36).slice(2)}`; // unique: a document may have several pages
-    const slider = make("input", { type: "range", min: "0", max: String(STEPS), step: "any", "aria-label": label });
-    const text = make("input", { type: "text", "aria-label": `${label}, value with unit`, spellcheck: false, autocomplete: "off", "aria-describedby": id });
+    const label = `${one.title}: ${named(one.doc, one.unit)}`, { page } = this, id = `taken-${Math.random().toString(36).slice(2)}`; // unique: a document may have several pages
+    const slider = make("input", { type: "range", min: "0", max: String(STEPS), step: "any", "aria-label": label, "data-name": one.name });
+    const text = make("input", { type: "text", "aria-label": `${label}, value with unit`, spellcheck: false, autocomplete: "off", "aria-describedby": id, "data-name": one.name });
     const fault = make("span", { className: "fault", role: "alert" }), taken = make("span", { className: "taken hint", id });
     const row = { box: /** @type {any} */ (null), slider, text, fault, taken, name: /** @type {any} */ (null), refused: NaN };
     slider.addEventListener("input", () => page.slide(i, Number(slider.value) / STEPS, true));
@@ -49,7 +50,8 @@ export class Controls {
     text.addEventListener("focus", () => tell(taken, this.unit(i) === "1" ? "" : `a bare number counts in ${this.unit(i)}`));
     text.addEventListener("input", () => tell(taken, this.taken(i)));
     text.addEventListener("blur", () => tell(taken, ""));
-    const name = make("span", { className: "name" }, make("b", { textContent: one.label.replace(/[_.]/g, "$&\u200b") }), " ", make("small", { textContent: named(one.doc, one.unit) }));
+    const about = named(one.doc, one.unit); // left out where it says no more than the title
+    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", { textContent: about.startsWith(one.title.split(" ")[0]) ? "" : about }));
     return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
   }
 
@@ -91,7 +93,7 @@ export class Controls {
   /** Update the shown values and tracks. */
   show() {
     const { rig, tracks } = this.page;
-    this.rows.forEach(({ slider, text, name, refused }, i) => {
+    this.rows.forEach(({ box, slider, text, name, refused }, i) => {
       const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = unitFor(one, value);
       const place = String(STEPS * this.page.scale(i).of(value)), typed = (many) => `${Number((value / factor).toPrecision(many))} ${unit}`.trim(), words = typed(typed(6).length > ROOM ? 4 : 6);
       if (slider.value !== place) slider.value = place;
@@ -100,11 +102,27 @@ export class Controls {
         if (!Number.isNaN(refused)) this.forget(i);
         if (text.value !== words) text.value = words;
       }
+      box.classList.toggle("pinned", this.page.chart.axes.includes(i));
       name.classList.toggle("changed", !Object.is(value, one.value));
-      const stops = visible(tracks[i], this.page.scale(i).of(value)).flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));
+      const stops = visible(tracks[i], this.page.scale(i).of(value)).flatMap((part, n) => [...(n ? [`var(--ink) ${inPercent(part.from)}`, `var(--ink) calc(${inPercent(part.from)} + ${EDGE})`] : []), ...filled(part)]);
       put(slider, "style", `--track: linear-gradient(to right, ${stops.join(", ")})`);
     });
   }
+}
+
+const inPercent = (share) => `${(100 * share).toFixed(2)}%`;
+
+/** Stops of the colour gradient of a part of a track; that without steady sliding is hatched. */
+function filled({ from, to, status }) {
+  const name = CLASSES[status], many = name === "none" ? Math.max(1, Math.round((to - from) / HATCH)) : 0, at = (k) => inPercent(from + ((to - from) * k) / many);
+  const hatches = Array.from({ length: many }, (_, k) => `var(--none) ${at(k + 0.65)}, var(--soft) ${at(k + 0.65)} ${at(k + 1)}, var(--none) ${at(k + 1)}`);
+  return [`var(--${name}) ${inPercent(from)}`, ...hatches, `var(--${name}) ${inPercent(to)}`];
+}
+
+/** Title of a parameter with its letter, the subscript below the line. @param {any} one @returns {(string | Node)[]} */
+export function lettered({ title, letter }) {
+  const [base, below] = letter.split("_");
+  return below && title.includes(letter) ? [title.slice(0, title.indexOf(letter)) + base, make("sub", { textContent: below })] : [title];
 }
 
 /** Parts of a track, thin ones widened to be visible, but never over the position of the rig. @param {{from: number, to: number, status: number}[]} parts @param {number} own */

@@ -10,6 +10,7 @@ import { outcome, quantity, slow } from "./words.js";
 
 /** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; indices of those of the phase plane */
 
+const LEAD = 0.08; // part of the time after the disturbance that is drawn before it
 const AWAY = 1e6; // velocity over that of steady sliding above which a run-away is not drawn
 const STILL = 1e-15, LOOSE = 1e-3; // slip rate and normal force over those of steady sliding below which the contact counts as stuck and as open
 const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // HIGH: height of a strip and PLANE: box of the phase plane, SVG units; LISTED: most events in the list; FILM: duration of replay, ms
@@ -30,7 +31,7 @@ export class Course {
     const { motion, still, sketch } = page.rig.data;
     if (motion) motion.parameters ??= page.rig.data.facts.parameters;
     this.mover = motion && new Mover(library, motion);
-    this.box = make("section", { className: "motion", "aria-label": "motion" }, make("h2", { textContent: "What does it do?" }));
+    this.box = make("section", { className: "motion", "aria-label": "motion", tabIndex: -1 }, make("h2", { textContent: "What does it do?" }));
     this.told = make("p", { className: "told", role: "status" });
     this.done = make("p", { className: "hint" }); // text: disturbance and time
     this.sketch = /** @type {any} */ (page.rig.data.phrases ? new MachineSketch(sketch, motion?.bodies ?? []) : new Sketch(sketch));
@@ -43,14 +44,14 @@ export class Course {
 
   build() {
     this.taken = make("p", { className: "bare", id: `bare-${Math.random().toString(36).slice(2)}`, textContent: "A bare number counts in the unit that its field shows." });
-    this.disturbance = make("select", { "aria-label": "disturbance" }, ...Object.keys(DISTURBANCES).map((value) => make("option", { value, textContent: called(value, this.page.rig.data) })));
-    this.size = make("input", { type: "text", "aria-label": "size of the disturbance", size: 9, "aria-describedby": this.taken.id });
-    this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself", "aria-describedby": this.taken.id });
+    this.disturbance = make("select", { "aria-label": "after a disturbance" }, ...Object.keys(DISTURBANCES).map((value) => make("option", { value, textContent: called(value, this.page.rig.data) })));
+    this.size = make("input", { type: "text", "aria-label": "of: size of the disturbance", size: 9, "aria-describedby": this.taken.id });
+    this.length = make("input", { type: "text", "aria-label": "for: length of the run", size: 9, placeholder: "by itself", "aria-describedby": this.taken.id });
     this.halt = make("button", { type: "button", textContent: "stop", disabled: true, onclick: () => this.mover.stop() });
     const { motion } = this.page.rig.data, { contacts, bodies, shares } = motion, named = [...contacts, ...bodies.map(([name]) => name)].filter(Boolean);
-    this.on = make("select", { "aria-label": "where it acts", onchange: () => this.forget() });
+    this.on = make("select", { "aria-label": "on: where it acts", onchange: () => this.forget() });
     this.where = make("label", {}, "on ", this.on);
-    this.view = make("select", { "aria-label": "contact or body", onchange: () => (this.draw(), this.page.note()) }, ...named.map((name, n) => make("option", { value: String(n), textContent: `${n < contacts.length ? "contact" : "body"} ${name}` })));
+    this.view = make("select", { "aria-label": "shown: contact or body", onchange: () => (this.draw(), this.page.note()) }, ...named.map((name, n) => make("option", { value: String(n), textContent: `${n < contacts.length ? "contact" : "body"} ${name}` })));
     this.shown = make("label", { hidden: !named.length }, "shown: ", this.view);
     this.choose = () => {
       const names = Object.keys(shares[this.disturbance.value] ?? {}).filter(Boolean);
@@ -156,6 +157,7 @@ export class Course {
       clearTimeout(this.late);
       this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own }));
       this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
+      this.course.since = Math.max(0, wanted.at - LEAD * (this.course.until - wanted.at)); // the curves begin just before the disturbance
       this.told.textContent = outcome(this.course, this.page.rig.data);
       this.done.textContent = wanted.words;
       this.draw();
@@ -215,14 +217,14 @@ export class Course {
     const { left, width } = this.page.size, { plane: [across, up] } = now, steady = (values) => values.every((one) => Math.abs(one - values[0]) <= 1e-6 * Math.abs(values[0]));
     const strips = now.shown.map((_, n) => n).filter((n) => n < 2 || !steady(now.shown[n][0]));
     this.boxes = strips.map((_, row) => ({ left, width, top: 8 + row * (HIGH + 14), height: HIGH }));
-    const parts = strips.map((n, row) => strip(this.boxes[row], all.map((one) => ({ times: one.times, values: one.shown[n][0] })), course.until, now.shown[n][1], now.shown[n][2], row === strips.length - 1));
+    const parts = strips.map((n, row) => strip(this.boxes[row], all.map((one) => ({ times: one.times, values: one.shown[n][0] })), [course.since, course.until], now.shown[n][1], now.shown[n][2], row === strips.length - 1));
     const bottom = this.boxes[this.boxes.length - 1].top + HIGH;
     this.cursor = svg("line", { class: "cursor", y1: this.boxes[0].top, y2: bottom });
-    const when = left + straight(0, course.until).of(course.at) * width, step = svg("line", { class: "step", x1: when, x2: when, y1: this.boxes[0].top, y2: bottom });
+    const when = left + straight(course.since, course.until).of(course.at) * width, step = svg("line", { class: "step", x1: when, x2: when, y1: this.boxes[0].top, y2: bottom });
     this.dots = strips.map(() => svg("circle", { class: "at", r: 4 }));
     this.strips.setAttribute("viewBox", `0 0 ${left + width + 14} ${bottom + 40}`);
     this.strips.setAttribute("aria-label", `${now.shown.map(([, , label]) => label).join(", ")} over time: ${this.told.textContent}`);
-    this.strips.replaceChildren(...parts.map((part) => part.group), ...(when < left + width ? [step] : []), this.cursor, ...this.dots);
+    this.strips.replaceChildren(...parts.map((part) => part.group), ...(when < left + width ? [step] : []), ...(course.status === "blow-up" ? [svg("line", { class: "blow-up", x1: left + width, x2: left + width, y1: this.boxes[0].top, y2: bottom })] : []), this.cursor, ...this.dots);
     const named = (n) => /** @type {[string, string]} */ ([now.shown[n][1], now.shown[n][2]]);
     const drawn = plane(PLANE, all.map((one) => ({ x: one.shown[across][0], y: one.shown[up][0] })), named(across), named(up));
     this.mark = svg("circle", { class: "at", r: 5 });
@@ -239,7 +241,7 @@ export class Course {
     this.list.style.display = events.length ? "" : "none";
     this.list.firstChild.textContent = `${events.length} slip event${events.length === 1 ? "" : "s"}${from ? `, the last ${LISTED} of them` : ""}`;
     this.events.replaceChildren(...events.slice(from).map((one) => {
-      const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show(one.begin / this.course.until));
+      const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show((one.begin - this.course.since) / (this.course.until - this.course.since)));
       const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? shown(one.drop, "N") : quantity(one.drop, "Pa", area), one.every !== null ? shown(one.every, "s", 3) : ""];
       return make("tr", {}, ...cells.map((cell) => make("td", {}, cell)));
     }));
@@ -257,7 +259,7 @@ export class Course {
   /** Show the run at a time. @param {number} share of its duration, 0 to 1 */
   show(share) {
     if (!this.course || !this.now.times.length) return;
-    const at = Math.min(1, Math.max(0, share)) * this.course.until, { times, shown: series, strips, drawn, plane: [across, up] } = this.now, { left, width } = this.page.size;
+    const { since, until } = this.course, at = since + Math.min(1, Math.max(0, share)) * (until - since), { times, shown: series, strips, drawn, plane: [across, up] } = this.now, { left, width } = this.page.size;
     let low = 0, high = times.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
@@ -265,7 +267,7 @@ export class Course {
       else high = middle;
     }
     const part = times[high] > times[low] ? Math.min(1, Math.max(0, (at - times[low]) / (times[high] - times[low]))) : 0, between = (all) => all[low] + part * (all[high] - all[low]);
-    const x = left + straight(0, this.course.until).of(at) * width;
+    const x = left + straight(this.course.since, this.course.until).of(at) * width;
     this.time.value = String(1000 * share);
     this.time.setAttribute("aria-valuetext", shown(at, "s"));
     this.cursor.setAttribute("x1", x.toFixed(1));

@@ -27,6 +27,14 @@ function legend() {
   return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key("at other values of what the bar shows, the larger the higher", ...dots));
 }
 
+/** Text of the distance to an edge: per cent, a factor, degrees, or "from zero". */
+function change(one, value, at) {
+  const sign = at < value ? "" : "+", ratio = at / value, few = (share) => `${sign}${digits(share, 3)}`;
+  if (one.unit === "rad") return `${few(((at - value) * one.factor * 180) / Math.PI)}\u00a0deg`;
+  if (!value) return "from zero";
+  return (ratio > 0 && ratio < 0.1) || Math.abs(ratio) > 10 ? `×\u00a0${digits(ratio, 3)}` : `${few(100 * (at - value) / Math.abs(value))}\u00a0%`;
+}
+
 export class Facts {
   /** @param {import("./page.js").Page} page */
   constructor(page) {
@@ -37,7 +45,7 @@ export class Facts {
     this.near = make("ol", { className: "edges" });
     this.far = make("details", {}, make("summary", {}), make("ol", { className: "edges" }));
     const head = make("thead", {}, make("tr", {}, ...["growth rate", "oscillation", "size"].map((text) => make("th", { textContent: text, scope: "col" }))));
-    this.box = make("section", { className: "facts", "aria-label": "details" },
+    this.box = make("section", { className: "facts", "aria-label": "details", tabIndex: -1 },
       make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: `one parameter changed, the others as they are; press to go ${100 * BESIDE} % to its stable side, or to the one that slides steadily` }), this.near, this.far),
       this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
       this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas, this.locus.note,
@@ -67,11 +75,11 @@ export class Facts {
   showEdges() {
     const { page } = this;
     const rows = (edges) => edges.map((edge) => {
-      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", textContent: `${one.name} → ${told(one, edge.at)}` });
+      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", textContent: `${one.title} → ${told(one, edge.at).replace(/ /g, "\u00a0")}`, "data-name": one.name });
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.put(page.with(edge.i, edge.landing));
       });
-      return make("li", {}, go, ` ${beyondWords(edge, page)}`);
+      return make("li", {}, go, ` ${change(one, page.rig.values[edge.i], edge.at)}: ${beyondWords(edge, page)}`);
     });
     const found = page.edges(), far = found.filter((edge) => edge.far);
     this.near.replaceChildren(...rows(found.filter((edge) => !edge.far)));

@@ -6,6 +6,7 @@ import { told } from "./quantities.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
 const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
+const WRITTEN = { stable: "stable", unstable: "unstable", none: "no steady sliding", unknown: "no such rig" }; // words in the areas
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Chart {
@@ -20,10 +21,10 @@ export class Chart {
     this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // unique: a document may have several pages
     const { parameters } = page.rig.data;
     this.choices = [0, 1].map((which) => {
-      const select = make("select", { "aria-label": which ? "parameter upwards" : "parameter across" },
-        ...parameters.map((one, i) => make("option", { value: String(i), textContent: one.name })));
+      const select = make("select", { "aria-label": which ? "up: parameter upwards" : "across: parameter across" },
+        ...parameters.map((one) => make("option", { value: one.name, textContent: one.title })));
       select.addEventListener("change", () => {
-        this.put(which, Number(select.value));
+        this.put(which, select.selectedIndex);
         this.show();
         page.note();
       });
@@ -38,8 +39,8 @@ export class Chart {
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => page.rest());
     this.canvas.addEventListener("keydown", (event) => this.nudge(event));
     this.key = Object.entries(KEY).map(([name, words]) => make("span", { className: name }, make("i", { className: name }), words));
-    this.box = make("section", { className: "map", "aria-label": "chart of stability" }, make("h2", { textContent: "Where is it stable?" }),
-      make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys" })),
+    this.box = make("section", { className: "map", "aria-label": "chart of stability", tabIndex: -1 }, make("h2", { textContent: "Where is it stable?" }),
+      make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys; solid line: edge of stability, dashed: edge of steady sliding" })),
       this.canvas, make("p", { className: "key" }, ...this.key));
   }
 
@@ -68,23 +69,25 @@ export class Chart {
     if (this.page.root.dataset.width === "narrow" && this.page.part !== "chart") return; // not visible
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
-    this.choices.forEach((select, which) => (select.value = String(this.axes[which])));
+    this.choices.forEach((select, which) => (select.selectedIndex = this.axes[which]));
     const rows = (facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? 2 : 1); // half the rows while a slider moves
     const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
     if (others !== this.painted || rows > this.rows) { // regions are painted anew only if other values change or more rows are wanted
       [this.painted, this.rows] = [others, rows];
-      const { paths, outline } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
+      const { paths, outline, lost, places } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
       this.frame(i, j, x, y);
       for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);
       put(this.hatched, "d", paths.none);
       const seen = new Set(this.page.tracks.flatMap((track) => track.map((part) => CLASSES[part.status])));
       for (const one of this.key) one.hidden = !paths[one.className] && !seen.has(one.className); // no legend for regions that are not in the chart
       put(this.outline, "d", outline);
+      put(this.lost, "d", lost);
+      this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, WRITTEN[name])));
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
     this.point.setAttribute("cx", String(box.left + at[0] * box.width));
     this.point.setAttribute("cy", String(box.top + (1 - at[1]) * box.height));
-    const words = [i, j].map((n) => `${parameters[n].name} ${told(parameters[n], rig.values[n])}`);
+    const words = [i, j].map((n) => `${parameters[n].title} ${told(parameters[n], rig.values[n])}`);
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
   }
 
@@ -98,10 +101,12 @@ export class Chart {
     const stripes = svg("pattern", { id: this.stripes, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("line", { x1: 0, y1: 0, x2: 0, y2: 8, class: "stripe" }));
     this.hatched = svg("path", { fill: `url(#${this.stripes})` });
     this.outline = svg("path", { class: "outline" });
-    inner.append(stripes, this.hatched, this.outline);
+    this.lost = svg("path", { class: "outline lost" });
+    this.words = svg("g", {});
+    inner.append(stripes, this.hatched, this.outline, this.lost, this.words);
     this.point = svg("circle", { r: 8, class: "point" });
     this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
     this.canvas.replaceChildren(inner,
-      axis(box, x, ranges[i], parameters[i], parameters[i].name, false), axis(box, y, ranges[j], parameters[j], parameters[j].name, true), this.point);
+      axis(box, x, ranges[i], parameters[i], parameters[i].title, false), axis(box, y, ranges[j], parameters[j], parameters[j].title, true), this.point);
   }
 }

@@ -10,6 +10,7 @@ import { Chart } from "./map.js";
 import { unitFor } from "./quantities.js";
 import { Rig, inside, nearestOf, rangeOf, scaleOf } from "./rig.js";
 import { changes } from "./search.js";
+import { stories } from "./stories.js";
 import { all, choose, chosen, chosenIn } from "./view.js";
 import { kindOf } from "./words.js";
 
@@ -36,6 +37,7 @@ export class Page {
   /** @type {Course} */ course;
   /** @type {any} */ tools;
   size = WIDE;
+  guessing = false;
   wide = 0; // width of the bar, px
   part = OPENED.values; // part shown on a narrow page
   first = /** @type {Record<string, string>} */ ({}); // initial choices of the page
@@ -58,7 +60,7 @@ export class Page {
     this.measure();
     this.tabs = Object.entries(OPENED).map(([part, words]) => make("button", { type: "button", textContent: words, onclick: () => this.open(part) }));
     this.word = make("b", {});
-    root.replaceChildren(this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, ...this.tabs));
+    root.replaceChildren(this.skips(), this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, ...this.tabs));
     this.open(this.part);
     this.judge();
     requestAnimationFrame(() => setTimeout(() => this.furnish(library))); // let the browser show the verdict first
@@ -74,6 +76,7 @@ export class Page {
     const near = this.edges().filter((edge) => !edge.far && edge.at).map((edge) => edge.i);
     if (data.phrases && near.length) [rig.bar] = near; // show the parameter with the nearest edge
     const k = Math.max(0, rig.bar), across = near.find((i) => i !== k) ?? (k === 0 ? 1 % data.parameters.length : 0);
+    const tales = stories(this);
     rig.values = values;
     this.fit(values);
     this.trace();
@@ -82,13 +85,15 @@ export class Page {
     this.facts = new Facts(this);
     this.course = new Course(this, library);
     root.append(make("main", {}, this.controls.box, make("div", { className: "middle" }, this.chart.box, this.course.box), this.facts.box), this.foot());
-    this.tools.append(...leaving(this), button("◐", "light or dark", () => {
+    this.tools.prepend(tales);
+    this.tools.append(...leaving(this), make("button", { type: "button", textContent: "guess first", title: "hide the verdict until it is guessed, for teaching", "aria-pressed": "false", onclick: (event) => this.guess(event.currentTarget) }), button("◐", "light or dark", () => {
       const dark = getComputedStyle(root).colorScheme.includes("dark");
       root.dataset.theme = dark ? "light" : "dark";
     }));
     this.first = all(this);
     if (!this.told) choose(this, chosenIn(location.hash));
     this.redraw();
+    new ResizeObserver(() => root.style.setProperty("--head", `${this.banner.box.offsetHeight + 8}px`)).observe(this.banner.box);
     new ResizeObserver(() => {
       if (!this.measure()) return;
       this.chart.show();
@@ -153,6 +158,31 @@ export class Page {
     return make("header", {}, this.said, make("p", { className: "brand" }, make("b", { textContent: title }), ` explored with steadyslip ${version}`), this.tools);
   }
 
+  /** Buttons for the keyboard that lead to the parts of the page. */
+  skips() {
+    const to = (words, part, box) => make("button", { type: "button", textContent: `skip to the ${words}`, onclick: () => {
+      if (part) this.open(part);
+      box()?.focus();
+    } });
+    return make("nav", { className: "skip", "aria-label": "skip links" }, to("verdict", "", () => this.banner.box), to("values", "values", () => this.controls?.rows[0]?.slider),
+      to("chart", "chart", () => this.chart?.canvas), to("motion", "motion", () => this.course?.box), to("edges", "numbers", () => this.facts?.box));
+  }
+
+  /** Hide the verdict until it is guessed, after each change of values, or end that. @param {any} pressed button */
+  guess(pressed) {
+    this.guessing = !this.guessing;
+    put(pressed, "aria-pressed", String(this.guessing));
+    if (this.guessing) this.root.dataset.guess = "yes";
+    else delete this.root.dataset.guess;
+  }
+
+  /** Show the verdict after a guess, and say whether it was right. @param {string} kind */
+  guessed(kind) {
+    delete this.root.dataset.guess;
+    const now = kindOf(this.answer);
+    this.say(`${kind === now ? "Right" : "Not so"}: ${this.banner.sentence.textContent}`);
+  }
+
   foot() {
     const many = this.rig.data.checks.length;
     const words = this.differs.length ? "" : `This browser agrees with ${many} answers of Python that came with the page. `;
@@ -209,6 +239,7 @@ export class Page {
     }
     this.future = [];
     this.rig.values = values;
+    if (this.guessing) this.root.dataset.guess = "yes";
     this.redraw();
   }
 

@@ -86,7 +86,7 @@ const frame = (box) => svg("rect", { x: box.left, y: box.top, width: box.width, 
 
 /** SVG path of a series over rising times; of many points only the lowest and highest of each pixel column. */
 export function pathOver(box, times, values, along, up) {
-  let path = "", column = -1, least = 0, most = 0, pen = "M";
+  let path = "", column = -1, least = 0, most = 0, pen = "M", outside = /** @type {number[]} */ ([]);
   const put = (x, y) => {
     path += `${pen}${x.toFixed(1)} ${y.toFixed(1)}`;
     pen = "L";
@@ -96,8 +96,16 @@ export function pathOver(box, times, values, along, up) {
     const x = box.left + along.of(times[i]) * box.width, y = clipped(box.top + (1 - up.of(values[i])) * box.height);
     if (x > box.left + box.width + 0.1) break;
     if (Number.isNaN(y)) { // a gap
-      [pen, column] = ["M", -1];
+      [pen, column, outside] = ["M", -1, []];
       continue;
+    }
+    if (x < box.left) {
+      outside = [x, y];
+      continue;
+    }
+    if (outside.length) { // begin at the frame
+      put(box.left, outside[1] + ((y - outside[1]) * (box.left - outside[0])) / (x - outside[0]));
+      outside = [];
     }
     if (Math.floor(x) !== column) {
       if (column >= 0 && most > least) put(column + 0.5, least), put(column + 0.5, most);
@@ -112,10 +120,10 @@ export function pathOver(box, times, values, along, up) {
 }
 
 /** Strip chart over time: axes and curves, faint ones first. @param {{times: any, values: any}[]} curves */
-export function strip(box, curves, until, unit, label, last) {
-  const up = spanning(extent(...curves.map((one) => one.values)), label), along = straight(0, until);
+export function strip(box, curves, [from, until], unit, label, last) {
+  const up = spanning(extent(...curves.map((one) => one.values)), label), along = straight(from, until);
   const group = svg("g", {}, axis(box, up.scale, up.range, { unit }, label, true));
-  if (last) group.append(axis(box, along, [0, until], { unit: "s" }, "time", false));
+  if (last) group.append(axis(box, along, [from, until], { unit: "s" }, "time", false));
   group.append(frame(box));
   curves.forEach((one, n) => group.append(svg("path", { class: n + 1 < curves.length ? "curve before" : "curve", d: pathOver(box, one.times, one.values, along, up.scale) })));
   return { group, up: up.scale };

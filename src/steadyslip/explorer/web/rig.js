@@ -3,7 +3,7 @@ import { Linear, UNKNOWN } from "./linear.js";
 import { exactly } from "./quantities.js";
 
 /**
- * @typedef {{name: string, group: string, label: string, unit: string, factor: number, value: number, natural: number, doc: string,
+ * @typedef {{name: string, group: string, title: string, letter: string, unit: string, factor: number, value: number, natural: number, doc: string,
  *   low: number | null, high: number | null, lowAllowed: boolean, highAllowed: boolean, whole: boolean,
  *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its SI size and the text of the value in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],

@@ -1,0 +1,28 @@
+// Stories: rigs to begin with, made from the values of the file and their nearest edges.
+import { make } from "./dom.js";
+import { STABLE } from "./linear.js";
+import { told } from "./quantities.js";
+import { inside } from "./rig.js";
+
+const TALES = 3; // edges that have a story
+
+/** Choice of a story: the rig of the file, just beyond its nearest edges, and at other speeds. @param {import("./page.js").Page} page */
+export function stories(page) {
+  const { parameters, speed } = page.rig.data, home = parameters.map((one) => one.value), drive = parameters.findIndex((one) => one.name === speed);
+  const found = /** @type {[string, number, number][]} */ ([]);
+  for (const edge of page.edges().filter((one) => !one.far).slice(0, TALES)) {
+    const one = parameters[edge.i], value = edge.beyond === STABLE ? edge.landing : edge.behind;
+    if (inside(one, value)) found.push([`${edge.beyond === STABLE ? "just stable" : "just beyond the edge"}: ${one.title} ${told(one, value)}`, edge.i, value]);
+  }
+  for (const [words, times] of /** @type {[string, number][]} */ ([["ten times as fast", 10], ["a tenth of the speed", 0.1]])) {
+    if (drive >= 0 && inside(parameters[drive], times * home[drive])) found.push([words, drive, times * home[drive]]);
+  }
+  const select = make("select", { "aria-label": "stories", title: "rigs to begin with" }, make("option", { textContent: "stories …", value: "" }), make("option", { textContent: "the rig of the file", value: "-1" }),
+    ...found.map(([words], n) => make("option", { textContent: words, value: String(n) })));
+  select.addEventListener("change", () => {
+    const [, i, value] = found[Number(select.value)] ?? ["", -1, 0];
+    if (select.value) page.put(home.map((own, n) => (n === i ? value : own)));
+    select.value = "";
+  });
+  return select;
+}

@@ -1,0 +1,175 @@
+"""Sections of a document for who ordered it: recommendation, assumptions, inputs, motion, laws and letters."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from steadyslip import figures
+from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.format import format_quantity, format_range
+from steadyslip.figures.inline import figure_html
+from steadyslip.linear.boundary import Margin
+from steadyslip.linear.status import stability
+from steadyslip.machine.letters import said
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.model.build import build_model
+from steadyslip.motion import simulate
+from steadyslip.protocol import VelocityStep
+from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table
+from steadyslip.verdict import Tolerated
+from steadyslip.verdict.findings import Verdict
+from steadyslip.verdict.words import REMOTE
+
+BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
+_PERIODS = 12  # length of the run in periods of the leading disturbance, so that its growth is seen
+_STEP, _BEFORE = 1.1, 0.05  # factor of the step of the drive velocity, and when it comes, share of the run
+_ROWS = 4  # changes that are recommended, nearest first
+
+
+def recommendation(analysis: Verdict, adjustable: Sequence[str] = ()) -> Iterator[str]:
+    """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
+
+    `adjustable` names what can be changed; otherwise all but parameters of friction, and these if nothing else helps.
+    """
+    yield heading("The recommendation")
+    rig = analysis.rig
+    if analysis.stable:
+        nearest = next((one for one in analysis.margins if one.edge is not None), None)
+        text = "No parameter has an edge within range."
+        if nearest is not None and nearest.edge is not None:
+            edge, now = (_value(analysis, nearest, value) for value in (nearest.edge.value, nearest.value))
+            name = said(rig, nearest.parameter)
+            text = f"The nearest edge is at {name} {edge}, now {now}: hold this value to a fraction of that distance."
+        yield paragraph(f"Keep it as it is. {text}")
+        return
+    curing = [one for one in analysis.margins if _cures(one)]
+    chosen = [one for one in curing if one.parameter in adjustable] if adjustable else []
+    chosen = chosen or [one for one in curing if "friction." not in one.parameter] or curing
+    rows = [row for one in chosen if (row := _change(analysis, one))][:_ROWS]
+    if not rows:
+        yield paragraph("No single change within range makes it stable; change several, as steadyslip cure proposes.")
+        return
+    name, now, to, *_ = rows[0]
+    yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
+    share = f"{100 * BEYOND_EDGE:g} %"
+    head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
+    yield table(rows, head, caption="Changes that make it stable.")
+
+
+def _cures(margin: Margin) -> bool:
+    edge = margin.edge
+    if edge is None or not edge.value:
+        return False
+    far = margin.unit != "rad" and margin.value and not 1 / REMOTE < abs(edge.value / margin.value) < REMOTE
+    return not far and edge.stable == ("above" if edge.value > margin.value else "below")
+
+
+def _change(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str] | None:
+    """Row of a change: name, value, recommended value, edge, and whether it is stable there; None if not."""
+    if margin.edge is None:
+        return None
+    rig: Any = analysis.rig
+    edge = margin.edge.value
+    away = math.copysign(BEYOND_EDGE * abs(edge - margin.value if margin.unit == "rad" else edge), edge - margin.value)
+    try:
+        holds = stability(rig.with_values({margin.parameter: edge + away})) == "stable"
+    except (ParameterError, NotAvailable):
+        holds = False
+    if not holds:
+        return None
+    word = "above" if edge > margin.value else "below"
+    words = [_value(analysis, margin, value) for value in (margin.value, edge + away, edge)]
+    return said(rig, margin.parameter), words[0], words[1], f"{word} {words[2]}", "yes"
+
+
+def _value(analysis: Verdict, margin: Margin, value: float) -> str:
+    return format_quantity(value, margin.unit, area=analysis.rig.area_of(margin.parameter))
+
+
+def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
+    """HTML of what the verdict takes for granted."""
+    yield heading("Assumptions")
+    inertia = "with inertia" if build_model(rig).inertial else "without inertia (quasistatic)"
+    yield paragraph(f"The rig is modelled {inertia}; bodies are rigid, and each contact has one normal force.")
+    yield paragraph(validity)
+    yield from (paragraph(text, "warning") for text in warnings)
+
+
+def tolerances_of(found: Tolerated | None) -> dict[str, str]:
+    """Text of the tolerance of each parameter by name."""
+    return (
+        {}
+        if found is None
+        else {one.parameter: format_range(one.low, one.high, one.unit, one.area) for one in found.alone}
+    )
+
+
+def notes_of(text: str) -> dict[str, str]:
+    """Comments behind the values of a rig file by dotted name, empty where there is none.
+
+    >>> notes_of("[friction]\\na = 0.01  # measured on B819\\nb = 0.02")
+    {'friction.a': 'measured on B819', 'friction.b': ''}
+    """
+    found, section = {}, ""
+    for line in text.splitlines():
+        if head := re.match(r"\s*\[+([\w.-]+)\]+", line):
+            section = head[1]
+        elif key := re.match(r"\s*([\w-]+)\s*=\s*(?:\"[^\"]*\"|[^#\"])*(?:#\s*(.*))?$", line):
+            found[f"{section}.{key[1]}"] = (key[2] or "").strip()
+    return found
+
+
+def motion(analysis: Verdict) -> Iterator[str]:
+    """HTML of the motion after a small step of the drive velocity: time history and phase plane with the cycle."""
+    yield heading("The motion")
+    rig: Any = analysis.rig
+    leading = next((s for s in analysis.eigenvalues if s.imag > 0), next(iter(analysis.eigenvalues), None))
+    if analysis.stable is None or leading is None or not abs(leading) or not math.isfinite(abs(leading)):
+        yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
+        return
+    period = 2 * math.pi / leading.imag if leading.imag else 5 / abs(leading.real)
+    until, speed = _PERIODS * period, float(rig.value("drive.velocity") or 0.0)
+    try:
+        run = simulate(rig, VelocityStep(at=_BEFORE * until, to=_STEP * speed), until=until)
+    except (NotAvailable, ParameterError) as refused:
+        yield paragraph(f"It was not simulated: {refused}.")
+        return
+    yield paragraph(f"After a step of the drive velocity by {100 * (_STEP - 1):.0f} %: {run.sentence or run.message}.")
+    words = "Motion after a small step of the drive velocity, over time."
+    yield figure(figure_html(lambda: figures.history(run), words, 6.4), words)
+    words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
+    yield figure(figure_html(lambda: figures.phase_plane(run), words, 5.0), words)
+
+
+def letters(rig: Slider | Machine) -> str:
+    """HTML table of the letters of the equations that are no inputs."""
+    model = build_model(rig)
+    rows = [(inline_math(model.written(one.symbol)), one.unit, one.doc) for one in model.variables]
+    return table(rows, ("letter", "unit", "meaning"), caption="Letters of the equations besides the inputs.")
+
+
+def references(rig: Slider | Machine) -> Iterator[str]:
+    """HTML of the laws of a rig with what their descriptions cite, and of the source of the method."""
+    yield heading("References")
+    parts: list[Any] = [rig] if isinstance(rig, Slider) else list(rig.contacts.values())
+    laws: list[Any] = []
+    for one in parts:
+        friction = one.friction
+        laws += [friction, getattr(friction, "evolution", None), getattr(friction, "normal_memory", None)]
+        laws += [getattr(one, "contact", None) or getattr(one, "law", None)]
+    rows = {}
+    for law in laws:
+        if law is not None and getattr(law, "name", ""):
+            rows[law.name] = (law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0])
+    yield table(
+        list(rows.values()), ("law", "what it is"), caption="Laws that were used; their pages have the equations."
+    )
+    yield paragraph(
+        "Method and numbered equations: P. E. Dupont and D. Bapna, Stability of sliding frictional surfaces with "
+        "varying normal force, Journal of Vibration and Acoustics 116 (2), 237-242, 1994, eqs 17-32, with corrections."
+    )

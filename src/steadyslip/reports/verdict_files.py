@@ -1,0 +1,37 @@
+"""Files of a verdict: its picture, or its document."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from steadyslip import figures
+from steadyslip.files.output import write_by_ending
+from steadyslip.files.standalone import write_page
+from steadyslip.machine.slider import Slider
+from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated
+
+
+def write_verdict(
+    found: Analysis | MachineAnalysis, within: Tolerated | None, path: Path, source: Path, journal: bool = False
+) -> None:
+    """Write the verdict on a rig as .html, or as a picture: for sliders the stability chart, for machines its ranges.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written, or nothing can be drawn.
+    """
+    shown: Any = found if within is None else within
+
+    def drawn() -> Any:
+        with figures.journal() if journal else nullcontext():
+            if not isinstance(found, Analysis):
+                return found.plot()
+            rig: Slider = found.rig
+            stiffness = rig.stiffness_name()
+            near = [one.parameter for one in found.margins if one.edge is not None and one.parameter != stiffness]
+            return figures.stability_chart(rig, near[0], stiffness) if near else figures.root_locus(rig)
+
+    write_by_ending(path, {".html": lambda p: write_page(shown, p, "Verdict", source=source)}, drawn, found)

@@ -39,7 +39,6 @@ from .experiments import (
     population as population,
     predict as predict,
     read_record as read_record,
-    read_spec as read_spec,
     record_from_arrays as record_from_arrays,
 )
 from .explorer import (
@@ -104,6 +103,7 @@ from .nonlinear import (
     frozen_verdicts as frozen_verdicts,
     hopf as hopf,
     hopf_curve as hopf_curve,
+    hunt as hunt,
     margin_to_kick as margin_to_kick,
     orbit as orbit,
     response as response,

@@ -130,7 +130,7 @@ def test_a_time_at_the_end_of_its_window_stops_no_fit():
 @pytest.mark.campaign
 def test_two_states_of_half_a_minute_of_basalt():
     """The best minimum, beside a degenerate valley at 1.8755e-3 in which nearly all starts used to end."""
-    spec = ss.read_spec("examples/fits/basalt.toml")
+    spec = ss.experiments.read_spec("examples/fits/basalt.toml")
     record = spec.read("examples/data/basalt_b819_velocity_step.txt").between(11650, 11700)
     assert ss.fit(two(), record, trend=1, starts=6).ssq == pytest.approx(1.85867e-3, rel=1e-4)
 

@@ -134,7 +134,7 @@ def false_sentences(rig):
     found += [*_stiffness(rig, verdict, text), *_edges(rig, verdict, str(verdict)), *_causes(rig, verdict, text)]
     if ("run-away (blow-up)" in text) != (
         own in ("oscillation", "growth") and isinstance(rig.friction, ss.laws.RateState)
-        and not (rig.mass or rig.damping or rig.radiation_damping or rig.drive.derivative())
+        and not (rig.mass or rig.damping or rig.radiation_damping or rig.drive.dashpot())
     ):  # fmt: skip
         found.append("run-away")
     if "stick-slip sets in" in text or "may still start stick-slip" in text:

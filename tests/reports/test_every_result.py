@@ -63,7 +63,7 @@ LONG = {
     "LawComparison": lambda: ss.compare_laws(lab.rig(), made("Record"), ("slip", "aging")),
     "Population": lambda: ss.population({f"b{b}": fitted(b) for b in (0.014, 0.0145, 0.015)}, count=200),
     "StepTable": lambda: ss.experiments.step_table(made("Fit")),
-    "Spec": lambda: ss.read_spec(Path("examples/fits/basalt.toml")),
+    "Spec": lambda: ss.experiments.read_spec(Path("examples/fits/basalt.toml")),
 }  # fmt: skip
 
 

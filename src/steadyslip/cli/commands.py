@@ -516,6 +516,29 @@ def response(
 
 
 @app.command()
+def hunt(
+    rig: RigFile,
+    changes: Changes = None,
+    until: Annotated[
+        str | None, typer.Option(help="end, such as '200 s'; where it rests or a cycle repeats itself unless given")
+    ] = None,
+    pieces: Pieces = None,
+    rtol: Annotated[float, typer.Option(help="error of the motion allowed per step, with bristles")] = 1e-8,
+    require_settled: Annotated[
+        bool, typer.Option("--require-settled", help="exit with status 1 unless it settles")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Does an axis that is held (velocity = 0) hunt about its target, how far and how often, or settle?"""
+    from steadyslip.nonlinear.cycle_commands import hunt_of_file
+
+    found = hunt_of_file(rig, changes or (), pieces or (), until, rtol)
+    output_result(found, (), as_json, lambda result, path: None)
+    if require_settled and found.hunts is not False:
+        raise typer.Exit(1)
+
+
+@app.command()
 def verdicts(
     rig: RigFile,
     changes: Changes = None,

@@ -13,7 +13,10 @@ from steadyslip.core.errors import Problem
 
 @dataclass(frozen=True)
 class Domain:
-    """Interval of allowed values, open or closed at each end, of integers only if `whole`; `text` describes it."""
+    """Interval of allowed values, open or closed at each end, of integers only if `whole`; `text` describes it.
+
+    `apart` is a single value outside of it that a record may have, but that is not reached by varying the parameter.
+    """
 
     low: float
     high: float
@@ -21,6 +24,7 @@ class Domain:
     high_allowed: bool
     text: str
     whole: bool = False
+    apart: float | None = None
 
     def contains(self, value: Any) -> Any:
         """Test values elementwise; False for NaN and infinity."""
@@ -31,6 +35,7 @@ class Domain:
 
 _INF = math.inf
 positive = Domain(0, _INF, False, True, "a finite number > 0")
+speed = Domain(0, _INF, False, True, "a finite number > 0, or 0 to hold a place", apart=0.0)
 nonnegative = Domain(0, _INF, True, True, "a finite number >= 0")
 real = Domain(-_INF, _INF, True, True, "a finite number")
 share = Domain(0, 1, True, True, "a number from 0 to 1")

@@ -181,7 +181,7 @@ class Parameter(Entry):
                 number = float(value)
             except (TypeError, ValueError, OverflowError) as error:
                 raise self.refused(value) from error
-        if not self.domain.contains(number):
+        if not self.domain.contains(number) and number != self.domain.apart:
             raise self.refused(value)
         return number + 0.0  # turns -0.0 into 0.0, which equals the default when files are written
 
@@ -209,7 +209,8 @@ class Parameter(Entry):
         domain = self.domain
         number: Schema = {"type": "integer" if domain.whole else "number"}
         if math.isfinite(domain.low):
-            number["minimum" if domain.low_allowed else "exclusiveMinimum"] = domain.low
+            reached = domain.low_allowed or domain.apart == domain.low
+            number["minimum" if reached else "exclusiveMinimum"] = domain.low
         if math.isfinite(domain.high):
             number["maximum" if domain.high_allowed else "exclusiveMaximum"] = domain.high
         unit = "" if self.unit == "1" else f", {self.unit}"

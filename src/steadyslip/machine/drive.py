@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from steadyslip.core.domains import nonnegative, positive
+from steadyslip.core.domains import nonnegative, positive, speed
 from steadyslip.core.records import FrozenRecord, parameter
+from steadyslip.machine.holding import Holding, limit, windup
+from steadyslip.machine.mechanism import Limits
 
 
 class Drive(FrozenRecord, family="drive", kw_only=False):
@@ -24,7 +26,7 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         """Stiffness added by the controller (Pa/m)."""
         return 0
 
-    def derivative(self) -> Any:
+    def dashpot(self) -> Any:
         """Damping added by the controller (Pa s/m)."""
         return 0
 
@@ -36,14 +38,21 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         """Dead time (s) between measuring and acting."""
         return 0
 
+    def limits(self) -> Limits | None:
+        """What sets a controller apart from a linear one; None for a load point."""
+        return None
+
 
 class SteadyDrive(Drive, name="steady", kw_only=False):
     """A load point pulled at constant velocity."""
 
 
-class PD(Drive, name="pd", kw_only=False):
+class PD(Holding, Drive, name="pd", kw_only=False):
     """A position controller with proportional and derivative gain, following the ramp v0 t."""
 
+    velocity: float = parameter("m/s", speed, "velocity of the load point in steady sliding; 0 to hold a place")
+    force_limit: float | None = limit("Pa")
+    integral_limit: float | None = windup("Pa")
     kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True, kind="stiffness")
     kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True)
     delay: float = parameter(
@@ -53,7 +62,7 @@ class PD(Drive, name="pd", kw_only=False):
     def proportional(self) -> Any:
         return self.kp
 
-    def derivative(self) -> Any:
+    def dashpot(self) -> Any:
         return self.kd
 
     def lateness(self) -> Any:

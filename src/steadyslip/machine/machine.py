@@ -79,10 +79,13 @@ class Machine(Rig):
             yield Problem(where, f"{name!r} {does} in steady sliding; name a body that moves forwards")
             return
         given = self.drive.velocity
-        object.__setattr__(self, "drive", replace(self.drive, velocity=given * (given / speed), velocity_of=None))
+        own = 0.0 if self.holds else given * (given / speed)
+        object.__setattr__(self, "drive", replace(self.drive, velocity=own, velocity_of=None))
 
     def inconsistencies(self) -> Iterator[Problem]:
         faults = [*self._name_problems(), *self._end_problems()]
+        if self.holds and any(body.is_structure for body in self.bodies.values()):
+            yield Problem("drive.velocity", "got 0; a place is held of bodies, not with a structure; allowed: > 0")
         yield from faults
         if not faults:
             yield from self._contact_problems()
@@ -270,13 +273,14 @@ class Machine(Rig):
             end: 0 for end in self.ends()
             if (at := self._structure_at(end)) is not None and not at[1].data.rigid_motions.size
         }  # fmt: skip
-        speeds, closing = rigid_motion({LOAD_POINT: self.drive.velocity, GROUND: 0, **still}, self._ties())
+        pace = 1.0 if self.holds else self.drive.velocity  # at rest the ratios of the speeds count
+        speeds, closing = rigid_motion({LOAD_POINT: pace, GROUND: 0, **still}, self._ties())
         return {name: 0 if _is_zero(speed) else speed for name, speed in speeds.items()}, closing
 
     def speeds(self) -> dict[str, Any]:
         """Speeds of bodies and of points of structures in steady sliding (m/s or rad/s), by name."""
         speeds, _ = self._speeds()
-        return {name: speeds[name] for name in self.ends()}
+        return {name: 0 if self.holds else speeds[name] for name in self.ends()}
 
     def _slip_rate(self, surface: Surface, speeds: dict[str, Any]) -> Any:
         lever = 1 if surface.radius is None else surface.radius
@@ -319,7 +323,8 @@ class Machine(Rig):
             if body.is_structure:
                 continue
             unit = "rad" if body.turns else "m"
-            coordinates.append(DegreeOfFreedom(name, body.inertia_of(), speeds[name], body.along(), unit))
+            pace = 0 if self.holds else speeds[name]
+            coordinates.append(DegreeOfFreedom(name, body.inertia_of(), pace, body.along(), unit))
             if body.lifts:
                 coordinates.append(DegreeOfFreedom(name + NORMAL, body.inertia_of(), 0, body.away()))
         elements = [self._element(name, link) for name, link in self.links.items()]
@@ -334,8 +339,15 @@ class Machine(Rig):
             for name, surface in self.contacts.items()
         )  # fmt: skip
         structures = tuple(_structure_part(n, b, speeds) for n, b in self.bodies.items() if b.is_structure)
+        velocity, limits = self.drive.velocity, self.drive.limits()
         return Mechanism(
-            tuple(coordinates), (*elements, *controls), integral, contacts, self.drive.velocity, structures=structures
+            tuple(coordinates),
+            (*elements, *controls),
+            integral,
+            contacts,
+            velocity,
+            structures=structures,
+            limits=limits,
         )
 
     def row(self, end: str, axis: str) -> dict[str, Any]:
@@ -371,9 +383,9 @@ class Machine(Rig):
         place, speed = ({body: speeds[driven] / speeds[body], LOAD_POINT: -1} for body in self.drive.watched())
         kp, kd, held, ki = self.drive.gains()
         acts, late = {driven: 1}, self.drive.lateness()
-        elements = [Element("", acts, place, kp, kd if place == speed else 0, delay=late)]
+        elements = [Element("", acts, place, kp, kd if place == speed else 0, delay=late, active=True)]
         if place != speed or held != 0:
-            elements.append(Element("", acts, speed, held, 0 if place == speed else kd, delay=late))
+            elements.append(Element("", acts, speed, held, 0 if place == speed else kd, delay=late, active=True))
         sensed = {name: share for name, share in place.items() if name != LOAD_POINT}
         return tuple(elements), None if ki is None else Integral(acts, sensed, ki, late)
 

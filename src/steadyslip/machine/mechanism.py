@@ -49,6 +49,8 @@ class Element:
         True for links to the ground: their force is not part of the spring force T of contact laws.
     delay
         Dead time (s) between sensing and acting.
+    active : bool
+        True for controllers.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Element:
     damping: Any
     grounded: bool = False
     delay: Any = 0
+    active: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,33 @@ class Integral:
     senses: Shares
     gain: Any
     delay: Any = 0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What sets a controller that holds a place apart from its linear terms; SI units, None where there is none.
+
+    Attributes
+    ----------
+    on_measurement : bool
+        True if the derivative is that of the measured place, not of the error.
+    force, integral : float or None
+        Largest force of all terms, and of the integral term.
+    dead_band : float or None
+        Error up to which there is none; with `of_integral` for the integral alone.
+    sample_time : float or None
+        Time between samples; the force is constant between.
+    resolution : float or None
+        Step of the encoder.
+    """
+
+    on_measurement: bool = False
+    force: float | None = None
+    integral: float | None = None
+    dead_band: float | None = None
+    of_integral: bool = False
+    sample_time: float | None = None
+    resolution: float | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +163,8 @@ class Mechanism:
         Stiffness that a controller adds to that of a slider.
     axial_share
         Ratio of a slider's stiffness along the slide to that along its axis, if the latter is given; else None.
+    limits : Limits or None
+        Of the controller, if there is one.
     """
 
     coordinates: tuple[DegreeOfFreedom, ...]
@@ -143,3 +175,4 @@ class Mechanism:
     gain: Any = 0
     axial_share: Any = None
     structures: tuple[StructurePart, ...] = ()
+    limits: Limits | None = None

@@ -48,6 +48,12 @@ class Rig(FrozenRecord, Keeper):
         """Laws of each contact by its name in the Model, which is empty for a slider's."""
         raise NotImplementedError
 
+    @property
+    def holds(self) -> bool:
+        """True if a controller holds a place: the velocity of the drive is 0, and there is no steady sliding."""
+        velocity = self.drive.velocity  # type: ignore[attr-defined]
+        return isinstance(velocity, (int, float)) and velocity == 0
+
     def mechanism(self) -> Mechanism:
         """Mechanism from which the Model is assembled; symbolic for a copy of the rig with symbols."""
         raise NotImplementedError

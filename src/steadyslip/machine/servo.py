@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from steadyslip.core.domains import nonnegative, positive
+from steadyslip.core.domains import nonnegative, positive, speed
 from steadyslip.core.entries import Text
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter, setting
+from steadyslip.machine.holding import Holding, band, encoder, limit, windup
+from steadyslip.machine.mechanism import Limits
 
 
 class MachineDrive(FrozenRecord, family="drive of a machine"):
@@ -46,6 +48,10 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
         """Gains on position of the first watched body, speed and position of the second, and integral of the first."""
         return 0, 0, 0, None
 
+    def limits(self) -> Limits | None:
+        """What sets a controller apart from a linear one; None for a load point."""
+        return None
+
 
 class Pull(MachineDrive, name="steady"):
     """A load point that moves along the slide at constant velocity; links tie bodies to it as ``drive``."""
@@ -58,7 +64,7 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
     velocity: float = parameter("rad/s", positive, "speed of the load point in steady sliding")
 
 
-class _Controller(MachineDrive):
+class _Controller(Holding, MachineDrive):
     """Base of controllers that act on a body; `delay` is the dead time of the measurement."""
 
     body: str = setting(Text("the body on which it acts"))
@@ -119,30 +125,35 @@ class Cascade(_Controller, name="p-pi"):
         return self.kp * self.kv, self.kp, self.kp / self.tn, self.kp * self.kv / self.tn
 
 
-class RotaryPD(PositionPD, name="rotary-pd"):
-    """`PositionPD` of a body that rotates."""
+class _Rotary(_Controller):
+    """Base of controllers that act on a body that rotates."""
 
     turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
+    velocity: float = parameter("rad/s", speed, "speed of the body in steady sliding; 0 to hold a place")
+    force_limit: float | None = limit("N m")
+    integral_limit: float | None = windup("N m")
+    dead_band: float | None = band("rad")
+    resolution: float | None = encoder("rad")
+
+
+class RotaryPD(_Rotary, PositionPD, name="rotary-pd"):
+    """`PositionPD` of a body that rotates."""
+
     kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness")
     kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True)
 
 
-class RotaryPID(PositionPID, name="rotary-pid"):
+class RotaryPID(_Rotary, PositionPID, name="rotary-pid"):
     """`PositionPID` of a body that rotates."""
 
-    turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
     kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness")
     kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True)
     ki: float = parameter("N m/(rad s)", positive, "integral gain")
 
 
-class RotaryCascade(Cascade, name="rotary-p-pi"):
+class RotaryCascade(_Rotary, Cascade, name="rotary-p-pi"):
     """`Cascade` of a body that rotates."""
 
-    turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
     kp: float = parameter("N m s/rad", positive, "gain Kp of the speed loop")
 
 

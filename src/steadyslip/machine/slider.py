@@ -103,7 +103,7 @@ class Slider(Rig, section="slider"):
             coordinates=(DegreeOfFreedom("x", self.mass, drive.velocity),),
             elements=(
                 Element("", {"x": 1}, pulled, self.stiffness, self.damping),
-                Element("", {"x": 1}, pulled, drive.proportional(), drive.derivative(), delay=late),
+                Element("", {"x": 1}, pulled, drive.proportional(), drive.dashpot(), delay=late, active=True),
                 Element("", {"x": 1}, {"x": 1}, 0, self.radiation_damping, grounded=True),
             ),
             integral=None if ki is None else Integral({"x": 1}, {"x": 1}, ki, late),
@@ -111,4 +111,5 @@ class Slider(Rig, section="slider"):
             velocity=drive.velocity,
             gain=drive.proportional(),
             axial_share=None if self.axial_stiffness is None else self.contact.sliding_stiffness(1),
+            limits=drive.limits(),
         )

@@ -21,6 +21,11 @@ from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
 from steadyslip.model.numeric import by_matrices
 
+HELD = (
+    "the drive holds a place (velocity = 0), so there is no steady sliding to be stable or not: linear stability does "
+    "not speak of hunting, and a loaded bristle at rest has no linearisation; ask `steadyslip hunt`, "
+    "or ss.hunt(rig) in Python"
+)
 RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 """Letters that the equations use, which parameters cannot have."""
 
@@ -70,6 +75,8 @@ def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
 
 def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model:
     """Build the Model without checks; `drive` is `MOVED`, `PULLED` or `EITHER`."""
+    if rig.holds:
+        raise NotAvailable(HELD)
     if by_matrices(rig):
         raise NotAvailable(
             "this is not offered for a machine with a structure, whose equations are matrices; offered are analyze, "

@@ -72,9 +72,10 @@ def run_file(
 
 
 def read_experiment(
-    path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None
-) -> tuple[Slider | Machine, Protocol]:
-    """The rig of a file, and its ``[protocol]`` with further pieces and its end; see `run_file`.
+    path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None, *,
+    ends: bool = True,
+) -> tuple[Slider | Machine, Protocol]:  # fmt: skip
+    """The rig of a file, and its ``[protocol]`` with further pieces and its end, if one is needed; see `run_file`.
 
     Raises
     ------
@@ -87,7 +88,7 @@ def read_experiment(
     machine = rig if isinstance(rig, Machine) else None
     added = _pieces(pieces, rig.area, machine)
     end = protocol.until if until is None else _seconds(until)
-    if end is None:
+    if end is None and ends:
         raise ParameterError(
             [Problem("until", "missing; give the end as --until '200 s', or write [protocol] with until in the file")]
         )

@@ -1,4 +1,4 @@
-"""Motion beyond small perturbations: onset of oscillation, stick-slip cycles, kicks, periodic forcing, slow changes.
+"""Motion beyond small perturbations: onset, stick-slip cycles, kicks, hunting, periodic forcing, slow changes.
 
 Depends on stability (`linear`) and simulation (`motion`); not on experiments, maps or the texts of verdicts.
 
@@ -22,6 +22,8 @@ How the smallest kick not survived is found (`threshold`): `kicks/threshold.py` 
 makes a motion of each, `kicks/settled.py` solves for the steady sliding it may return to, `kicks/outcomes.py` decides
 the outcome, with `spans.py` (simulation), `neighbourhood.py` (returns), `closed_orbits.py` (oscillates), `fold.py` (no
 solution) and `shells.py` (close to an edge).
+
+`hunting/` is of axes that are held, at velocity 0, where there is no steady sliding: `hunt`.
 """
 
 from __future__ import annotations
@@ -29,6 +31,8 @@ from __future__ import annotations
 from steadyslip.nonlinear.forced import response
 from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
+from steadyslip.nonlinear.hunting.hunt import hunt
+from steadyslip.nonlinear.hunting.result import Hunt
 from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
 from steadyslip.nonlinear.kicks.brackets import threshold_map
 from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold
@@ -45,6 +49,7 @@ __all__ = [
     "FrequencyResponse",
     "FrozenVerdicts",
     "HopfCurve",
+    "Hunt",
     "KickMargin",
     "Onset",
     "SpecialCycle",
@@ -55,6 +60,7 @@ __all__ = [
     "frozen_verdicts",
     "hopf",
     "hopf_curve",
+    "hunt",
     "margin_to_kick",
     "orbit",
     "response",

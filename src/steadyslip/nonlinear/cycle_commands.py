@@ -1,4 +1,4 @@
-"""Commands for cycles, thresholds, responses and frozen verdicts: read a rig file, compute, write files."""
+"""Commands for cycles, thresholds, hunting, responses and frozen verdicts: read a rig file, compute, write files."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ from steadyslip.motion.commands import progress_of, read_experiment
 from steadyslip.nonlinear.forced import amplitude_unit, response
 from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
+from steadyslip.nonlinear.hunting.hunt import hunt
+from steadyslip.nonlinear.hunting.result import Hunt
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.kicks import kick_problems
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
@@ -160,6 +162,25 @@ def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = N
     writers = {".html": lambda p: write_page(thresholds, p, "Kicks", source=source)}
     write_by_ending(path, writers, lambda: thresholds.basin.plot(), thresholds)
     return path.suffix.lower() != ".html" and thresholds.basin.interrupted
+
+
+def hunt_of_file(
+    path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None, rtol: float
+) -> Hunt:
+    """`steadyslip.hunt` for the rig and the protocol of a file, and further pieces in words; shows progress.
+
+    Raises
+    ------
+    ParameterError
+        If anything is wrong; everything is listed.
+    """
+    rig, protocol = read_experiment(path, changes, pieces, until, ends=False)
+    with progress_text("hunting") as said:
+
+        def progress(time: float, strokes: int) -> None:
+            said(f"hunting, {strokes} strokes by {format_quantity(time, 's')}")
+
+        return hunt(rig, protocol, rtol=rtol, progress=progress)
 
 
 def response_of_file(

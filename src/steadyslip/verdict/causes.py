@@ -43,7 +43,7 @@ def why_always_stable(analysis: Findings) -> str:
 
 def _has_damping(analysis: Findings) -> bool:
     rig = analysis.rig
-    return bool(rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
+    return bool(rig.damping or rig.radiation_damping or float(rig.drive.dashpot()))
 
 
 @quietly

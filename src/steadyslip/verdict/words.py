@@ -99,7 +99,7 @@ def meaning(analysis: Findings) -> list[str]:
 
 def _limited(rig: Slider) -> bool:
     """True if mass or damping keeps velocity finite."""
-    return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
+    return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.dashpot()))
 
 
 HEADLINES = {
@@ -171,7 +171,7 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
 
 def _pull(rig: Slider) -> list[tuple[str, str]]:
     """Row (label, text) on what T, the force that presses a contact, contains; none if the spring alone."""
-    control = [rig.drive.proportional(), rig.drive.derivative(), rig.drive.integral()]
+    control = [rig.drive.proportional(), rig.drive.dashpot(), rig.drive.integral()]
     inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
     pulling = [f"the {name}" for name, there in inside.items() if there]
     if (pulling == ["the spring"] and not rig.radiation_damping) or not rig.contact.follows_spring():

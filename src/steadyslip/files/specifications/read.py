@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
-from steadyslip.core.domains import positive
+from steadyslip.core.domains import positive, speed
 from steadyslip.core.errors import (
     InternalError,
     NotAvailable,
@@ -362,7 +362,7 @@ class _ContentsReader(TableReader):
             return None
         given = table.get("velocity")
         if feed is not None and given is not None:
-            role = Parameter("rad/s" if feed.turns else "m/s", positive, f"velocity of {table['velocity_of']!r}")
+            role = Parameter("rad/s" if feed.turns else "m/s", speed, f"velocity of {table['velocity_of']!r}")
             value = self._value(role, given, "drive.velocity")
             table = table | {"velocity": 1.0 if value is None else value}
         elif law is not None and _is_quantity(given, "m/s" if law.turns else "rad/s"):

@@ -41,13 +41,16 @@ class Coulomb(FrictionLaw, name="coulomb"):
         if self.mu_static is not None:
             message = (
                 "got {}, more than mu_coulomb = {}; simulation has no friction that is larger at rest under this law: "
-                "leave mu_static out, or use the law lugre"
+                "leave mu_static out, or use the law lugre; `steadyslip hunt` has it, for drives that hold a place"
             )
             at_rest, sliding = np.asarray(self.mu_static), np.asarray(self.mu_coulomb)
             yield Condition("mu_static", at_rest <= sliding, message, (at_rest, sliding))
 
     def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
         return sigma * (self.mu_coulomb * sp.sign(v) + self.viscous * v)
+
+    def rest_strength(self, sigma: Expression) -> Expression:
+        return sigma * (self.mu_coulomb if self.mu_static is None else self.mu_static)
 
 
 class StribeckCurve(FrictionLaw):
@@ -73,6 +76,9 @@ class StribeckCurve(FrictionLaw):
         if self.stribeck_exponent is not None:
             fast = (fast + REST**2) ** (self.stribeck_exponent / 2)
         return self.mu_coulomb + (self.mu_static - self.mu_coulomb) * sp.exp(-fast)
+
+    def slow_velocity(self) -> Expression | None:
+        return self.v_stribeck
 
 
 class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):

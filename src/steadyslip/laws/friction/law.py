@@ -66,6 +66,15 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         """Friction stress (Pa) of a law with a delay; `late` is the velocity (m/s) a time `lateness` ago."""
         return self.strength(v, sigma, memory, tau)
 
+    def rest_strength(self, sigma: Expression) -> Expression:
+        """Largest friction stress (Pa) at rest of a law without memory: that of slow sliding unless overridden."""
+        v = sp.Symbol("v", positive=True)
+        return sp.sympify(self.strength(v, sigma, (), sp.nan)).subs(v, 0)
+
+    def slow_velocity(self) -> Expression | None:
+        """Velocity (m/s) below which a contact with memory counts as at rest; None for laws that cannot hold."""
+        return None
+
     def direction(self, v: Expression, velocity: Expression) -> Expression:
         """Smooth replacement of sign(v) in simulations, which cannot integrate a step at rest.
 

@@ -1,0 +1,87 @@
+"""What a controller at rest has besides its gains: limits, a dead band, samples and an encoder (theory 14).
+
+At a velocity other than 0 it follows a ramp and is linear, so these fields are refused there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from steadyslip.core.domains import positive, speed
+from steadyslip.core.errors import Problem
+from steadyslip.core.records import FrozenRecord, option, parameter
+from steadyslip.machine.mechanism import Limits
+
+
+def limit(unit: str) -> Any:
+    """Declare the largest force of a controller; its integral goes on growing there."""
+    return parameter(
+        unit, positive, "at velocity 0: largest force of the controller; its integral winds up", default=None
+    )
+
+
+def windup(unit: str) -> Any:
+    """Declare the largest force of the integral term."""
+    return parameter(unit, positive, "at velocity 0: largest force of the integral term, clamped there", default=None)
+
+
+def band(unit: str) -> Any:
+    """Declare the dead band."""
+    doc = "at velocity 0: error up to which there is none; beyond it, counted from its end"
+    return parameter(unit, positive, doc, default=None)
+
+
+def encoder(unit: str) -> Any:
+    """Declare the step of the encoder."""
+    doc = "at velocity 0: step of the encoder, to which places are rounded; needs a sample_time"
+    return parameter(unit, positive, doc, default=None)
+
+
+class Holding(FrozenRecord):
+    """Base of controllers, which hold a place at velocity 0; with `sample_time` they act by differences over it."""
+
+    velocity: float = parameter("m/s", speed, "velocity v0 in steady sliding; 0 to hold a place")
+    derivative: str = option(
+        "error", "measurement", doc="at velocity 0: of what the derivative is taken", default="error"
+    )
+    force_limit: float | None = limit("N")
+    integral_limit: float | None = windup("N")
+    dead_band: float | None = band("m")
+    dead_band_of: str = option(
+        "error",
+        "integral",
+        doc="whether the dead band acts on the error of all terms or of the integral",
+        default="error",
+    )
+    sample_time: float | None = parameter(
+        "s",
+        positive,
+        "at velocity 0: time between samples, the force being constant between; without it none",
+        default=None,
+    )
+    resolution: float | None = encoder("m")
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        yield from super().inconsistencies()
+        own = ("force_limit", "integral_limit", "dead_band", "sample_time", "resolution")
+        if self.velocity != 0:
+            named = [key for key in own if getattr(self, key) is not None]
+            named += ["derivative"] * (self.derivative != "error") + ["dead_band_of"] * (self.dead_band_of != "error")
+            for key in named:
+                yield Problem(key, "is of a controller that holds a place; leave it out, or write velocity = 0")
+        if self.resolution is not None and self.sample_time is None:
+            yield Problem("sample_time", "missing; an encoder of some resolution is read at samples")
+        if self.dead_band_of != "error" and self.dead_band is None:
+            yield Problem("dead_band", "missing; dead_band_of says on what it acts")
+
+    def limits(self) -> Limits:
+        return Limits(
+            on_measurement=self.derivative == "measurement",
+            force=self.force_limit,
+            integral=self.integral_limit,
+            dead_band=self.dead_band,
+            of_integral=self.dead_band_of == "integral",
+            sample_time=self.sample_time,
+            resolution=self.resolution,
+        )

@@ -1,0 +1,199 @@
+"""`hunt`: run a rig that holds a place until it rests, repeats itself, or the time is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import checked
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.hunting.motion import Motion, Stroke, friction_at_rest
+from steadyslip.nonlinear.hunting.plant import Plant, plant_of
+from steadyslip.nonlinear.hunting.result import Hunt
+from steadyslip.protocol import Protocol
+from steadyslip.protocol.pieces import DisplacementStep
+from steadyslip.protocol.protocol import LOAD_POINT
+from steadyslip.protocol.segments import pack
+
+EXACT = 1e-9  # relative difference of two cycles that are one: what exact pieces are asked to agree to
+MOST_STROKES = 400  # after which the last ones are judged as they are; chosen by trial
+MOST_STEPS = 300_000  # the same for steps, some seconds to a minute; chosen by trial
+LONGEST = 1e9  # s, end of a motion that ends earlier by rest, repetition, strokes or steps
+CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually there are two
+SHRINKING = 0.9  # ratio of later to earlier strokes below which they are told to shrink; chosen by trial
+
+
+@checked()
+def hunt(
+    rig: Slider | Machine,
+    protocol: Any = None,
+    *,
+    until: float | None = None,
+    rtol: float = 1e-8,
+    progress: Callable[[float, int], None] | None = None,
+) -> Hunt:
+    """Does an axis that is held (velocity 0) hunt about its target, or settle?
+
+    The motion begins at rest at place 0, where the target is as well, and then moves as the protocol says. Contacts
+    with Coulomb friction stick and slide, each piece a linear system that is solved exactly; those with bristles
+    (LuGre) are integrated.
+
+    Parameters
+    ----------
+    rig : Slider or Machine
+        With a controller at velocity 0.
+    protocol : Protocol, piece or list of pieces, optional
+        What moves the target. Without one it steps by twice the error that friction at rest can hold.
+    until : float, optional
+        End of the motion (s). Without it, it ends where it rests, or a cycle repeats itself.
+    rtol : float
+        Error per step allowed with bristles.
+    progress : callable, optional
+        Called with the time reached and the number of strokes.
+
+    Returns
+    -------
+    Hunt
+
+    Raises
+    ------
+    ParameterError
+        If the drive does not hold a place, or the protocol acts on something else than the target.
+    NotAvailable
+        If something has no mass, or a law or a dead time is not offered at rest.
+
+    Examples
+    --------
+    >>> import steadyslip as ss
+    >>> axis = ss.rig_from_text('''
+    ... friction = {law = "coulomb", mu_coulomb = 1, mu_static = 1.5, viscous = "0.4 s/m"}
+    ... contact = {law = "constant", preload = "1 N"}
+    ... slider = {area = 1, mass = "1 kg"}
+    ... drive = {control = "pid", velocity = 0, kp = "3 N/m", kd = "6 N s/m", ki = "4 N/(m s)"}
+    ... ''')
+    >>> print(ss.hunt(axis).sentence)
+    HUNTS ±65.65 mm about the target every 24.01 s
+    """
+    if not rig.holds:
+        message = f"got {rig.drive.velocity:g}; hunting is of a drive that holds a place: a controller at velocity = 0"
+        raise ParameterError([Problem("drive.velocity", message)])
+    given = _target(Protocol.of(protocol), rig)
+    plant = plant_of(rig)
+    if plant.delay and plant.limits.sample_time is None:
+        raise NotAvailable("drive.delay: hunting takes a dead time only together with a sample_time")
+    if not given.pieces:
+        step = DisplacementStep(at=0.0, by=_usual_step(plant))
+        given = Protocol(pieces=(step,), until=given.until)
+    end = until if until is not None else given.until
+    motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol)
+    last_change = max((float(t) for t in motion.segments.start[0]), default=0.0)
+    close = EXACT if motion.exact else 100 * rtol
+    at_rest = False
+    for done in motion.run():
+        if done is not None and progress is not None:
+            progress(motion.time, len(motion.trace.strokes))
+        if motion.time >= last_change and motion.at_rest:
+            at_rest = True
+            break
+        if motion.steps > MOST_STEPS:
+            break
+        if end is None and done is not None:
+            own = [one for one in motion.trace.strokes if one.start > last_change]
+            if len(own) >= MOST_STROKES or cycle_length(own, close):
+                break
+    return _result(rig, given, motion, at_rest, close, last_change)
+
+
+def _target(protocol: Protocol, rig: Slider | Machine) -> Protocol:
+    """The protocol, if it acts on the target alone, without waves."""
+    problems = []
+    for number, piece in enumerate(protocol.pieces, start=1):
+        if piece.channel != LOAD_POINT or piece.frees_load_point or piece.wave() is not None:
+            message = f"{piece.name!r} is not offered: only steps, ramps, holds and tables of the target are"
+            problems.append(Problem(f"protocol.pieces.{number}", message))
+    if problems:
+        raise ParameterError(problems)
+    return protocol
+
+
+def _usual_step(plant: Plant) -> float:
+    """Twice the error (m or rad) that friction at rest holds against the controller's gain and the springs."""
+    gain = sum(np.outer(plant.acts, place) * k for place, (k, _) in zip(plant.places, plant.gains, strict=True))
+    pull = plant.acts * sum(k for k, _ in plant.gains) - plant.target_stiffness
+    try:
+        moved = np.linalg.solve(plant.stiffness + gain, pull)
+    except np.linalg.LinAlgError:
+        moved = np.full(plant.size, np.nan)
+    held = sum(friction_at_rest(one) * abs(float(one.row @ moved)) for one in plant.contacts)
+    step = 2 * held / float(pull @ moved)
+    if not (np.isfinite(step) and step > 0):
+        raise ParameterError(
+            [Problem("protocol", "missing; no gain kp or spring tells how far a step of the target is")]
+        )
+    return float(step)
+
+
+def cycle_length(strokes: Sequence[Stroke], close: float) -> int:
+    """Number of strokes after which the last ones repeat themselves to a relative error; 0 if they do not."""
+    done = [one for one in strokes if np.isfinite(one.end)]
+    for count in range(1, CYCLES + 1):
+        if len(done) < 2 * count + 1:
+            return 0
+        last, before = done[-count - 1 :], done[-2 * count - 1 : -count]
+        size = max(abs(one.ends) for one in last)
+        period = last[-1].start - last[0].start
+        pairs = list(zip(last, before, strict=True))
+        same = all(abs(a.ends - b.ends) <= close * size and abs(a.begins - b.begins) <= close * size for a, b in pairs)
+        if same and abs(period - (before[-1].start - before[0].start)) <= close * period:
+            return count
+    return 0
+
+
+def _result(
+    rig: Slider | Machine, protocol: Protocol, motion: Motion, at_rest: bool, close: float, since: float
+) -> Hunt:  # fmt: skip
+    from steadyslip import __version__
+
+    table, strokes = motion.trace.table(), motion.trace.strokes
+    own = [one for one in strokes if one.start >= since and np.isfinite(one.end)]
+    count = 0 if at_rest else cycle_length(own, close)
+    period = own[-1].start - own[-1 - count].start if count else np.nan
+    hunts: bool | None = False if at_rest else True if count else _trend(own)
+    rested = max([since, *(one.end for one in strokes if np.isfinite(one.end))])
+    settled = (motion.time if any(motion.mode.contacts) else rested) if at_rest else np.nan
+    if at_rest:
+        seen = -motion.watched[0:1] @ motion.state
+    elif own:
+        recent = own[-max(2, count) :] if count or hunts is False else own[-max(2, len(own) // 3) :]
+        seen = -np.array([value for one in recent for value in (one.lowest, one.highest)])
+        if hunts and not count and len(recent) > 2:
+            period = _average_period(recent)
+    else:
+        seen = -table[-1:, 1] if len(table) else np.zeros(1)
+    turns = isinstance(rig, Machine) and rig.drive.turns
+    force = "N m" if turns else "N" if isinstance(rig, Machine) else "Pa"
+    return Hunt(
+        rig=rig, protocol=protocol, hunts=hunts, lowest=float(seen.min()), highest=float(seen.max()),
+        period=float(period), repeats=bool(count), strokes=tuple(strokes), time=table[:, 0], error=table[:, 1],
+        velocity=table[:, 2], force=table[:, 3], exact=motion.exact, rtol=close, settled_at=float(settled),
+        unit="rad" if turns else "m", force_unit=force, version=__version__,
+    )  # fmt: skip
+
+
+def _trend(strokes: Sequence[Stroke]) -> bool | None:
+    """True if the later strokes reach as far as those before, False if they shrink; None of fewer than six."""
+    if len(strokes) < 6:
+        return None
+    third = len(strokes) // 3
+    reach = [max(abs(one.ends) for one in part) for part in (strokes[third : 2 * third], strokes[2 * third :])]
+    return reach[1] > SHRINKING * reach[0]
+
+
+def _average_period(strokes: Sequence[Stroke]) -> float:
+    """Average time (s) between starts of strokes in the same direction; NaN without two."""
+    starts = [one.start for one in strokes if (one.ends - one.begins) * (strokes[-1].ends - strokes[-1].begins) > 0]
+    return float(np.mean(np.diff(starts))) if len(starts) > 1 else np.nan

@@ -1,0 +1,200 @@
+"""Modes of a held rig: which contacts stick or slide, where the controller is limited; each a linear system.
+
+In a mode the motion is Y' = A Y (with the memory of bristles besides) as long as every guard, a row on Y, is not
+negative; a guard that becomes so names the switch and its new position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.nonlinear.hunting.plant import Array, Plant
+
+
+class Switch(NamedTuple):
+    """A change of mode: ``contact`` of some number, ``band``, ``clamp`` or ``limit``, to its new position."""
+
+    name: str
+    number: int
+    to: int
+
+
+@dataclass(frozen=True)
+class HeldMode:
+    """Positions of all switches.
+
+    Attributes
+    ----------
+    contacts : tuple of int
+        -1, 0, 1: sliding back, at rest, sliding forward.
+    band : int
+        Side of the dead band on which the error is; 0 inside.
+    clamp, limit : int
+        Side at which the integral term, or the whole force, is at its limit; 0 if it is not.
+    """
+
+    contacts: tuple[int, ...]
+    band: int = 0
+    clamp: int = 0
+    limit: int = 0
+
+    def switched(self, switch: Switch) -> HeldMode:
+        if switch.name != "contact":
+            change: Any = {switch.name: switch.to}
+            return replace(self, **change)
+        contacts = list(self.contacts)
+        contacts[switch.number] = switch.to
+        return replace(self, contacts=tuple(contacts))
+
+
+class HeldPiece:
+    """Equations of a plant in one mode.
+
+    Parameters
+    ----------
+    plant : Plant
+    mode : HeldMode
+    acceleration : float
+        Of the target, m/s².
+    """
+
+    def __init__(self, plant: Plant, mode: HeldMode, acceleration: float) -> None:
+        self.plant, self.mode, self.acceleration = plant, mode, acceleration
+        self.sampled = plant.limits.sample_time is not None
+
+    @cached_property
+    def banded(self) -> Array:
+        """Row of the error that is integrated, without its dead band."""
+        band = self.plant.limits.dead_band
+        if band is None:
+            return self.plant.error()
+        if not self.mode.band:
+            return np.zeros(self.plant.width)
+        return self.plant.error() - self.plant.row(one=self.mode.band * band)
+
+    @cached_property
+    def wanted(self) -> Array:
+        """Row of the controller's force before its limit."""
+        plant = self.plant
+        (gain, damping), *others = plant.gains
+        of_all = plant.limits.dead_band is not None and not plant.limits.of_integral
+        rate = plant.error_rate()
+        if plant.bands_rate and not self.mode.band:
+            rate = np.zeros(plant.width)
+        found = gain * (self.banded if of_all else plant.error()) + damping * rate
+        for loop, (stiff, damped) in enumerate(others, start=1):
+            found = found + stiff * plant.error(loop) + damped * plant.error_rate(loop)
+        found[2 * plant.size] += plant.integral
+        return found
+
+    @cached_property
+    def force(self) -> Array:
+        """Row of the controller's force."""
+        plant = self.plant
+        if self.sampled:
+            return plant.row(held=1.0)
+        if self.mode.limit:
+            return plant.row(one=self.mode.limit * (plant.limits.force or 0.0))
+        return self.wanted
+
+    @cached_property
+    def pushed(self) -> Array:
+        """Rows of the accelerations without the friction of contacts at rest, (coordinates, width)."""
+        plant, n = self.plant, self.plant.size
+        rows = np.zeros((n, plant.width))
+        rows[:, :n], rows[:, n : 2 * n] = -plant.stiffness, -plant.damping
+        rows[:, 2 * n + 1], rows[:, 2 * n + 2] = -plant.target_stiffness, -plant.target_damping
+        rows[:, -1] = plant.force
+        rows += np.outer(plant.acts, self.force)
+        for contact, way in zip(plant.contacts, self.mode.contacts, strict=True):
+            if way and not contact.slow:
+                friction = contact.drag * plant.slip(contact) + plant.row(one=way * contact.coulomb)
+                rows -= np.outer(contact.row, friction)
+        return rows / plant.inertia[:, None]
+
+    @cached_property
+    def resting(self) -> dict[int, Array]:
+        """Rows of the friction forces of contacts at rest, by number."""
+        plant = self.plant
+        own = [i for i, (one, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True))
+               if not way and not one.slow]  # fmt: skip
+        if not own:
+            return {}
+        rows = np.array([plant.contacts[i].row for i in own])
+        belts = np.array([plant.contacts[i].belt for i in own])
+        carried = rows @ self.pushed
+        carried[:, -1] -= belts * self.acceleration
+        matrix = rows @ (rows / plant.inertia).T
+        if np.linalg.matrix_rank(matrix) < len(own):
+            raise NotAvailable(
+                "the friction of contacts at rest is not determined: more of them than bodies between which they "
+                "slide; leave one out"
+            )
+        return dict(zip(own, np.linalg.solve(matrix, carried), strict=True))
+
+    @cached_property
+    def matrix(self) -> Array:
+        """A, (width, width)."""
+        plant, n = self.plant, self.plant.size
+        found = np.zeros((plant.width, plant.width))
+        found[:n, n : 2 * n] = np.eye(n)
+        found[n : 2 * n] = self.pushed
+        for i, row in self.resting.items():
+            found[n : 2 * n] -= np.outer(plant.contacts[i].row / plant.inertia, row)
+        if plant.integral and not (self.sampled or self.mode.clamp):
+            found[2 * n] = self.banded
+        found[2 * n + 1, 2 * n + 2] = 1.0
+        found[2 * n + 2, -1] = self.acceleration
+        return found
+
+    @cached_property
+    def fastest(self) -> float:
+        """Largest rate of the linear system (1/s)."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.matrix)), initial=0.0))
+
+    @cached_property
+    def guards(self) -> tuple[Array, tuple[Switch, ...]]:
+        """Rows that are not negative in this mode, (guards, width), and the switch that each one makes."""
+        found = [*self._of_contacts(), *(self._of_controller() if not self.sampled else ())]
+        rows = np.array([row for row, _ in found]) if found else np.zeros((0, self.plant.width))
+        return rows, tuple(switch for _, switch in found)
+
+    def _of_contacts(self) -> list[tuple[Array, Switch]]:
+        plant = self.plant
+        found = []
+        for i, (contact, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True)):
+            slip = plant.slip(contact)
+            if way:  # half the speed, so that a contact with memory does not switch to and fro
+                found.append((way * slip - plant.row(one=0.5 * contact.slow), Switch("contact", i, 0)))
+                continue
+            bound, row = (contact.slow, slip) if contact.slow else (contact.rest, self.resting[i])
+            found += [(plant.row(one=bound) - to * row, Switch("contact", i, to)) for to in (1, -1)]
+        return found
+
+    def _of_controller(self) -> list[tuple[Array, Switch]]:
+        plant, limits = self.plant, self.plant.limits
+        found = []
+        if limits.dead_band is not None:
+            error = plant.error()
+            found += _bounded("band", self.mode.band, error, plant.row(one=limits.dead_band))
+        if limits.force is not None:
+            found += _bounded("limit", self.mode.limit, self.wanted, plant.row(one=limits.force))
+        if limits.integral is not None and plant.integral:
+            if self.mode.clamp:
+                found.append((self.mode.clamp * self.banded, Switch("clamp", 0, 0)))
+            else:
+                bound = plant.row(one=limits.integral / plant.integral)
+                found += _bounded("clamp", 0, plant.row(integral=1.0), bound)
+        return found
+
+
+def _bounded(name: str, side: int, row: Array, bound: Array) -> list[tuple[Array, Switch]]:
+    """Guards of a value that is within a bound (side 0), or beyond it at a side."""
+    if side:
+        return [(side * row - bound, Switch(name, 0, 0))]
+    return [(bound - to * row, Switch(name, 0, to)) for to in (1, -1)]

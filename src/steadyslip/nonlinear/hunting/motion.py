@@ -1,0 +1,271 @@
+"""Motion of a held rig from mode to mode, sample to sample, and its strokes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.nonlinear.hunting.modes import HeldMode, HeldPiece, Switch
+from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
+from steadyslip.nonlinear.hunting.sampled import SampledController
+from steadyslip.nonlinear.hunting.steps import NODES, POWERS, BristleSteps, ExactSteps, first_crossing
+from steadyslip.protocol.segments import Segments
+
+BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
+STILL = 1e-9  # of the fastest speed so far, below which what is at rest moves no more
+AT_ONCE = 100  # switches without time passing that are no sequence of switches any more
+KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
+
+
+@dataclass
+class Stroke:
+    """Motion between two rests: when (s), from where to where (error, m or rad), and its extremes."""
+
+    start: float
+    begins: float
+    end: float = np.nan
+    ends: float = np.nan
+    fastest: float = 0.0
+    lowest: float = np.inf
+    highest: float = -np.inf
+
+
+@dataclass
+class Trace:
+    """Values at times of a motion: time, error, velocity of the measured place, force of the controller."""
+
+    rows: list[Array] = field(default_factory=list)
+    strokes: list[Stroke] = field(default_factory=list)
+
+    def table(self) -> Array:
+        """All values, (times, 4)."""
+        return np.concatenate(self.rows) if self.rows else np.zeros((0, 4))
+
+
+class Motion:
+    """A motion from rest at place 0 under a target.
+
+    Parameters
+    ----------
+    plant : Plant
+    segments : Segments
+        Target of one lane, to the end of the motion.
+    rtol : float
+        For contacts with memory.
+    """
+
+    def __init__(self, plant: Plant, segments: Segments, rtol: float) -> None:
+        self.plant, self.segments = plant, segments
+        self.state = np.zeros(plant.width)
+        self.state[-1] = 1.0
+        self.time, self.trace, self.steps, self.fastest = 0.0, Trace(), 0, 0.0
+        self.mode = HeldMode((0,) * len(plant.contacts))
+        self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
+        self.acceleration = 0.0
+        self.exact = not plant.memory
+        self.stepper: ExactSteps | BristleSteps = (
+            ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant))
+        )
+        self.sampled = None if plant.limits.sample_time is None else SampledController(plant)
+        self.fresh: frozenset[tuple[str, int]] = frozenset()
+        self.at_once = 0
+        self.watched = np.array([plant.error(), plant.row(None, plant.places[0]), plant.row()])
+
+    # -- the run
+
+    def run(self) -> Iterator[Stroke | None]:
+        """Go on to the end of the target's segments, step by step; yields a stroke where one ends."""
+        spans = zip(
+            self.segments.end[0], self.segments.jump[0], self.segments.value[0, :, 0], self.segments.slope[0, :, 0],
+            strict=True,
+        )  # fmt: skip
+        n = self.plant.size
+        for end, jump, velocity, slope in spans:
+            self.state[2 * n + 1] += jump
+            self.state[2 * n + 2] = velocity
+            self.acceleration = float(slope)
+            self._placed()
+            yield None
+            while self.time < end:
+                yield from self._to(float(end))
+
+    def _to(self, end: float) -> Iterator[Stroke | None]:
+        """Go on to the next sample, or to the end."""
+        if self.sampled is not None:
+            if self.sampled.act(self.time, self.state):
+                self._placed()
+            end = min(end, self.sampled.next)
+        while self.time < end:
+            yield self._step(end)
+
+    def _piece(self) -> HeldPiece:
+        key = (self.mode, self.acceleration)
+        if key not in self.pieces:
+            self.pieces[key] = HeldPiece(self.plant, *key)
+        return self.pieces[key]
+
+    def _step(self, end: float) -> Stroke | None:
+        """Take one step, at most to a switch or the `end`; the stroke that it completes, or None."""
+        piece = self._piece()
+        length, coefficients = self.stepper.step(piece, self.state, end - self.time)
+        self.steps += 1
+        rows, switches = piece.guards
+        guards = rows @ coefficients.T
+        fresh = np.array([(one.name, one.number) in self.fresh for one in switches], dtype=bool)
+        noise = self.stepper.noise(piece, rows, coefficients, length) if fresh.any() else np.zeros((len(rows), 3))
+        begun = [
+            one.name == "contact" and bool(self.mode.contacts[one.number]) and not self.plant.contacts[one.number].slow
+            for one in switches
+        ]
+        noise[np.array(begun, dtype=bool) & fresh, 0] = np.inf  # a slip rate that is 0 but for rounding
+        crossed = first_crossing(guards, fresh, noise) if len(rows) else None
+        share = 1.0 if crossed is None else crossed[0]
+        if share > 0:
+            self._record(coefficients, length, share)
+            self.fresh = frozenset()
+        before, self.time = self.time, self.time + share * length
+        if self.time > before:
+            self.at_once = 0
+        if crossed is None:
+            self.state = coefficients.sum(axis=0)
+            if self.time + 1e-15 * abs(end) >= end:
+                self.time = end
+            return None
+        self.state = self.stepper.until(piece, self.state, coefficients, length, share)
+        self.at_once += 1
+        if self.at_once > AT_ONCE:
+            raise NotAvailable("the contacts switch between rest and sliding without time passing; not decided")
+        return self._switched(switches[crossed[1]])
+
+    # -- switches
+
+    def _switched(self, switch: Switch) -> Stroke | None:
+        moved = any(self.mode.contacts)
+        self.fresh |= {(switch.name, switch.number)}
+        self.mode = self.mode.switched(switch)
+        if switch.name == "contact" and not self.plant.contacts[switch.number].slow:
+            self._stop(switch.number)
+            self._settle_contacts()
+        return self._stroke(moved)
+
+    def _stop(self, index: int) -> None:
+        """Set the slip rate of a contact to exactly 0, by the least change of momentum."""
+        contact, n = self.plant.contacts[index], self.plant.size
+        slip = float(self.plant.slip(contact) @ self.state)
+        share = contact.row / self.plant.inertia
+        self.state[n : 2 * n] -= share * (slip / float(contact.row @ share))
+
+    def _settle_contacts(self) -> None:
+        """Let contacts at rest slide that would need more friction than there is at rest."""
+        for _ in self.plant.contacts:
+            forces = {i: float(row @ self.state) for i, row in self._piece().resting.items()}
+            excess = {i: abs(force) / self.plant.contacts[i].rest - 1.0 for i, force in forces.items()}
+            worst = max(excess, key=excess.__getitem__, default=None)
+            if worst is None or excess[worst] <= BEYOND:
+                return
+            self._stop(worst)  # from rounding
+            self.mode = self.mode.switched(Switch("contact", worst, 1 if forces[worst] > 0 else -1))
+            self.fresh |= {("contact", worst)}
+
+    def _placed(self) -> None:
+        """Positions of all switches after a jump of the target or of the force."""
+        plant, limits, moved = self.plant, self.plant.limits, any(self.mode.contacts)
+        if self.sampled is None:
+            if limits.dead_band is not None:
+                self.mode = self.mode.switched(_side("band", float(plant.error() @ self.state), limits.dead_band))
+            if limits.integral is not None and plant.integral:
+                held, grows = plant.integral * self.state[2 * plant.size], float(self._piece().banded @ self.state)
+                side = int(np.sign(held)) if abs(held) >= limits.integral and held * grows > 0 else 0
+                self.mode = self.mode.switched(Switch("clamp", 0, side))
+            if limits.force is not None:
+                wanted = float(self._piece().wanted @ self.state)
+                self.mode = self.mode.switched(_side("limit", wanted, limits.force))
+        self._settle_contacts()
+        self._stroke(moved)
+
+    # -- what is kept
+
+    def _stroke(self, moved: bool) -> Stroke | None:
+        """Begin or end a stroke if the contacts have begun or ceased to move; the one that ended."""
+        moves, strokes = any(self.mode.contacts), self.trace.strokes
+        error = float(self.watched[0] @ self.state)
+        if moves and not moved:
+            strokes.append(Stroke(self.time, error))
+        elif moved and not moves:
+            strokes[-1].end, strokes[-1].ends = self.time, error
+            return strokes[-1]
+        return None
+
+    def _record(self, coefficients: Array, length: float, share: float) -> None:
+        self.watched[2] = self._piece().force
+        degrees = np.arange(len(coefficients))
+        values = (self.watched @ coefficients.T * share**degrees) @ POWERS[: len(coefficients)]
+        self.trace.rows.append(np.column_stack([self.time + share * length * NODES, *values])[KEPT])
+        if self.trace.strokes:
+            last = self.trace.strokes[-1]
+            last.lowest = min(last.lowest, _least(values[0]))
+            last.highest = max(last.highest, -_least(-values[0]))
+            last.fastest = max(last.fastest, -_least(-np.abs(values[1])))
+            self.fastest = max(self.fastest, last.fastest)
+
+    @property
+    def at_rest(self) -> bool:
+        """True if nothing moves any more and the controller's integral is constant."""
+        plant, n = self.plant, self.plant.size
+        if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
+            return False
+        pace = STILL * max([self.fastest, *(one.slow for one in plant.contacts)])
+        if np.any(np.abs(self.state[n : 2 * n]) > pace):
+            return False
+        if self.sampled is not None:
+            return self.sampled.constant and not any(self.mode.contacts)
+        rates = self._piece().matrix @ self.state
+        creeps = any(self.mode.contacts) and bool(np.any(np.abs(rates[n : 2 * n]) > pace * self._piece().fastest))
+        return not (rates[2 * n] or creeps)
+
+
+def _side(name: str, value: float, bound: float) -> Switch:
+    return Switch(name, 0, int(np.sign(value)) if abs(value) > bound else 0)
+
+
+def _least(values: Array) -> float:
+    """Least value of a smooth function at evenly spaced places, by a parabola through the least and its neighbours."""
+    i = int(np.argmin(values))
+    if not 0 < i < len(values) - 1:
+        return float(values[i])
+    before, here, after = values[i - 1 : i + 2]
+    bend = before + after - 2 * here
+    return float(here - (after - before) ** 2 / (8 * bend)) if bend > 0 else float(here)
+
+
+def natural_sizes(plant: Plant) -> Array:
+    """Least sizes of the variables, from which errors of contacts with memory are counted."""
+    found = np.full(plant.width, 1.0)
+    n = plant.size
+    slow = [one for one in plant.contacts if one.slow]
+    friction, speed = 0.0, 0.0
+    place = 2 * n + 4
+    for one in slow:
+        law = one.port.friction
+        memory = [float(value) for value in law.steady_memory(one.slow, one.normal)]
+        found[place : place + len(memory)] = np.abs(memory)
+        place += len(memory)
+        friction = max(friction, float(one.port.area * law.steady_strength(one.slow, one.normal)))
+        speed = max(speed, one.slow)
+    stiff = plant.gains[0][0] + float(np.max(np.diag(plant.stiffness)))
+    found[:n] = found[2 * n + 1] = friction / stiff if stiff else 1.0
+    found[n : 2 * n] = found[2 * n + 2] = speed
+    found[2 * n] = friction / plant.integral if plant.integral else 1.0
+    found[2 * n + 3] = friction
+    return found
+
+
+def friction_at_rest(contact: HeldContact) -> float:
+    """Largest friction force at rest (N, or Pa), of bristles that of slow sliding."""
+    if not contact.slow:
+        return contact.rest
+    slow = contact.slow * 1e-6  # far below the velocity from which on friction depends on it
+    return float(contact.port.area * contact.port.friction.steady_strength(slow, contact.normal))

@@ -1,0 +1,215 @@
+"""Matrices of a rig whose drive holds a place: inertia, springs, controller and contacts, as numbers.
+
+The state is Y = [q, w, I, r, r', u, z, 1]: places and velocities of the coordinates, the integral of the error, the
+target and its velocity, the force of a sampled controller, the memory of the contacts, and a constant. Rows act on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Limits, Mechanism
+from steadyslip.machine.slider import Slider
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldContact:
+    """A contact: force −`row`·F with F = `coulomb` sign(v) + `drag` v, v = `row`·w − `belt` r'.
+
+    Attributes
+    ----------
+    row : ndarray (coordinates,)
+    belt : float
+        Share of the target's velocity in the slip rate.
+    rest : float
+        Largest friction force at rest (N, or Pa).
+    coulomb, drag : float
+        Of sliding friction; 0 for a law with memory.
+    port : ContactPort
+        Law of friction, of a contact that is not linear in sliding.
+    normal : float
+        Normal stress (Pa), or force.
+    slow : float
+        Slip rate (m/s) below which a contact with memory counts as at rest; 0 for one without.
+    """
+
+    row: Array
+    belt: float
+    rest: float
+    coulomb: float
+    drag: float
+    port: ContactPort
+    normal: float
+    slow: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A rig at rest as matrices; `size` is the number of coordinates, `memory` that of memory variables."""
+
+    inertia: Array
+    stiffness: Array
+    damping: Array
+    target_stiffness: Array
+    target_damping: Array
+    force: Array
+    acts: Array
+    places: tuple[Array, ...]
+    gains: tuple[tuple[float, float], ...]
+    integral: float
+    delay: float
+    limits: Limits
+    contacts: tuple[HeldContact, ...]
+
+    @property
+    def size(self) -> int:
+        return len(self.inertia)
+
+    @property
+    def memory(self) -> int:
+        return sum(len(one.port.friction.memory()) for one in self.contacts if one.slow)
+
+    @property
+    def width(self) -> int:
+        """Length of Y."""
+        return 2 * self.size + 5 + self.memory
+
+    @property
+    def bands_rate(self) -> bool:
+        """True if the dead band acts on the derivative as well: of the error, not of the speed loop of a cascade."""
+        limits = self.limits
+        return (
+            limits.dead_band is not None and not (limits.of_integral or limits.on_measurement) and len(self.gains) == 1
+        )
+
+    def row(self, place: Array | None = None, velocity: Array | None = None, **others: float) -> Array:
+        """Row over Y; `others` are ``integral``, ``target``, ``target_velocity``, ``held`` and ``one``."""
+        n = self.size
+        found = np.zeros(self.width)
+        if place is not None:
+            found[:n] = place
+        if velocity is not None:
+            found[n : 2 * n] = velocity
+        where = {"integral": 2 * n, "target": 2 * n + 1, "target_velocity": 2 * n + 2, "held": 2 * n + 3, "one": -1}
+        for name, value in others.items():
+            found[where[name]] = value
+        return found
+
+    def error(self, loop: int = 0) -> Array:
+        """Row of the error that a loop of the controller sees."""
+        return self.row(-self.places[loop], target=1.0)
+
+    def error_rate(self, loop: int = 0) -> Array:
+        """Row of its derivative, of the measured place alone where the limits say so."""
+        return self.row(None, -self.places[loop], target_velocity=0.0 if self.limits.on_measurement else 1.0)
+
+    def slip(self, contact: HeldContact) -> Array:
+        """Row of the slip rate of a contact."""
+        return self.row(None, contact.row, target_velocity=-contact.belt)
+
+
+def plant_of(rig: Slider | Machine) -> Plant:
+    """Matrices of a rig that holds a place.
+
+    Raises
+    ------
+    NotAvailable
+        If a coordinate has no inertia, or normal stress depends on the motion, or a law cannot hold.
+    """
+    mechanism = rig.mechanism()
+    names = [one.name for one in mechanism.coordinates]
+    what = "the slider" if isinstance(rig, Slider) else None
+    for one in mechanism.coordinates:
+        if not one.inertia:
+            raise NotAvailable(
+                f"{what or f'bodies.{one.name}'} has no mass; hunting needs the inertia of all that moves"
+            )
+    size = len(names)
+    stiffness, damping = np.zeros((size, size + 1)), np.zeros((size, size + 1))
+    for element in mechanism.elements:
+        if element.active:
+            continue
+        acts, senses = _row(element.acts, names), _row(element.senses, names, True)
+        stiffness += np.outer(acts, senses) * float(element.stiffness or 0)
+        damping += np.outer(acts, senses) * float(element.damping or 0)
+    return Plant(
+        inertia=np.array([float(one.inertia) for one in mechanism.coordinates]),
+        stiffness=stiffness[:, :-1], damping=damping[:, :-1],
+        target_stiffness=stiffness[:, -1], target_damping=damping[:, -1],
+        force=np.array([float(one.force) for one in mechanism.coordinates]),
+        contacts=_merged([_contact(one, names) for one in mechanism.contacts]),
+        **_controller(mechanism, names),
+    )  # fmt: skip
+
+
+def _row(shares: Mapping[str, Any], names: list[str], target: bool = False) -> Array:
+    """Shares as a row over the coordinates, with that of the load point as its last element if `target`."""
+    found = [float(shares.get(name, 0)) for name in names]
+    return np.array([*found, float(shares.get(LOAD_POINT, 0))] if target else found)
+
+
+def _controller(mechanism: Mechanism, names: list[str]) -> dict[str, Any]:
+    """Fields of `Plant` about the controller; a loop has an error of its own and a gain on it and on its derivative."""
+    active = [one for one in mechanism.elements if one.active]
+    integral = mechanism.integral
+    return {
+        "acts": _row(active[0].acts, names),
+        "places": tuple(_row(one.senses, names) for one in active),
+        "gains": tuple((float(one.stiffness), float(one.damping)) for one in active),
+        "integral": 0.0 if integral is None else float(integral.gain),
+        "delay": max(float(one.delay) for one in active),
+        "limits": mechanism.limits or Limits(),
+    }
+
+
+def _contact(port: ContactPort, names: list[str]) -> HeldContact:
+    label = f"contacts.{port.name}." if port.name else ""
+    law, contact = port.friction, port.contact
+    time = sp.Symbol("t")
+    load, slow = contact.load(), law.slow_velocity()
+    if port.separation or contact.memory() or not contact.is_imposed() or contact.imposed(time) != 0:
+        raise NotAvailable(f"{label}contact: hunting needs a constant normal force; law = 'constant' has one")
+    if law.lateness() or (law.memory() and slow is None):
+        raise NotAvailable(
+            f"{label}friction: the law {law.name!r} is not offered at rest; allowed: coulomb, coulomb-stribeck, lugre"
+        )
+    sigma = float((contact.steady_stress() if load is None else load) or 0.0)
+    row, belt = _row(port.slip, names), -float(port.slip.get(LOAD_POINT, 0))
+    if law.memory() and slow is not None:
+        return HeldContact(row, belt, 0.0, 0.0, 0.0, port, sigma, float(slow))
+    v = sp.Symbol("v", positive=True)
+    sliding = sp.sympify(law.strength(v, sigma, (), sp.nan))
+    if sliding.diff(v, 2) != 0:
+        raise NotAvailable(f"{label}friction: the law {law.name!r} is not offered at rest; allowed: coulomb, lugre")
+    rest, coulomb, drag = (
+        float(port.area * value) for value in (law.rest_strength(sigma), sliding.subs(v, 0), sliding.diff(v))
+    )
+    return HeldContact(row, belt, rest, coulomb, drag, port, sigma)
+
+
+def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
+    """Contacts without memory that slide in proportion, joined: where they stick, only their sum is determined."""
+    found: list[HeldContact] = []
+    for one in contacts:
+        for i, other in enumerate(found):
+            own, theirs = np.append(one.row, one.belt), np.append(other.row, other.belt)
+            ratio = float(own @ theirs / (theirs @ theirs))
+            if not one.slow and not other.slow and np.array_equal(own, ratio * theirs):
+                found[i] = HeldContact(
+                    other.row, other.belt, other.rest + abs(ratio) * one.rest, other.coulomb + abs(ratio) * one.coulomb,
+                    other.drag + ratio**2 * one.drag, other.port, other.normal,
+                )  # fmt: skip
+                break
+        else:
+            found.append(one)
+    return tuple(found)

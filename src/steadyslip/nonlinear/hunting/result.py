@@ -1,0 +1,139 @@
+"""Result of `hunt`: whether a held axis hunts or settles, how far, how often, in numbers and words."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.format import format_quantity
+from steadyslip.core.results import ReadOnly
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.hunting.motion import Stroke
+from steadyslip.nonlinear.hunting.plant import Array
+from steadyslip.protocol import Protocol
+
+SYMMETRIC = 1e-3  # relative difference of the two sides up to which they are written as one: four digits are printed
+
+
+@dataclass(frozen=True, eq=False)
+class Hunt(ReadOnly):
+    """Whether an axis that is held hunts about its target.
+
+    Attributes
+    ----------
+    rig : Slider or Machine
+    protocol : Protocol
+        Target, as it was moved.
+    hunts : bool or None
+        True if strokes go on without becoming smaller, False if it settles; None if the motion ended before.
+    lowest, highest : float
+        Extremes of the measured place over the target (m or rad), in the last cycle, or from the last rest on.
+    period : float
+        Duration of the cycle (s), with strokes to and fro; NaN if it does not repeat.
+    repeats : bool
+        True if the last cycle is that before, to 1e-9 (with bristles to a hundred times `rtol`).
+    strokes : tuple of Stroke
+        Motions between two rests; `begins` and `ends` are errors (target less place).
+    time, error, velocity, force : ndarray
+        The motion: s; m or rad; m/s or rad/s; N, N m or Pa.
+    exact : bool
+        True if every piece is solved exactly, else to the error `rtol` per step.
+    rtol : float
+    settled_at : float
+        Time from which on it rests (s); NaN if it does not.
+    unit, force_unit : str
+    version : str
+    """
+
+    rig: Slider | Machine
+    protocol: Protocol
+    hunts: bool | None
+    lowest: float
+    highest: float
+    period: float
+    repeats: bool
+    strokes: tuple[Stroke, ...]
+    time: Array
+    error: Array
+    velocity: Array
+    force: Array
+    exact: bool
+    rtol: float
+    settled_at: float
+    unit: str
+    force_unit: str
+    version: str
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed of the measured place in the last two strokes (m/s or rad/s); 0 without strokes."""
+        return max((one.fastest for one in self.strokes[-2:]), default=0.0)
+
+    @property
+    def every(self) -> float:
+        """Time from the start of the last but one stroke to that of the last (s); NaN without two."""
+        return self.strokes[-1].start - self.strokes[-2].start if len(self.strokes) > 1 else np.nan
+
+    @property
+    def sentence(self) -> str:
+        """Answer in a line, such as "HUNTS ±63.9 mm about the target every 24.4 s"."""
+        far = max(abs(self.lowest), abs(self.highest))
+        size = format_quantity(far, self.unit)
+        if self.hunts:
+            if abs(self.highest + self.lowest) > SYMMETRIC * far:
+                low, high = (format_quantity(value, self.unit) for value in (self.lowest, self.highest))
+                size = f"from {low} to {high}"
+            else:
+                size = f"±{size}"
+            often = f"every {format_quantity(self.period, 's')}" if np.isfinite(self.period) else "without a period"
+            return f"HUNTS {size} about the target {often}"
+        if self.hunts is None:
+            return f"NOT DECIDED by {format_quantity(self._end, 's')}: the last strokes reach {size} from the target"
+        if np.isfinite(self.settled_at):
+            return f"SETTLES within {size} of the target after {format_quantity(self.settled_at, 's')}"
+        return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
+
+    @property
+    def _end(self) -> float:
+        return float(self.time[-1]) if len(self.time) else 0.0
+
+    def __str__(self) -> str:
+        lines = [self.sentence]
+        if self.strokes:
+            last = self.strokes[-1]
+            again = f", {format_quantity(self.every, 's')} after the one before" if len(self.strokes) > 1 else ""
+            lines.append(
+                f"strokes         {len(self.strokes)}; the last: starts{again}, fastest "
+                f"{format_quantity(last.fastest, f'{self.unit}/s')}"
+            )
+        if len(self.force):
+            area = self.rig.area if isinstance(self.rig, Slider) else None
+            ends = (self.force.min(), self.force.max())
+            low, high = (format_quantity(float(force), self.force_unit, area=area) for force in ends)
+            lines.append(f"controller      {low} to {high}")
+        accuracy = "exact pieces" if self.exact else f"rtol {self.rtol:g}"
+        lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Verdict and strokes as JSON-ready dict, SI units; None for what does not exist."""
+        return {
+            "hunts": self.hunts,
+            "sentence": self.sentence,
+            "lowest": self.lowest,
+            "highest": self.highest,
+            "period": _finite(self.period),
+            "repeats": self.repeats,
+            "settled_at": _finite(self.settled_at),
+            "fastest": self.fastest,
+            "exact": self.exact,
+            "unit": self.unit,
+            "strokes": [{k: _finite(v) for k, v in asdict(one).items()} for one in self.strokes],
+        }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

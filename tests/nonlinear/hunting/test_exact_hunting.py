@@ -1,0 +1,110 @@
+"""Hunting with Coulomb friction: theory 14, a second route, limits."""
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from hunting_by_scipy import axis, by_hand, compared
+from steadyslip.protocol import DisplacementStep
+
+THEORY = {"mass": 1.0, "rest": 1.5, "sliding": 1.0, "viscous": 0.4, "kp": 3.0, "kd": 6.0, "ki": 4.0}
+
+
+def test_the_cycle_of_theory_14():
+    found = ss.hunt(axis(**THEORY))
+    assert found.hunts
+    assert found.repeats
+    assert found.exact
+    assert found.every == pytest.approx(12.00651936, abs=5e-9)
+    assert found.highest == pytest.approx(0.06565304, abs=5e-9)
+    assert found.lowest == pytest.approx(-found.highest, rel=1e-9)
+    assert found.period == pytest.approx(2 * found.every, rel=1e-9)
+    assert found.sentence == "HUNTS ±65.65 mm about the target every 24.01 s"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_strokes_are_those_of_scipy(seed):
+    assert compared(np.random.default_rng([7, seed])) < 1e-9
+
+
+@pytest.mark.campaign
+def test_strokes_of_forty_axes_are_those_of_scipy():
+    assert max(compared(np.random.default_rng([1, i])) for i in range(40)) < 1e-9
+
+
+def test_scales_of_length_and_time_and_force_change_nothing():
+    """Lengths times L, times times T, masses times M: the same motion."""
+    far, slow, heavy = 1e-4, 0.3, 70.0
+    force = heavy * far / slow**2
+    other = axis(
+        mass=heavy, rest=1.5 * force, sliding=force, viscous=0.4 * heavy / slow, kp=3 * heavy / slow**2,
+        kd=6 * heavy / slow, ki=4 * heavy / slow**3,
+    )  # fmt: skip
+    one, two = ss.hunt(axis(**THEORY)), ss.hunt(other)
+    assert two.every == pytest.approx(slow * one.every, rel=1e-9)
+    assert two.highest == pytest.approx(far * one.highest, rel=1e-9)
+    assert len(two.strokes) == len(one.strokes)
+
+
+def test_without_integral_it_rests_where_friction_holds():
+    found = ss.hunt(axis(**THEORY | {"ki": 0.0}))
+    assert found.hunts is False
+    assert abs(found.error[-1]) * 3.0 <= 1.5
+    assert found.sentence == "SETTLES within 333.3 mm of the target after 41.42 s"  # it creeps up to Coulomb friction
+
+
+def test_a_stiff_controller_stops_at_a_time():
+    found = ss.hunt(axis(**THEORY | {"ki": 0.0, "kd": 1.0}))
+    assert found.hunts is False
+    assert found.settled_at == found.strokes[-1].end
+    assert abs(found.error[-1]) * 3.0 <= 1.5
+
+
+def test_a_step_that_friction_holds_makes_no_stroke():
+    found = ss.hunt(axis(**THEORY | {"ki": 0.0}), DisplacementStep(at=0, by=0.49))
+    assert found.hunts is False
+    assert found.strokes == ()
+    assert found.highest == pytest.approx(-0.49)
+
+
+def test_friction_as_large_at_rest_does_not_hunt():
+    found = ss.hunt(axis(**THEORY | {"rest": 1.0}), until=600.0)
+    assert found.hunts is False
+    reach = [abs(one.ends) for one in found.strokes]
+    assert reach[-1] < 0.2 * reach[1]
+
+
+def test_energy_is_what_the_controller_gives_less_friction():
+    """Over one stroke: the work of the force is friction's and viscosity's, as it begins and ends at rest."""
+    found = ss.hunt(axis(**THEORY))
+    at = (found.time >= found.strokes[-1].start) & (found.time <= found.strokes[-1].end)
+    t, v, u = (np.concatenate(([part[at][0]], part[at])) for part in (found.time, found.velocity, found.force))
+    lost = 1.0 * abs(found.strokes[-1].ends - found.strokes[-1].begins)
+    given = np.trapezoid(u * v, t) - np.trapezoid(0.4 * v**2, t)
+    assert given == pytest.approx(lost, rel=2e-3)  # trapezoids over a hundred samples
+
+
+SAMPLED = {
+    "plain": {},
+    "on the measurement": {"derivative": "measurement"},
+    "an encoder": {"resolution": 1e-3, "derivative": "measurement"},
+    "a limit": {"force_limit": 1.8, "integral_limit": 1.6},
+    "a dead band": {"dead_band": 0.02},
+    "a dead band of the integral": {"dead_band": 0.02, "dead_band_of": "integral"},
+    "late": {"delay": 0.1},
+}
+BY_HAND = {"force_limit": "force", "integral_limit": "integral_limit", "dead_band": "band", "resolution": "encoder"}
+
+
+@pytest.mark.parametrize("more", SAMPLED.values(), ids=SAMPLED)
+def test_a_sampled_controller_is_that_of_a_simulation_by_hand(more):
+    numbers = {name: more[key] for key, name in BY_HAND.items() if key in more}
+    theirs = by_hand(
+        1.0, 60.0, **THEORY, sample=0.05, on_measurement="derivative" in more, of_integral="dead_band_of" in more,
+        delay=2 if "delay" in more else 0, **numbers,
+    )  # fmt: skip
+    found = ss.hunt(axis(**THEORY, sample_time=0.05, **more), DisplacementStep(at=0, by=1.0), until=60.0)
+    times = 0.05 * np.arange(1, len(theirs))
+    ours = 1.0 - np.array([found.error[np.argmin(np.abs(found.time - t))] for t in times])
+    assert np.ptp(theirs) > 0.9
+    assert ours == pytest.approx(theirs[1:], abs=1e-9)

@@ -42,8 +42,8 @@ class Check(Displayed):
 
 def check(what: str, how: str, error: float, allowed: float) -> Check:
     """Make a Check that passes if the error is finite and not larger than allowed."""
-    error = float(error) if math.isfinite(error) else math.inf
-    return Check(what, how, error, float(allowed), error <= allowed)
+    error, allowed = float(error) if math.isfinite(error) else math.inf, float(allowed)
+    return Check(what, how, error, allowed, error <= allowed)
 
 
 def in_words(checks: Sequence[Check]) -> str:

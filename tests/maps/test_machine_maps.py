@@ -93,7 +93,7 @@ edge = {{ along = "{name}" }}
     assert "kN" in str(found)
     assert "Pa" not in str(found)
     axes = found.plot(show="edge")
-    assert axes.get_xlabel() == "first preload (kN)"
+    assert axes.get_xlabel() == "first preload σ₀ (kN)"
     assert axes.get_ylabel() == "edge of first preload (kN)"
 
 

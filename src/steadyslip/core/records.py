@@ -357,6 +357,15 @@ def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str,
         yield (prefix if role.inline else f"{name}."), value
 
 
+def records_in(record: FrozenRecord) -> Iterator[FrozenRecord]:
+    """Yield the records in the fields of a record, each followed by those in its own fields."""
+    for name, own, role in field_layout(record):
+        if isinstance(role, Part):
+            for _, member in below(role, getattr(record, name), own, ""):
+                yield member
+                yield from records_in(member)
+
+
 def _each(role: Part, value: Any, name: str, prefix: str, change: Callable[[Any, str], Any]) -> Any:
     """Value of a field with ``change(record, prefix)`` applied to every record in it."""
     changed = [change(member, before) for before, member in below(role, value, name, prefix)]

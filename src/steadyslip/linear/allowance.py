@@ -2,7 +2,7 @@
 
 Where late terms nearly outweigh what acts at once, or delays are long, one count takes seconds and a scan asks for a
 thousand of them. Inside `at_most` all counts together stop after a number of terms, the same on every computer: they
-come out as `argument.UNKNOWN`, and `Allowance.spent` tells so.
+come out as `argument.UNKNOWN`, and `CountingAllowance.spent` tells so.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ _SHARE = 16  # of what is left; about the number of times that pieces of the axi
 
 
 @dataclass
-class Allowance:
+class CountingAllowance:
     """Terms that are left, and whether more were asked for."""
 
     left: int
     spent: bool = False
 
 
-_CURRENT: ContextVar[Allowance | None] = ContextVar("allowance", default=None)
+_CURRENT: ContextVar[CountingAllowance | None] = ContextVar("allowance", default=None)
 
 
 @contextmanager
-def at_most(terms: int) -> Iterator[Allowance]:
+def at_most(terms: int) -> Iterator[CountingAllowance]:
     """Allowance of so many terms, about half a microsecond each, for all that is counted inside the block."""
-    own = Allowance(terms)
+    own = CountingAllowance(terms)
     token = _CURRENT.set(own)
     try:
         yield own

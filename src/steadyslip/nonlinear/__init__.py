@@ -32,7 +32,7 @@ from steadyslip.nonlinear.forced import response
 from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.hunting.hunt import hunt
-from steadyslip.nonlinear.hunting.result import Hunt
+from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
 from steadyslip.nonlinear.kicks.brackets import threshold_map
 from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold

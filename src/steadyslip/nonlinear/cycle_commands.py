@@ -29,7 +29,7 @@ from steadyslip.nonlinear.forced import amplitude_unit, response
 from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.hunting.hunt import hunt
-from steadyslip.nonlinear.hunting.result import Hunt
+from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.kicks import kick_problems
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold

@@ -11,6 +11,7 @@ from typing import Any
 from steadyslip import figures
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.records import records_in
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.boundary import Margin
 from steadyslip.linear.status import stability
@@ -156,16 +157,9 @@ def letters(rig: Slider | Machine) -> str:
 def references(rig: Slider | Machine) -> Iterator[str]:
     """HTML of the laws of a rig with what their descriptions cite, and of the source of the method."""
     yield heading("References")
-    parts: list[Any] = [rig] if isinstance(rig, Slider) else list(rig.contacts.values())
-    laws: list[Any] = []
-    for one in parts:
-        friction = one.friction
-        laws += [friction, getattr(friction, "evolution", None), getattr(friction, "normal_memory", None)]
-        laws += [getattr(one, "contact", None) or getattr(one, "law", None)]
-    rows = {}
-    for law in laws:
-        if law is not None and getattr(law, "name", ""):
-            rows[law.name] = (law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0])
+    both = [law for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
+    laws = [one for law in both for one in (law, *records_in(law)) if one.name]
+    rows = {law.name: (law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0]) for law in laws}
     yield table(
         list(rows.values()), ("law", "what it is"), caption="Laws that were used; their pages have the equations."
     )

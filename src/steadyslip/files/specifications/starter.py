@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import textwrap
+import tomllib
 from collections.abc import Iterator
 from dataclasses import Field
+from functools import cache
+from importlib import resources
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
@@ -16,20 +19,6 @@ from steadyslip.files.specifications.layout import Section, find_law, has_choice
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.machine.slider import Slider
 
-START = {
-    "mu_coulomb": "0.11", "mu_static": "0.19", "v_stribeck": '"8 mm/min"', "bristle_stiffness": '"125000 1/m"',
-    "viscous": '"1.25 s/m"', "a": "0.010", "b": "0.014", "d_c": '"10 um"', "mu_ref": "0.6", "v_ref": '"1 mm/min"',
-    "preload": '"3.2 kN"', "confining_pressure": '"160 kPa"', "angle": '"20 deg"', "crank_angle": '"60 deg"',
-    "crank_radius": '"50 mm"', "rod_length": '"200 mm"', "gain": "0.3", "lead_angle": '"5 deg"',
-    "axial_load": '"3.2 kN"', "transmitted": "0.1", "ram_stiffness": '"100 N/um"', "dilatancy": '"0.1 um"',
-    "lift": '"10 N s/m"', "guide_stiffness": '"100 N/um"', "slope": '"1 deg"', "suction": '"10 kPa"',
-    "drainage": '"1 1/s"', "slip_distance": '"10 um"', "velocity": '"0.5 mm/min"', "kp": '"12 N/um"',
-    "kd": '"5 N s/mm"', "ki": '"20 N/um/s"', "area": '"200 cm^2"', "stiffness": '"12 N/um"', "mass": '"240 kg"',
-    "damping": '"5 N s/mm"',
-}  # fmt: skip
-"""Values of a slow machine slide, 240 kg on 3.2 kN; they stand in until replaced."""
-NOT_BESIDE = {"self-energising": ("wedge_angle", "lead_angle"), "lift": (), "linear": ("gain",)}
-"""Keys of which a law takes one alone, left out where another one stands."""
 EXAMPLES = {
     "machine": "machines/feed-axis.toml", "protocol": "stick-slip.toml", "fit": "fits/basalt.toml",
     "map": "maps/safe-stiffness.toml",
@@ -104,15 +93,25 @@ def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterato
             yield from _comment(f"{role.doc}: one of {words}")
             yield f'# {key} = "{default}"'
         return
-    usual = key in START and key not in NOT_BESIDE.get(law.name, ())
+    values, not_beside = _usual_values()
+    usual = key in values and key not in not_beside.get(law.name, ())
     if isinstance(role, Parameter):
-        value = START.get(key, example(role.unit).replace("'", '"'))
+        value = values.get(key, example(role.unit).replace("'", '"'))
         text = f"{key} = {value}"
         yield f"{text if usual or is_required(item) else '# ' + text:<{_WIDE}} # {role.doc}"
     elif hasattr(role, "choices"):
         default = item.default
         shown = str(default).lower() if isinstance(default, bool) else f'"{default}"'
         yield f"{f'# {key} = {shown}':<{_WIDE}} # {role.doc}: {role.allowed()}"
+
+
+@cache
+def _usual_values() -> tuple[dict[str, str], dict[str, list[str]]]:
+    """Values of a slow machine slide as TOML text by key, and by law the keys that are left out."""
+    text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
+    values, _, _ = text.partition("[not_beside]")
+    lines = (line.partition(" = ") for line in values.splitlines() if " = " in line)
+    return {key: value for key, _, value in lines}, tomllib.loads(text)["not_beside"]
 
 
 def _comment(text: str) -> list[str]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
-from steadyslip.model.numeric.assembly import MachineMatrices, Site
 from steadyslip.model.numeric.contact_laws import SteadyNumbers
+from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site
 
 _STEPS = 60  # of Newton's method; laws that are linear in the stresses take two
 _CONVERGED = 1e-13  # change of the stresses relative to them, some hundred units in the last place

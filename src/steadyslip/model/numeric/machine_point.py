@@ -12,8 +12,8 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
-from steadyslip.model.numeric.assembly import MachineMatrices, assemble
 from steadyslip.model.numeric.balance import Balance, balance
+from steadyslip.model.numeric.machine_matrices import MachineMatrices, assemble
 from steadyslip.model.numeric.pencil import StatePencil, linearised
 from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
-from steadyslip.model.numeric.assembly import MachineMatrices, Site
 from steadyslip.model.numeric.balance import Balance, state_of
 from steadyslip.model.numeric.contact_laws import Slopes
+from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site
 
 ComplexArray = NDArray[np.complex128]
 

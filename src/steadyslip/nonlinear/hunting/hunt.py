@@ -11,9 +11,9 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.nonlinear.hunting.motion import Motion, Stroke, friction_at_rest
+from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.nonlinear.hunting.plant import Plant, plant_of
-from steadyslip.nonlinear.hunting.result import Hunt
+from steadyslip.nonlinear.hunting.stick_and_slip import Motion, Stroke, friction_at_rest
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.pieces import DisplacementStep
 from steadyslip.protocol.protocol import LOAD_POINT

@@ -11,8 +11,8 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.nonlinear.hunting.motion import Stroke
 from steadyslip.nonlinear.hunting.plant import Array
+from steadyslip.nonlinear.hunting.stick_and_slip import Stroke
 from steadyslip.protocol import Protocol
 
 SYMMETRIC = 1e-3  # relative difference of the two sides up to which they are written as one: four digits are printed

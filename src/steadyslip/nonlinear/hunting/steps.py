@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.kernels.methods import rodas5p
-from steadyslip.nonlinear.hunting.modes import HeldPiece
+from steadyslip.nonlinear.hunting.held_modes import HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
 
 DEGREE = 22  # of the Taylor series: 1/22! is 1e-21, for steps of one over the largest eigenvalue

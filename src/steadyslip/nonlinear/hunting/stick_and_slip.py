@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.nonlinear.hunting.modes import HeldMode, HeldPiece, Switch
+from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece, Switch
 from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
 from steadyslip.nonlinear.hunting.sampled import SampledController
 from steadyslip.nonlinear.hunting.steps import NODES, POWERS, BristleSteps, ExactSteps, first_crossing

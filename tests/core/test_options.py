@@ -152,7 +152,8 @@ LEFT = {  # parameters that their functions check themselves, with words of thei
     "normal_stress", "sampling", "rate", "time", "friction", "shear", "normal", "displacement", "velocity",
     "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick", "precision", "rtol",
     "amplitude", "amplitudes", "periods", "doublings", "most_points", "method", "points", "result",
-    "pore_pressure", "calibrated", "tolerances", "sure", "table", "load", "loop", "hold", "errors", "intervals",
+    "pore_pressure", "calibrated", "tolerances", "names", "kept", "sure", "table", "load", "loop", "hold",
+    "errors", "intervals",
 }  # fmt: skip
 PUBLIC = {
     name: thing for name, thing in public().items()

@@ -140,7 +140,7 @@ CONTENT = Tested("the text of a file", lambda value: isinstance(value, str))
 MAKERS = {
     "Slider": "read_rig", "Machine": "read_rig", "Slider | Machine": "read_rig",
     "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
-    "Cycle": "cycles", "Protocol": "read_protocol",
+    "Cycle": "cycles", "Protocol": "read_protocol", "StructureData": "machine.StructureData",
 }  # fmt: skip
 INTEGRATION = {"rtol": within(tolerance), "arrest": within(below_one), "most_steps": within(steps)}
 BY_WORD: dict[str, Role] = INTEGRATION | {

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from scipy.optimize import brentq, minimize_scalar
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.kernels.methods import rodas5p
@@ -188,6 +187,8 @@ def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, in
 
 def _root(guard: Array) -> float | None:
     """First share of a step at which a guard that is not negative at first becomes so; None if there is none."""
+    from scipy.optimize import brentq, minimize_scalar  # not at start-up
+
     values = guard @ POWERS[: len(guard)]
     polynomial = np.polynomial.Polynomial(guard)
     skip = int(np.argmax(guard != 0)) if np.any(guard) else 0

@@ -10,6 +10,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from dimensionless import A, unit_rig
+from hunting_by_scipy import axis
 from machines import two_mass
 from public_names import public_results
 from rigs_of_theory import V0, rate_state, rig
@@ -34,6 +35,8 @@ QUICK = {
     "StableWithin": lambda: ss.verdict.stable_within(RIG, {"stiffness": (1e9, 5e10)}),
     "ValuesWithin": lambda: made("StableWithin").each[0],
     "Samples": lambda: ss.maps.Samples({"friction.a": (0.01, 0.02)}, 2), "Explorer": lambda: ss.explore(RIG),
+    "StructureData": lambda: ss.machine.StructureData(*np.eye(2)[None].repeat(4, axis=0)),
+    "Hunt": lambda: ss.hunt(axis(mass=1.0, rest=1.5, sliding=1.0, viscous=0.4, kp=3.0, kd=6.0, ki=4.0), until=30.0),
 }  # fmt: skip
 LONG = {
     "Report": lambda: ss.report(RIG, explorer=False), "MapResult": lambda: with_map(lambda found: found),

@@ -17,6 +17,7 @@ from steadyslip.core.entries import Whole
 from steadyslip.core.errors import ParameterError, Problem, repr_short
 from steadyslip.core.names import Members
 from steadyslip.core.options import Tested, checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.records import FrozenRecord, members, parameter, setting
 from steadyslip.core.roles import Entry, Schema, fault
 from steadyslip.machine.bodies import Body
@@ -29,7 +30,7 @@ _SYMMETRIC = 1e-8  # relative asymmetry of an inertia matrix that is taken for r
 
 
 @dataclass(frozen=True, eq=False)
-class StructureData:
+class StructureData(Displayed):
     """Matrices of a structure in SI units, and the motion of its points.
 
     Attributes

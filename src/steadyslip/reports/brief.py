@@ -38,7 +38,8 @@ from steadyslip.reports.elements import (
 )
 
 _BY_UNIT = {
-    "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times periods t departure",
+    "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times periods t departure "
+    "settled_at",
     "m/s": "velocity v speed peak_velocity lowest_velocity velocities slip_rate",
     "m": "slip x displacement",
     "Pa": "normal_stress shear_stress spring_stress stress_drop lowest_normal_stress highest_normal_stress normal "
@@ -50,10 +51,13 @@ _BY_UNIT = {
     "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r",
     "Hz": "ring_frequency",
     "m^2": "area",
-    "N": "load normal_force friction_force force_drop pull",
+    "N": "load force normal_force friction_force force_drop pull",
+    "kg": "mass",
+    "N s/m": "damping gyroscopic",
+    "N/m": "stiffness",
 }
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
-RESULT_UNIT = frozenset("value error low high amount absolute values".split())  # noqa: SIM905 -- a list of words
+RESULT_UNIT = frozenset("value error low high amount absolute values lowest highest".split())  # noqa: SIM905 -- a list of words
 DIMENSIONLESS = frozenset(
     """relative size bracket searched damping_ratio amplitude trivial multipliers ratio share ssq rtol steps rejected
     routh characteristic_polynomial characteristic_terms growth_slope f1 mu B0 B2 B3 friction precision rise scale noise
@@ -218,6 +222,10 @@ def _attribute_rows(result: Any) -> Iterator[tuple[str, Any]]:
 def unit_of(result: Any, name: str) -> str:
     """SI unit of an attribute of a result, found by the name of the attribute."""
     own = getattr(result, "unit", None)
+    if name == "force" and hasattr(result, "force_unit"):
+        return str(result.force_unit)
+    if own == "rad" and UNITS.get(name) == "m/s":
+        return "rad/s"
     if isinstance(own, str) and name in RESULT_UNIT | _BY_TYPE.get(type(result).__name__, set()):
         return own
     return UNITS.get(name, "1")

@@ -94,5 +94,5 @@ def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
         assert "--unstable" in visit.slider("links.caliper.stiffness").get_attribute("style"), "a band 9 % wide"
         visit.page.get_by_role("button", name="undo").click()
         visit.type("bodies.pad.press", "-1 N")
-        edges.filter(has_text="bodies.pad.press").filter(has_text="slides steadily, but unstable").wait_for()
+        edges.filter(has_text="pad press").filter(has_text="slides steadily, but unstable").wait_for()
         assert visit.page.locator(".verdict p").first.inner_text().startswith("Lift-off at contact disc.")

@@ -37,7 +37,8 @@ def test_each_fault_is_named_where_it_stands():
     told = _spoiled("brake-pad", ('body = "pad"', 'body = "pad"\nloaded_by = "lining"'))
     assert told.endswith("'lining' pulls away from the surface only; allowed: one along the slide")
     told = _spoiled("geared-servo", ('kd = "0.5 N s/mm"', 'tn = "1 s"'))
-    assert "unknown key 'tn'; allowed: velocity, velocity_of, body, measured, delay, kp, kd; it is a key of" in told
+    assert "unknown key 'tn'; allowed: velocity, velocity_of, derivative," in told
+    assert "body, measured, delay, kp, kd; it is a key of" in told
     told = _spoiled("brake-pad", ("bodies.pad", "bodies.None"), ('"pad"', '"None"'))
     assert told == _spoiled("brake-pad", ("bodies.pad", "bodies.other"), ('"pad"', '"other"'))
     told = _spoiled("telescope", ('"tube"]', '"ground"]'))

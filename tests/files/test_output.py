@@ -27,7 +27,7 @@ def writers(history, tmp_path_factory):
         "to_netcdf": found.to_netcdf,
         "to_parquet": found.to_parquet,
         "explore": lambda path: ss.explore(rig()).save(path),
-        "figure": lambda path: write_by_ending(path.with_suffix(".png"), {}, found.plot),
+        "figure": lambda path: write_by_ending(path.with_suffix(".png"), {}, found.plot, found),
     }
 
 

@@ -32,6 +32,7 @@ CONTACTS = [
     ss.laws.LinearNormalStress(steady_normal_stress=5e6, b2=-0.3),
     ss.laws.InclinedSpring(preload=5e6, angle=-45 * deg),
     ss.laws.InclinedSpring(steady_normal_stress=5e6, angle=30 * deg),
+    ss.laws.Transmitted(preload=5e6, transmitted=0.4, transmitted_back=0.2),
     ss.laws.SliderCrank(preload=5e6, **CRANK),
     ss.laws.SliderCrank(preload=5e6, **CRANK, stroke="push"),
     ss.laws.SliderCrank(steady_normal_stress=5e6, crank_angle=-1.1, crank_radius=0.1, rod_length=0.3),
@@ -200,7 +201,13 @@ def test_inclined_spring_of_the_paper(psi, kappa):
 
 
 @pytest.mark.parametrize(
-    "contact", [c for c in CONTACTS if getattr(c, "preload", None) or getattr(c, "confining_pressure", None)], ids=repr
+    "contact",
+    [
+        c
+        for c in CONTACTS
+        if hasattr(c, "steady_normal_stress") and (getattr(c, "preload", None) or getattr(c, "confining_pressure", None))
+    ],
+    ids=repr,
 )
 def test_preload_and_steady_normal_stress_say_the_same(contact):
     """A contact given by the σss that its load leads to has the same roots and stable stiffnesses."""

@@ -131,7 +131,7 @@ def test_a_report_says_everything_about_a_rig():
         assert part in text, part
     assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
     assert " um" not in text
-    assert found.html.count("<figure>") == 4
+    assert found.html.count("<figure>") == 6  # the rig, two charts, eigenvalues, motion over time and in its plane
     assert found.html.count("<math") > 10
     assert found.html.count('class="steadyslip-root"') == 1
     assert len(found.html.encode()) <= 500_000

@@ -167,7 +167,7 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
 
     Examples
     --------
-    >>> ss.read_spec("examples/fits/basalt.toml").rig.stiffness
+    >>> ss.experiments.read_spec("examples/fits/basalt.toml").rig.stiffness
     10000000000.0
     """
     return spec_from_text(text_of(path), str(path), changes)

@@ -146,4 +146,5 @@ def _drop_brackets(text: str) -> str:
 
 def minify_css(text: str) -> str:
     """Minified text of a style sheet."""
-    return re.sub(r"(?<=[;{},]) +|(?<=[a-z]:) (?=[^{}]*[;}])|;? *(?=\})", "", re.sub(r"^ +", "", text, flags=re.M))
+    bare = re.sub(r"^ +", "", text, flags=re.M)
+    return re.sub(r"(?<=[;{},])\s+|\s+(?=\{)|(?<=[a-z]:) (?=[^{}]*[;}])|;?\s*(?=\})", "", bare)

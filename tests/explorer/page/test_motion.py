@@ -142,7 +142,7 @@ def own_time(visit, run):
 
 STOP = """() => new Promise((done) => {
   const stop = [...document.querySelectorAll("button")].find((one) => one.textContent === "stop");
-  const length = document.querySelector("[aria-label='length of the run']");
+  const length = document.querySelector("[aria-label$='length of the run']");
   length.value = "100 yr";
   length.dispatchEvent(new Event("change"));
   const began = performance.now();

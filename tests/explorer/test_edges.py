@@ -14,7 +14,8 @@ from steadyslip.verdict.words import BEYOND
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(
-    str(path.relative_to(EXAMPLES).with_suffix("")) for path in (*EXAMPLES.glob("*.toml"), *EXAMPLES.glob("machines/*"))
+    str(path.relative_to(EXAMPLES).with_suffix(""))
+    for path in (*EXAMPLES.glob("[!h]*.toml"), *EXAMPLES.glob("machines/*"))
 )
 
 

@@ -205,7 +205,8 @@ def test_inclined_spring_of_the_paper(psi, kappa):
     [
         c
         for c in CONTACTS
-        if hasattr(c, "steady_normal_stress") and (getattr(c, "preload", None) or getattr(c, "confining_pressure", None))
+        if hasattr(c, "steady_normal_stress")
+        and (getattr(c, "preload", None) or getattr(c, "confining_pressure", None))
     ],
     ids=repr,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from typing import Any
@@ -117,9 +118,10 @@ def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> 
 
 
 def json_for_html(known: Mapping[str, Any]) -> str:
-    """JSON text for a script element, with <, >, & and line separators escaped so that no data can end the element."""
+    """JSON text for a script element, with <, & and line separators escaped so that no data can end the element."""
     data = json.dumps(known, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    for letter in "<>&\u2028\u2029":
+    data = re.sub(r'(?<!\\)(":-?\d+)\.0(?=[,}])', r"\1", data)  # 2 for 2.0
+    for letter in "<&\u2028\u2029":
         data = data.replace(letter, f"\\u{ord(letter):04x}")
     return data
 

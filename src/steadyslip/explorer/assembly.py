@@ -75,8 +75,8 @@ def document(title: str, styles: str, body: str) -> str:
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{html.escape(title)}</title>\n<style>\nbody {{ margin: 0; }}\n{styles}</style>\n</head>\n"
+        '<meta name="viewport" content="width=device-width,initial-scale=1">\n'
+        f"<title>{html.escape(title)}</title>\n<style>\nbody{{margin:0}}\n{styles}</style>\n</head>\n"
         f"<body>\n{body}</body>\n</html>\n"
     )
 
@@ -110,9 +110,9 @@ def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> 
     return (
         '<div class="steadyslip-root"></div>\n'
         f'<script type="application/json" class="steadyslip-data">{json_for_html(known)}</script>\n'
-        f'<script>\n"use strict";\n(() => {{\n{code}'
-        "const place = document.currentScript.previousElementSibling;\n"
-        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs, library);\n"
+        f'<script>\n"use strict";(()=>{{\n{code}'
+        "const place=document.currentScript.previousElementSibling;"
+        "mount(place.previousElementSibling,JSON.parse(place.textContent),programs,library);\n"
         "})();\n</script>\n"
     )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 RELEASE = "0.2.0"
-KINDS = (".py", ".pyi", ".js", ".css", ".json")
+KINDS = (".py", ".pyi", ".js", ".css", ".json", ".toml")
 """Extensions of the package's source files."""
 
 

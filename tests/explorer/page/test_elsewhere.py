@@ -98,7 +98,7 @@ def test_the_command_writes_the_page(tmp_path):
     assert answered.returncode == 0, answered.stderr
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<title>my rig – steadyslip</title>" in text
-    assert '"value":90000000000.0' in text
+    assert '"value":90000000000,' in text
     refused = run("explore", tmp_path / "my rig.toml", "-o", tmp_path / "page.pdf")
     assert refused.returncode == 2
     assert ".html" in refused.stderr

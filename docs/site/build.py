@@ -128,6 +128,7 @@ def kind_of(thing: object) -> str:
 def write_gallery(source: Path, extra: Path, quick: bool) -> None:
     """Write a page with file, verdict, chart and live page for each example of a rig."""
     import matplotlib as mpl
+    import numpy as np
 
     mpl.use("agg")
 
@@ -137,16 +138,17 @@ def write_gallery(source: Path, extra: Path, quick: bool) -> None:
     for path in sorted((ROOT / "examples").glob("*.toml")) + sorted((ROOT / "examples/machines").glob("*.toml")):
         rig = ss.read_rig(path)
         lines = [f"# {path.stem.replace('-', ' ').capitalize()}", ""]
-        if not quick:
-            ss.explore(rig, live / f"{path.stem}.html")
-            figure = ss.analyze(rig).plot().figure
+        command, answer = ("hunt", ss.hunt(rig)) if rig.holds else ("analyze", ss.analyze(rig))
+        if not quick and not rig.holds:
+            ss.explore(rig, title=path.stem).save(live / f"{path.stem}.html")
+            figure = np.ravel(answer.plot())[0].figure
             figure.savefig(folder / f"{path.stem}.svg")
             mpl.pyplot.close(figure)
             lines += [f'<a href="../live/{path.stem}.html">Open it as a page with sliders</a>', ""]
             lines += [f"![Verdict on {path.stem}]({path.stem}.svg)", ""]
         name = path.relative_to(ROOT).as_posix()
         lines += [f"`{name}`", "", "```toml", path.read_text(encoding="utf-8").rstrip(), "```", ""]
-        lines += [f"`steadyslip analyze {name}` prints", "", "```text", str(ss.analyze(rig)), "```", ""]
+        lines += [f"`steadyslip {command} {name}` prints", "", "```text", str(answer), "```", ""]
         (folder / f"{path.stem}.md").write_text("\n".join(lines), encoding="utf-8")
 
 

@@ -78,8 +78,8 @@ def test_while_a_hand_moves_a_slider_the_nearest_edges_are_those_at_rest(name):
     """Fewer samples then tell of the same edges, to the width of a pixel."""
     there, values = page(name), page(name).home
     moving, resting = there(values, coarse=True)["edges"], there(values)["edges"]
-    assert [one["i"] for one in moving] == [one["i"] for one in resting]
-    assert [one["at"] for one in moving] == pytest.approx([one["at"] for one in resting], rel=1e-4)
+    seen, found = ({one["i"]: one["at"] for one in edges} for edges in (moving, resting))
+    assert seen == pytest.approx(found, rel=1e-4)
 
 
 def test_every_kind_of_edge_has_the_words_of_python():
@@ -95,6 +95,20 @@ def test_every_kind_of_edge_has_the_words_of_python():
         assert there.script(words, beyond=beyond, now=now, behind=there.home[0]) in allowed
     kinds = {one["words"] for one in there(there.home)["edges"]}
     assert {"it locks up", "becomes stable"} <= kinds
+
+
+def test_a_curve_that_has_died_out_has_no_slope():
+    """Its slope is a power up to e^700 times an exponential of zero; a page that clips that is unstable from 548."""
+    law = ss.laws.LuGre(
+        mu_coulomb=0.3, mu_static=0.4, v_stribeck=100.0, bristle_stiffness=0.1, bristle_damping=1e-3, viscous=0.01,
+        stribeck_exponent=2.0,
+    )  # fmt: skip
+    load, drive = ss.laws.ConstantNormalStress(preload=1.0), ss.machine.SteadyDrive(357.0)
+    there = Edges(ss.Slider(friction=law, contact=load, stiffness=1e-3, mass=1e-3, drive=drive))
+    i = there.names.index("friction.stribeck_exponent")
+    for exponent in (500.3, 546.8, 549.3, 551.3):
+        values = [exponent if n == i else one for n, one in enumerate(there.home)]
+        assert there.script("rig.status(i, x)", i=i, x=exponent) == STABLE == judged(there.own(values))[0]
 
 
 def test_thin_parts_of_a_track_are_seen_and_leave_the_own_place():

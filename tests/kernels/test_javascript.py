@@ -73,7 +73,7 @@ def test_arrays_are_parts_of_one_block(runtime):
 
 def test_elementary_functions_end_as_in_the_kernels(runtime):
     assert runtime("[exp(1e4), exp(-1e4), log(0), log(-1), expm1(1e4)]") == [
-        pytest.approx(math.exp(700)), pytest.approx(math.exp(-700)), pytest.approx(-708.3964185322641),
+        pytest.approx(math.exp(700)), 0.0, pytest.approx(-708.3964185322641),
         pytest.approx(math.nan, nan_ok=True), pytest.approx(math.exp(700)),
     ]  # fmt: skip
 

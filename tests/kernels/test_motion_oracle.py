@@ -21,7 +21,7 @@ from steadyslip.motion.observe import observe
 QUICK = SimpleNamespace(
     **vars(primitives)
     | {
-        "exp": lambda x: np.float64(math.exp(min(max(x, -700.0), 700.0))),
+        "exp": lambda x: np.float64(math.exp(min(x, 700.0)) if x >= -700.0 else 0.0),
         "log": lambda x: np.float64(math.log(max(x, 2.2250738585072014e-308)) if x >= 0 else math.nan),
         "sin": lambda x: np.float64(math.sin(x)),
         "cos": lambda x: np.float64(math.cos(x)),

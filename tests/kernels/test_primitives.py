@@ -16,7 +16,7 @@ UNIT = mpmath.mpf(2) ** -52
 LEAST, MOST = mpmath.exp(-700), mpmath.exp(700)
 LANES = 16
 EXACT = {
-    "exp": lambda x: min(max(mpmath.exp(x), LEAST), MOST),
+    "exp": lambda x: min(mpmath.exp(x), MOST) if x >= -700 else mpmath.mpf(0),
     "log": lambda x: mpmath.log(min(max(x, TINY), mpmath.mpf(2) ** 1024)) if x >= 0 else mpmath.nan,
     "expm1": lambda x: mpmath.expm1(min(x, 700)),
     "log1p": lambda x: EXACT["log"](1 + x) if x <= -1 or x > 1e300 else mpmath.log1p(x),
@@ -127,7 +127,8 @@ def _power(x, y):
         return mpmath.mpf(0) if y > 0 else min(mpmath.mpf(TINY) ** y, MOST)
     if x < 0 and y != mpmath.floor(y):
         return mpmath.nan
-    size = min(max(abs(x) ** y, LEAST), MOST)
+    size = abs(x) ** y
+    size = mpmath.mpf(0) if size < LEAST else min(size, MOST)
     return -size if x < 0 and mpmath.floor(y) % 2 else size
 
 
@@ -164,3 +165,9 @@ def test_asinh_exp(languages):
 def test_rough_logarithm(languages):
     x = 10 ** np.random.default_rng(3).uniform(-300, 300, 64)
     assert np.abs(languages(x)["rough_log"] - np.log(x)).max() < 0.03
+
+
+def test_what_an_exponential_outweighs_is_zero(languages):
+    """x e^-x, as the slope of a Stribeck curve has it, up to the largest numbers."""
+    x = np.array([690.0, 720.0, 760.0, 1e10, 1e150, 1e303])
+    assert np.all(x * languages(-x)["exp"] < 1e-296)

@@ -5,7 +5,7 @@ the last place (2^-52 of its value) of the exact function, for every float (meas
 tests/kernels/test_primitives.py). For all of them:
 
 - NaN gives NaN; the sign of zero is lost.
-- The argument of an exponential is clipped to ±700, so that no step meets an infinity.
+- An exponential is e^700 above 700, so that no step meets an infinity, and 0 below -700, so that x e^-x ends at 0.
 - A logarithm treats arguments from 0 to 2.2e-308 as 2.2e-308: it is finite at zero, and v ln v is 0 at rest.
 
 `printers/runtime.js` follows the same rules.
@@ -66,7 +66,7 @@ def sqrt(x: Any) -> Any:
 
 
 def exp(x: Any) -> Any:
-    """e^x to 2.5 units; e^±700 beyond ±700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
+    """e^x to 2.5 units; 0 below -700, e^700 above 700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
 
     Each step of a trajectory waits for it: the chain of dependent operations from x to the result is kept short.
     """
@@ -82,7 +82,7 @@ def exp(x: Any) -> Any:
     high = (1 / 39916800 * r + 1 / 3628800) * r2 + (1 / 362880 * r + 1 / 40320)
     top = (1 / 6227020800 * r + 1 / 479001600) * r4 + high
     value = (top * (r4 * r4) + (middle * r4 + low)) * scale
-    limit = select(x > 0.0, MOST, LEAST)
+    limit = select(x > 0.0, MOST, 0.0)
     return select(abs(x) > 700.0, limit, value)
 
 
@@ -133,7 +133,7 @@ def log1p(x: Any) -> Any:
 def power(x: Any, y: Any) -> Any:
     """x^y to 5 + 2 |y ln|x|| units, y finite; for x < 0 defined if y is an integer below 2^50, else NaN.
 
-    Zero to a positive power is 0; to a negative power, that of 2.2e-308. Results are clipped to e^±700.
+    Zero to a positive power is 0; to a negative power, that of 2.2e-308. Results end as those of `exp`.
     """
     size, shifted = abs(x), y + ROUND
     turned = select(abs((shifted - ROUND) - y) <= 0.0, select((bits(shifted) & 1) > 0, -1.0, 1.0), math.nan)

@@ -7,7 +7,7 @@ const ROUND = 6755399441055744; // 1.5 * 2 ** 52: adding it rounds to an integer
 /** e^x to the last bit as in the kernels, and twice as fast as Math.exp where one waits for another. @param {number} x */
 export function exp(x) {
   if (!(x <= 700)) return x > 700 ? 1.0142320547350045e304 : NaN;
-  if (x < -700) return 9.859676543759770e-305;
+  if (x < -700) return 0;
   const n = x * 1.4426950408889634 + ROUND - ROUND;
   const r = x - n * 0.6931471805598903, r2 = r * r, r4 = r2 * r2;
   const low = (1 / 6 * r + 0.5) * r2 + (1 + r);
@@ -25,7 +25,7 @@ export function rough_log(x) {
   return ((HALVES[1] - 0x3ff00000) * 4294967296 + HALVES[0]) * 1.539095918623324e-16 + 0.02983;
 }
 
-const TINY = 2 ** -1022, LARGE = 2 ** 500, FARTHEST = 2 ** 45; // as in the kernels
+const TINY = 2 ** -1022, LEAST = exp(-700), LARGE = 2 ** 500, FARTHEST = 2 ** 45; // as in the kernels
 
 export const abs = Math.abs, sqrt = Math.sqrt, tanh = Math.tanh, sign = Math.sign;
 
@@ -35,10 +35,10 @@ export const log = (x) => (x >= 0 ? Math.log(Math.min(Math.max(x, TINY), Number.
 /** ln(1 + x), as finite as log. @param {number} x */
 export const log1p = (x) => (x > -1 && x < LARGE ? Math.log1p(x) : log(1 + x));
 
-/** x^y; within e^±700 but for zero to a positive power. @param {number} x @param {number} y */
+/** x^y; ends as exp does. @param {number} x @param {number} y */
 export function power(x, y) {
   if (x === 0 && y > 0) return 0;
-  const size = Math.min(Math.max(Math.max(Math.abs(x), TINY) ** y, exp(-700)), exp(700)); // NaN stays NaN
+  const whole = Math.max(Math.abs(x), TINY) ** y, size = whole < LEAST ? 0 : Math.min(whole, exp(700)); // NaN stays NaN
   return x < 0 ? (Number.isInteger(y) ? (y % 2 ? -size : size) : NaN) : size;
 }
 
@@ -56,7 +56,7 @@ export const asinh = (x) => (Math.abs(x) > LARGE ? Math.sign(x) * (log(Math.abs(
 
 /** asinh(x e^y) without overflow or underflow on the way, as in the kernels. @param {number} x @param {number} y */
 export function asinh_exp(x, y) {
-  const size = Math.abs(x), far = y < -1400, factor = far ? 9.859676543759770e-305 : 1; // e^-700
+  const size = Math.abs(x), far = y < -1400, factor = far ? LEAST : 1;
   const half = exp((far ? y + 1400 : y) / 2), product = size * factor * half * (factor * half);
   const z = product > LARGE ? log(size) + y + Math.LN2 : Math.asinh(product);
   return x >= 0 ? z : -z;

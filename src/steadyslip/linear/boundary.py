@@ -26,6 +26,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_digits, require_range
 
 _TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
+_TIED = 6  # digits in which two distances are equal: an edge a thousandth away has lost three of its twelve
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ def _urgency(margin: Margin) -> float:
         return np.inf
     if not margin.value and margin.unit != "rad":
         return 1e300
-    return float(f"{abs(margin.absolute if margin.unit == 'rad' else margin.relative):.9g}")
+    return float(f"{abs(margin.absolute if margin.unit == 'rad' else margin.relative):.{_TIED}g}")
 
 
 def present_zeros(rig: Rig) -> tuple[str, ...]:

@@ -3,6 +3,7 @@ import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
 import { inside } from "./rig.js";
 
 export const BESIDE = 1e-3; // distance from an edge of the value set by "go there", over the value at the edge
+const TIED = 6; // digits in which two distances are equal, as in steadyslip/linear/boundary.py
 
 /**
  * Nearest edge of every parameter, nearest first: value, status behind it, far or not, and two values close to it:
@@ -11,24 +12,24 @@ export const BESIDE = 1e-3; // distance from an edge of the value set by "go the
  */
 export function edgesOf(page) {
   const { remote } = page.rig.data; // ratio to the own value above which an edge counts as far
-  const found = /** @type {{i: number, at: number, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
+  const found = /** @type {{i: number, at: number, gap: number, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
   page.rig.data.parameters.forEach((one, i) => {
-    const value = page.rig.values[i], { edges, low, high } = page.found[i];
+    const value = page.rig.values[i], { edges, low, high } = page.found[i], size = one.unit === "rad" ? 1 : Math.abs(value);
     let best = null;
     edges.forEach(({ at, below, above }, n) => {
       const away = at > value;
       if (below === UNKNOWN || above === UNKNOWN) return; // no valid rig on one side
       const [here, beyond] = away ? [below, above] : [above, below];
-      const distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
-      if (best !== null && distance >= best.distance && (value || at >= best.at)) return;
+      const gap = Math.abs(at - value);
+      if (best !== null && gap >= best.gap) return;
       const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < remote && times > 1 / remote);
       const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // true if the side to land on is behind the edge
       const room = (up) => (up ? (edges[n + 1]?.at ?? high) : (edges[n - 1]?.at ?? low)) - at;
-      best = { i, at, distance: value ? distance : 1e6, beyond, far, landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)) };
+      best = { i, at, gap, distance: size ? Number((gap / size).toPrecision(TIED)) : Infinity, beyond, far, landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)) };
     });
     if (best) found.push(best);
   });
-  return found.sort((a, b) => a.distance - b.distance);
+  return found.sort((a, b) => a.distance - b.distance || 0);
 }
 
 /** Value close to an edge, on the side given by the sign of `room` (its distance to the next edge), with few digits. */

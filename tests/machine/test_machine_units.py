@@ -41,6 +41,16 @@ def test_with_an_area_totals_stand_beside_stresses():
     assert (row["total_unit"], row["total"]) == ("N", pytest.approx(row["value"] * 25e-4))
 
 
+def test_stresses_of_a_contact_are_printed_as_stresses():
+    """As the file and the page have them: the areas of contacts may differ, and vary."""
+    found = ss.analyze(SHEAR)
+    (line,) = [one for one in str(found).splitlines() if one.strip().startswith("contacts.first.contact.preload")]
+    assert "15 MPa" in line
+    assert "kN" not in line
+    edge = next(one.edge for one in found.margins if one.parameter == "contacts.first.contact.preload")
+    assert "MPa" in str(edge)
+
+
 @pytest.mark.parametrize("machine", [AXIS, SHEAR], ids=["no area", "area"])
 def test_text_is_read_in_the_units_of_its_user(machine):
     name = "contacts.first.contact.preload" if machine is SHEAR else "contacts.guide.contact.preload"

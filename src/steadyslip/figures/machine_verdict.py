@@ -131,7 +131,7 @@ def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> No
     edge = margin.edge
     if edge is None:
         return
-    text = typeset(format_quantity(edge.value, margin.unit, area=found.rig.area_of(margin.parameter)))
+    text = typeset(format_quantity(edge.value, margin.unit, area=found.rig.printed_area(margin.parameter)))
     ratio = edge.value / margin.value
     left = (
         1 / _SPAN_FACTOR**0.75 < ratio < 1 or ratio > _SPAN_FACTOR**0.75

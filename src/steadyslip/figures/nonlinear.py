@@ -52,7 +52,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     >>> axes.figure.savefig("cycle-branch.svg")
     """
     ax = axes_or_new(ax)
-    area, origin, along = branch.rig.area_of(branch.along), 0.0, short_name(branch.along)
+    area, origin, along = branch.rig.printed_area(branch.along), 0.0, short_name(branch.along)
     factor, unit = display_unit(branch.unit, branch.onset.value, area)
     reach = max((abs(one.value - branch.onset.value) for one in branch.cycles), default=0.0)
     if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # all ticks of an axis of values would read alike
@@ -145,7 +145,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     factors, names = [], []
     for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
-        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.area_of(name))
+        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.printed_area(name))
         factors.append(factor)
         names.append(axis_label(short_name(name), shown_unit))
     x, y = curve.first / factors[0], curve.second / factors[1]

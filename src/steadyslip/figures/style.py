@@ -160,7 +160,7 @@ def _footer(result: Any) -> str:
     if isinstance(rig, Rig):
         for name, one in rig.parameters().items():
             if one.value and np.ndim(one.value) == 0:
-                word = format_quantity(float(one.value), one.role.unit, 4, rig.area_of(name))
+                word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
                 values.append(f"{said(rig, name)} {typeset(word)}".replace(" ", "\xa0").replace("-", "−"))
     return f"{', '.join(values)}. ".lstrip(". ") + f"steadyslip\xa0{__version__}, {datetime.now(UTC):%Y-%m-%d}"
 

@@ -99,8 +99,8 @@ class UndampedSearch(Search):
             kind, frequency, contact = *self._meeting(low, high), ""
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         return Boundary(
-            self.name, middle, (low, high), kind, frequency, "neither", self.role.unit, self.rig.area_of(self.name),
-            contact, quiet,
+            self.name, middle, (low, high), kind, frequency, "neither", self.role.unit,
+            self.rig.printed_area(self.name), contact, quiet,
         )  # fmt: skip
 
     def _meeting(self, low: float, high: float) -> tuple[str, float]:

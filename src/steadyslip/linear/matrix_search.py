@@ -222,7 +222,7 @@ class MatrixSearch:
         stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
         bracket = float(np.nextafter(value, -np.inf)), float(np.nextafter(value, np.inf))
         return Boundary(
-            self.name, value, bracket, kind, beta, stable, self.role.unit, self.machine.area_of(self.name), contact
+            self.name, value, bracket, kind, beta, stable, self.role.unit, self.machine.printed_area(self.name), contact
         )
 
 

@@ -334,8 +334,8 @@ class Search:
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         bracket = float(low), float(high)
         return Boundary(
-            self.name, float(middle), bracket, kind, frequency, stable, self.role.unit, self.rig.area_of(self.name),
-            "" if lost is None else lost.contact,
+            self.name, float(middle), bracket, kind, frequency, stable, self.role.unit,
+            self.rig.printed_area(self.name), "" if lost is None else lost.contact,
         )  # fmt: skip
 
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
@@ -389,7 +389,7 @@ class Search:
         stable = "above" if np.any(intervals[:, 0] == k) else "below"
         bracket = (float(np.nextafter(k, 0)), float(np.nextafter(k, np.inf)))
         beta = frequency if kind == "oscillatory" else 0.0
-        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area_of(self.name))
+        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.printed_area(self.name))
 
 
 def natural_size(

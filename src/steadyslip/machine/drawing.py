@@ -233,7 +233,7 @@ class Drawing:
         for full, known in self.machine.parameters().items():
             labelled = known.role.kind in ("normal stress", "stiffness") and known.value is not None
             if labelled and full.startswith(f"contacts.{name}.contact."):
-                return format_quantity(float(known.value or 0.0), known.role.unit, area=self.machine.area_of(full))
+                return format_quantity(float(known.value or 0.0), known.role.unit, area=self.machine.printed_area(full))
         return one.contact.name
 
     # -- links

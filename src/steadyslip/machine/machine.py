@@ -303,6 +303,9 @@ class Machine(Rig):
         area: float | None = self.contacts[rest.partition(".")[0]].area
         return area
 
+    def printed_area(self, name: str) -> float | None:
+        return None
+
     def declared(self) -> dict[str, Address]:
         """Collect the parameters; laws of contacts without an area have units of force."""
         return {name: self._in_forces(one) for name, one in super().declared().items()}

@@ -59,7 +59,11 @@ class Rig(FrozenRecord, Keeper):
         raise NotImplementedError
 
     def area_of(self, name: str) -> float | None:
-        """Area (m²) if users give and get this parameter as a total of the contact, else None."""
+        """Area (m²) if users may give this parameter as a total of the contact, else None."""
+        raise NotImplementedError
+
+    def printed_area(self, name: str) -> float | None:
+        """Area (m²) if this parameter is printed as a total of the contact; None where contacts have own areas."""
         raise NotImplementedError
 
     def parameters(self) -> dict[str, Address]:

@@ -91,6 +91,8 @@ class Slider(Rig, section="slider"):
     def area_of(self, name: str) -> float | None:
         return self.area
 
+    printed_area = area_of
+
     def laws_by_contact(self) -> dict[str, LawsOfContact]:
         return {"": LawsOfContact("", self.friction, self.contact)}
 

@@ -120,7 +120,7 @@ class FrozenVerdicts(ReadOnly):
 
     def _shown(self, name: str) -> tuple[str, float, str]:
         """Label, factor and display unit of a changed parameter; forces where the rig has an area."""
-        factor, unit = outside(self.rig.parameters()[name].role.unit, self.rig.area_of(name))
+        factor, unit = outside(self.rig.parameters()[name].role.unit, self.rig.printed_area(name))
         label = self.labels[name]
         return label.replace("normal stress", "normal force") if unit == "N" else label, factor, unit
 

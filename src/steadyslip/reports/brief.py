@@ -171,7 +171,7 @@ def _record_html(record: FrozenRecord) -> Iterator[str]:
     for path, one in (record.parameters() if isinstance(record, Machine) else parameters(record)).items():
         if one.value is not None:
             values = np.asarray(one.value)
-            area = record.area_of(path) if isinstance(record, Rig) else None
+            area = record.printed_area(path) if isinstance(record, Rig) else None
             words = (
                 format_quantity(float(values), one.role.unit, 6, area)
                 if values.ndim == 0

@@ -118,7 +118,12 @@ def _basin(result: Basin) -> Parts:
 def _sensitivity(result: Sensitivity) -> Parts:
     known = result.rig.parameters()
     ranges = [
-        (name, format_range(low, high, known[name].role.unit, result.rig.area_of(name)), spacing, known[name].role.doc)
+        (
+            name,
+            format_range(low, high, known[name].role.unit, result.rig.printed_area(name)),
+            spacing,
+            known[name].role.doc,
+        )
         for name, (low, high, spacing) in result.ranges.items()
     ]
     body = [
@@ -262,7 +267,7 @@ def _slip_table(result: History) -> Iterator[str]:
 
 @parts_of.register
 def _branch(result: CycleBranch) -> Parts:
-    along, unit, area = result.along, result.unit, result.rig.area_of(result.along)
+    along, unit, area = result.along, result.unit, result.rig.printed_area(result.along)
     stress = "Pa" if isinstance(result.rig, Slider) else "N"
     drop = "stress drop" if isinstance(result.rig, Slider) else "force drop"
     first, _, rest = str(result).partition("\n")

@@ -91,8 +91,8 @@ def input_table(
             (
                 name,
                 known,
-                format_quantity(one.value, one.role.unit, 6, rig.area_of(name)),
-                stress_name(one.role.doc, rig.area_of(name)),
+                format_quantity(one.value, one.role.unit, 6, rig.printed_area(name)),
+                stress_name(one.role.doc, rig.printed_area(name)),
                 *((tolerances.get(name, ""),) if tolerances else ()),
                 *((notes[name] or "rig file" if name in notes else "default",) if notes else ()),
             )

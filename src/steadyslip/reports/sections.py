@@ -89,7 +89,7 @@ def _change(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str]
 
 
 def _value(analysis: Verdict, margin: Margin, value: float) -> str:
-    return format_quantity(value, margin.unit, area=analysis.rig.area_of(margin.parameter))
+    return format_quantity(value, margin.unit, area=analysis.rig.printed_area(margin.parameter))
 
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:

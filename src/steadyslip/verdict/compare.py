@@ -278,7 +278,7 @@ def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
     known = rig.parameters().get(name)
     if known is None or not isinstance(value, float):
         return str(value)
-    words = format_quantity(value, known.role.unit, area=rig.area_of(name))
+    words = format_quantity(value, known.role.unit, area=rig.printed_area(name))
     return f"{name.rpartition('.')[2]} {words}" if named else words
 
 

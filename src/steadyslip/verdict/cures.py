@@ -323,7 +323,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
     """All windows of one parameter."""
     low, high = _limits(chances, name, one)
     values = _scan(chances, name, (low, high))
-    role, area = chances.rig.parameters()[name].role, chances.rig.area_of(name)
+    role, area = chances.rig.parameters()[name].role, chances.rig.printed_area(name)
     if not values.size:
         return Window(name, role.unit, chances.own(name), (), (low, high), math.inf, area)
 

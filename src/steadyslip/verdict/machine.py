@@ -243,7 +243,7 @@ def _nearest(found: MachineAnalysis, margin: Margin) -> str:
     if edge is None:
         return ""
     side = "above" if edge.value > margin.value else "below"
-    value = format_quantity(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
+    value = format_quantity(edge.value, margin.unit, area=found.rig.printed_area(margin.parameter))
     what = PHRASES["stable"] if edge.stable == side else QUIET if edge.quiet == side else beyond(edge)
     return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=what)
 

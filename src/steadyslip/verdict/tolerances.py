@@ -155,7 +155,7 @@ class Tolerated(ReadOnly):
         if self.otherwise:
             known = self.rig.parameters()
             values = (
-                f"{name} {format_quantity(value, known[name].role.unit, area=self.rig.area_of(name))}"
+                f"{name} {format_quantity(value, known[name].role.unit, area=self.rig.printed_area(name))}"
                 for name, value in self.otherwise.items()
             )
             kind = "but not in every one: unstable" if share else "but in another one: stable"
@@ -195,7 +195,7 @@ class Tolerated(ReadOnly):
     @property
     def area(self) -> float | None:
         """Contact area (m²) by which `edge` is multiplied for a total; None where there is none."""
-        return self.rig.area_of(self.along) if self.along else None
+        return self.rig.printed_area(self.along) if self.along else None
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the safety factor or growth rate over each tolerance; see `steadyslip.figures.tolerance_bars`."""
@@ -348,7 +348,9 @@ def _alone(rig: Slider | Machine, name: str, low: float, high: float, along: str
     found = _outcomes(rig, {name: values[possible]}, along)
     whole = bool(found.stable[0]) if np.all(found.stable == found.stable[0]) else None
     safety, growth = _finite_range(found.safety) or nothing, _finite_range(found.growth) or nothing
-    return Alone(name, low, high, rig.parameters()[name].role.unit, safety, growth, whole, share, rig.area_of(name))
+    return Alone(
+        name, low, high, rig.parameters()[name].role.unit, safety, growth, whole, share, rig.printed_area(name)
+    )
 
 
 @dataclass(frozen=True)

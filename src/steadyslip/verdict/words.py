@@ -366,8 +366,8 @@ def _margin_row(analysis: Verdict, margin: Margin, edge: Boundary) -> tuple[str,
         words = beyond(edge)
     return (
         margin.parameter,
-        format_quantity(margin.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
-        format_quantity(edge.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
+        format_quantity(margin.value, margin.unit, area=analysis.rig.printed_area(margin.parameter)),
+        format_quantity(edge.value, margin.unit, area=analysis.rig.printed_area(margin.parameter)),
         change,
         words,
     )

@@ -151,7 +151,7 @@ class Onset(Displayed):
         return MEANINGS[self.kind]
 
     def __str__(self) -> str:
-        edge = format_quantity(self.value, self.unit, 6, self.rig.area_of(self.along))
+        edge = format_quantity(self.value, self.unit, 6, self.rig.printed_area(self.along))
         lines = [f"{self.title} at {self.along} = {edge}", f"  {self.meaning}"]
         where = f" at {self.contact}" if self.contact else ""
         size = f"{self.normalised:.4g}{self._within()} of the frequency per squared amplitude of ln v{where}"

@@ -101,11 +101,11 @@ class HopfCurve(ReadOnly):
         lines = [f"oscillatory edge in {a} and {b}: {len(self.first)} points"]
         for name, unit, column in zip(self.names, self.units, (self.first, self.second), strict=True):
             lines.append(
-                f"  {name}  {format_range(float(column.min()), float(column.max()), unit, self.rig.area_of(name))}"
+                f"  {name}  {format_range(float(column.min()), float(column.max()), unit, self.rig.printed_area(name))}"
             )
         for point in self.special:
             where = ", ".join(
-                f"{n} = {format_quantity(point.values[n], u, 7, self.rig.area_of(n))}"
+                f"{n} = {format_quantity(point.values[n], u, 7, self.rig.printed_area(n))}"
                 for n, u in zip(self.names, self.units, strict=True)
             )
             lines.append(f"  {point.kind} at {where}")

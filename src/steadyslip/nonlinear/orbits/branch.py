@@ -116,7 +116,7 @@ class CycleBranch(Displayed):
     def _area(self, name: str) -> float | None:
         """Area (m²) by which a quantity is multiplied for display as a total; None if it is not."""
         if name == "value" or isinstance(self.rig, Slider):
-            return self.rig.area_of(self.along)
+            return self.rig.printed_area(self.along)
         return None
 
     def at(self, value: float) -> CyclesAt:
@@ -308,7 +308,7 @@ def _stable(branch: CycleBranch) -> str:
     """Describe the parameter ranges in which the cycles are stable."""
     if all(one.stable for one in branch.stretches):
         return "all"
-    area = branch.rig.area_of(branch.along)
+    area = branch.rig.printed_area(branch.along)
     return "; ".join(
         f"{format_quantity(one.range[0], branch.unit, area=area)} to "
         f"{format_quantity(one.range[1], branch.unit, area=area)}"

@@ -60,7 +60,7 @@ class EndRules:
         cycle = now.cycle
         if not low < cycle.value < high:
             end = format_quantity(
-                low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area_of(self.onset.along)
+                low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.printed_area(self.onset.along)
             )
             return f"end of the range, {end}", True
         if cycle.amplitude < SHRUNK and self.slows(now):

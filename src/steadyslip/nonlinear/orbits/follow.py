@@ -211,7 +211,7 @@ def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) 
     if not low < high:
         raise ParameterError([Problem("between", f"got {between!r}; allowed: low < high")])
     if not low <= onset.value <= high:
-        edge = format_quantity(onset.value, onset.unit, 6, rig.area_of(onset.along))
+        edge = format_quantity(onset.value, onset.unit, 6, rig.printed_area(onset.along))
         raise ParameterError([Problem("between", f"got {between!r}; it must contain the edge, {edge}")])
     return low, high
 

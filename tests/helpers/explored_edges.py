@@ -1,17 +1,41 @@
-"""Edges of a page beside Python's: the modules of a page in V8, without a document."""
+"""Verdict, sentences and edges of pages beside Python's: the modules of a page in V8, without a document.
 
+    python tests/helpers/explored_edges.py 100 1              # 100 settings, seed 1, in V8
+    python tests/helpers/explored_edges.py 20 1 --browser     # and every listed edge pressed in Chromium
+
+Settings are those of the pages of all examples, of sliders with any laws (users' too) and of random machines; each is
+read at values drawn at random and where listed edges were pressed. Printed is every difference, and how many settings,
+edges and refusals there were.
+"""
+
+import argparse
 import json
+import re
+import time
+import warnings
+from functools import cache
 from importlib.resources import files
+from itertools import product
+from pathlib import Path
+
+import numpy as np
 
 import steadyslip as ss
+import users_laws
 from javascript import Script
+from machines import at_random
+from rigs_of_theory import CONTACTS, LAWS, V0, rig
+from steadyslip.core.format import typeset
 from steadyslip.explorer.assembly import MODULES, _data
 from steadyslip.explorer.equations import linear_part
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
-from steadyslip.linear.status import STABLE, UNSTABLE, on_edge, status
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
+from steadyslip.verdict.causes import why_always_stable, why_never_stable
+from steadyslip.verdict.words import edge_rows, headline, is_undecided
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 NEAR = 0.3  # share of a value within which no edge may be missing or invented
 SHARE = 1e-6  # of a value: the same edge
 
@@ -21,8 +45,15 @@ function edgesAt(values, coarse) {
   rig.values = values;
   const found = data.parameters.map((_, i) => changes(rig, i, undefined, coarse));
   const page = { rig, found, answer: rig.assess(), rounded: Page.prototype.rounded, with: Page.prototype.with };
-  const edges = edgesOf(page).map((edge) => ({ ...edge, words: beyondWords(edge, page) }));
-  return { found, edges, status: page.answer.status };
+  const texts = ({ i, at }) => [values[i], at].map((x) => told(data.parameters[i], x));
+  const edges = edgesOf(page).map((edge) => ({ ...edge, words: beyondWords(edge, page), told: texts(edge) }));
+  const { answer } = page, banner = { data, page }, { told: full, speed } = Banner.prototype;
+  const first = answer.status === UNKNOWN ? "" : headline(answer, speed.call(banner, answer), data);
+  const why = data.phrases ? full.call(banner, answer, edges[0]) : reason(answer, data);
+  return {
+    found, edges, status: answer.status, onEdge: answer.onEdge, headline: first, reason: why,
+    growth: answer.illPosed ? Infinity : answer.eigenvalues[0]?.re ?? null,
+  };
 }
 """
 
@@ -69,24 +100,74 @@ def judged(rig):
     return found, found in (STABLE, UNSTABLE) and bool(on_edge(point))
 
 
+def in_python(found, is_machine):
+    """First line and reason of an analysis as a page writes them: without causes, which a page does not look for."""
+    why = found.reason
+    if is_machine:
+        pass
+    elif found.stable is not None:
+        why = why.removesuffix(why_always_stable(found) or ":").removesuffix(why_never_stable(found) or ":")
+    else:  # the hint of a contact in its own terms
+        why = why.partition(";")[0]
+    return [written(text) for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")]
+
+
+def written(text):
+    """Text with the typography of pages, but for signs."""
+    return re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", typeset(text).replace("−", "-"))
+
+
 def other_edges(page, values):
     """Differences of the page from Python at some values, in words, and its list of nearest edges."""
     own, told, wrong = page.own(values), page(values), []
-    now, rounding = judged(own)
-    for name, value, found in zip(page.names, values, told["found"], strict=True):
-        here = next((one["above"] for one in found["edges"][::-1] if one["at"] < value), found["status"])
-        if here != now and not rounding:
+    found = ss.analyze(own)
+    if is_undecided(found):
+        return wrong, told["edges"]
+    now = ABSENT if found.stable is None else STABLE if found.stable else UNSTABLE
+    if (now, found.on_edge) != (told["status"], told["onEdge"]):
+        wrong.append(f"status {told['status']}, on edge {told['onEdge']} for {now}, {found.on_edge}")
+    growth = found.growth_rate
+    if growth is not None and now != ABSENT and not found.on_edge:
+        mine = told["growth"]
+        if mine is None or not np.isclose(mine, growth, rtol=SHARE, atol=0):
+            wrong.append(f"growth {mine} for {growth}")
+    for name, value, along in zip(page.names, values, told["found"], strict=True):
+        here = next((one["above"] for one in along["edges"][::-1] if one["at"] < value), along["status"])
+        if here != now and not found.on_edge:
             wrong.append(f"the track of {name} has {here} at its own value for {now}")
-    listed = {page.names[one["i"]]: one["at"] for one in told["edges"]}
-    for margin in ss.margins(own):
-        if margin.parameter in page.names:
-            theirs, mine = margin.edge and margin.edge.value, listed.get(margin.parameter)
-            size = max(abs(margin.value), 0.1) if margin.unit == "rad" else abs(margin.value)
-            near = [one for one in (theirs, mine) if one is not None and abs(one - margin.value) <= NEAR * size]
-            if near and (theirs is None or mine is None or abs(theirs - mine) > SHARE * size):
-                wrong.append(f"{margin.parameter} = {margin.value!r}: {mine} for {theirs}")
-    wrong += [f"no words: {one}" for one in told["edges"] if not one["words"] or "undefined" in one["words"]]
+    wrong += other_lists(page, found, told["edges"])
+    is_machine = isinstance(own, ss.Machine)
+    sentences = list(zip((told["headline"], told["reason"]), in_python(found, is_machine), strict=True))
+    wrong += [f"{mine!r} for {theirs!r}" for mine, theirs in sentences[is_machine:] if written(mine) != theirs]
     return wrong, told["edges"]
+
+
+def other_lists(page, found, edges):
+    """Differences of the list of nearest edges from that of an analysis: places, words, values and order."""
+    listed, wrong = {page.names[one["i"]]: one for one in edges}, []
+    rows, _ = edge_rows(found)
+    rows = {row[0]: row for row in rows}
+    order = []
+    for margin in found.margins:
+        if margin.parameter not in page.names:
+            continue
+        theirs, mine = margin.edge and margin.edge.value, listed.get(margin.parameter)
+        size = max(abs(margin.value), 0.1) if margin.unit == "rad" else abs(margin.value)
+        places = [one for one in (theirs, mine and mine["at"]) if one is not None]
+        if not any(abs(one - margin.value) <= NEAR * size for one in places):
+            continue
+        if len(places) < 2 or abs(places[0] - places[1]) > SHARE * size:
+            wrong.append(f"{margin.parameter} = {margin.value!r}: {mine and mine['at']} for {theirs}")
+            continue
+        order.append(margin.parameter)
+        _, value, edge, _, words = map(written, rows[margin.parameter])
+        texts = [*mine["told"], mine["words"]]
+        if [written(one) for one in texts] != [value, edge, words]:
+            wrong.append(f"{margin.parameter}: {texts} for {[value, edge, words]}")
+    mine = [page.names[one["i"]] for one in edges if page.names[one["i"]] in order]
+    if mine != order:
+        wrong.append(f"the order {mine} for {order}")
+    return wrong + [f"no words: {one}" for one in edges if not one["words"] or "undefined" in one["words"]]
 
 
 def walked(page, chance, presses):
@@ -99,5 +180,62 @@ def walked(page, chance, presses):
         edge = edges[int(chance.integers(len(edges)))]
         values = [edge["landing"] if i == edge["i"] else one for i, one in enumerate(values)]
         found, edges = other_edges(page, values)
-        wrong += [f"after {page.names[edge['i']]} -> {edge['at']}: {one}" for one in found]
+        wrong += [f"after {page.names[edge['i']]} -> {edge['at']!r}: {one}" for one in found]
     return wrong
+
+
+PAGES = sorted(path for path in EXAMPLES.glob("*.toml") if path.stem != "hunting-axis")
+PAGES += sorted(EXAMPLES.glob("machines/*.toml"))
+SLIDERS = list(product(LAWS.values(), (*CONTACTS, users_laws.CONTACT), (0.0, 1e6)))
+DRIVES = ss.machine.SteadyDrive(V0), ss.machine.PD(V0, kp=2e10, kd=1e9), ss.machine.PID(V0, kp=2e10, kd=1e9, ki=1e9)
+
+
+@cache
+def example(path):
+    return Edges(ss.read_rig(path))
+
+
+def drawn(chance):
+    """Page of an example, of a slider of any laws or of a random machine, with a name for it."""
+    which = chance.integers(3)
+    if which == 0:
+        path = PAGES[int(chance.integers(len(PAGES)))]
+        return path.stem, example(path)
+    if which == 1:
+        law, contact, mass = SLIDERS[n := int(chance.integers(len(SLIDERS)))]
+        area = 0.01 if chance.random() < 0.3 else None
+        drive = DRIVES[m := int(chance.integers(len(DRIVES)))]
+        made = rig(friction=law, contact=contact, mass=mass, stiffness=9e9, area=area, drive=drive)
+        return f"slider {n}, drive {m}, area {area}", Edges(made)
+    seed = int(chance.integers(10**6))
+    return f"machine {seed}", Edges(at_random(seed)[0])
+
+
+def campaign(many, seed, presses):
+    """Print every difference; how many settings were read, and how many pages are refused in words."""
+    chance = np.random.default_rng(seed)
+    counts = dict.fromkeys(("settings", "other", "refused"), 0)
+    for _ in range(many):
+        name = ""
+        try:
+            name, page = drawn(chance)
+            wrong = walked(page, chance, presses)
+        except ss.NotAvailable as refused:
+            counts["refused"] += 1
+            print(f"{name}: refused, {str(refused)[:150]}", flush=True)
+            continue
+        counts["settings"] += 1
+        counts["other"] += bool(wrong)
+        for one in wrong:
+            print(f"{name}: {one}", flush=True)
+    print(counts, f"{time.process_time():.0f} CPU s")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("many", type=int)
+    parser.add_argument("seed", type=int)
+    parser.add_argument("--presses", type=int, default=1, help="listed edges pressed one after the other")
+    given = parser.parse_args()
+    warnings.simplefilter("error")
+    campaign(given.many, given.seed, given.presses)

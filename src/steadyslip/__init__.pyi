@@ -28,6 +28,7 @@ from .core.errors import (
     QuantityError as QuantityError,
     RigFileError as RigFileError,
     SteadyslipError as SteadyslipError,
+    UndecidedWarning as UndecidedWarning,
     UnknownNameError as UnknownNameError,
 )
 from .experiments import (

@@ -140,6 +140,10 @@ class IllPosedWarning(UserWarning):
     """Some rigs are ill-posed: infinitely many eigenvalues have positive real part, so there is no rightmost one."""
 
 
+class UndecidedWarning(UserWarning):
+    """In a part of the range that was asked for, edges of stability are not known."""
+
+
 class NotKeptWarning(UserWarning):
     """The kernel cache cannot be written, so every process compiles its kernels again."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import checked_array
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem, UndecidedWarning
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
@@ -17,7 +19,7 @@ from steadyslip.linear.allowance import at_most
 from steadyslip.linear.coupling import search_for
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
-from steadyslip.linear.search import Boundary
+from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -25,6 +27,7 @@ from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_digits, require_range
 
+_TOO_MANY = "roots under the delays are too many there to be counted; shorten the delays"
 _TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
 _TIED = 6  # digits in which two distances are equal: an edge a thousandth away has lost three of its twelve
 
@@ -81,7 +84,8 @@ def boundary(
     Returns
     -------
     tuple of Boundary
-        By rising value; empty if stability does not change in the range.
+        By rising value; empty if stability does not change in the range. An `UndecidedWarning` tells where that is not
+        known: roots under long delays may be too many to be counted.
 
     Raises
     ------
@@ -106,7 +110,25 @@ def boundary(
     _require_answers(rig, branch)
     if limits is not None:
         operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
-    return search_for(rig, full, _kept(rig, full), branch).boundaries(limits)
+    search = search_for(rig, full, _kept(rig, full), branch)
+    found = search.boundaries(limits)
+    if unknown := _unknown(rig, search, *(limits or search.searched)):
+        warnings.warn(f"edges of {unknown} are not decided: {_TOO_MANY}", UndecidedWarning, stacklevel=3)
+    return found
+
+
+def _unknown(rig: Rig, search: Search | MatrixSearch, low: float, high: float) -> str:
+    """Name of a parameter and where between `low` and `high` its edges are not known; empty if they are."""
+    if search.hides:
+        return f"{search.name} near some values"
+    first, last = search.decided
+    sides = [(first > low, "below", first), (last < high, "above", last)]
+    parts = [
+        f"{side} {format_quantity(end, search.role.unit, area=rig.area_of(search.name))}"
+        for cut, side, end in sides
+        if cut
+    ]
+    return f"{search.name} {' and '.join(parts)}" if parts else ""
 
 
 def _require_answers(rig: Rig, branch: int) -> None:
@@ -143,7 +165,11 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
 
 
 def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], tuple[str, ...]]:
-    """What `margins` gives, and the names of the parameters whose edges took too long to find."""
+    """What `margins` gives, and the names of the parameters whose edges took too long to find.
+
+    Of a parameter whose edges are known in a part of the range only, the margin tells that part as `searched`; it is
+    among those missing, with the part in words, if its nearest edge may lie beyond.
+    """
     if by_matrices(rig):
         require_matrices(rig)
     else:
@@ -156,7 +182,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
         and address.value is not None
         and (address.value != 0 or not address.role.structural or name in present)
     ]
-    found, share, left = [], 0, _TERMS
+    found, cut, share, left = [], [], 0, _TERMS
     while asked and left // len(asked) > share:  # those that took too long again, with what the others did not need
         missing, share = [], left // len(asked)
         for name, address in asked:
@@ -166,10 +192,16 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
             left -= share - allowance.left
             if allowance.spent or search.hides:
                 missing.append((name, address))
+                continue
+            (low, high), (first, last) = search.searched, search.decided
+            own = _margin(name, address.role.unit, search.value, edges, (max(low, first), min(high, last)))
+            cuts = [abs(end - search.value) for end in (first, last) if low < end < high]
+            if min(cuts, default=np.inf) < (np.inf if own.edge is None else abs(own.absolute)):
+                cut.append(_unknown(rig, search, low, high))
             else:
-                found.append(_margin(name, address.role.unit, search.value, edges, search.searched))
+                found.append(own)
         asked = missing
-    return tuple(sorted(found, key=_urgency)), tuple(name for name, _ in asked)
+    return tuple(sorted(found, key=_urgency)), (*(name for name, _ in asked), *cut)
 
 
 def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Margin, ...]:

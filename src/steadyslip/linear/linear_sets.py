@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import sympy as sp
 
@@ -41,10 +43,11 @@ def most_values(point: OperatingPoint) -> int:
     return _WINDOWS if point.model.delays else most_intervals(characteristic(point).shape[-1] - 1)
 
 
-def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Array:
+def sets_of(point: OperatingPoint, name: str, size: Array | None = None, *, edges: bool = False) -> Array:
     """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), NaN padded.
 
-    `size` (...) are positive values to search around for rigs with delay; by default the rigs' own values.
+    `size` (...) are positive values to search around for rigs with delay; by default the rigs' own values. With `edges`
+    ends that are none, but ends of what is known under a delay, are NaN.
 
     Raises
     ------
@@ -68,6 +71,8 @@ def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Arra
             raise not_linear_error(name) if size is None else too_many_windows_error(name)
         count = min(len(own.intervals), most)
         flat[i, :count] = own.intervals[:count]
+        if edges:
+            flat[i][np.isin(flat[i], [one for one in own.searched if 0 < one < np.inf])] = np.nan
     return found
 
 
@@ -144,10 +149,11 @@ def linear_set(
         )
     else:
         windows = _with_far_edges_removed(stable_set(p[0], q[0], spare_powers(point)))
-    return (
-        None
-        if windows is None
-        else StableSet(windows.intervals * value, windows.edges * value, windows.frequencies, windows.changes)
+    if windows is None:
+        return None
+    low, high = windows.searched
+    return replace(
+        windows, intervals=windows.intervals * value, edges=windows.edges * value, searched=(low * value, high * value)
     )
 
 

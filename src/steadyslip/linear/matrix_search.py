@@ -43,6 +43,7 @@ class MatrixSearch:
         self.known: dict[float, tuple[int, StatePencil | None]] = {}
 
     hides = False
+    decided = -np.inf, np.inf
     """As of `Search`: no edge lies where roots cannot be counted."""
 
     @cached_property

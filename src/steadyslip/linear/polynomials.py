@@ -114,12 +114,15 @@ class StableSet:
         Angular frequency (1/s) at each edge: 0 divergence, inf ill-posed.
     changes : ndarray (..., e) of bool
         Whether stability changes at the edge.
+    searched : tuple of float
+        Values of k between which the set is known; narrower under delays whose windows are too many.
     """
 
     intervals: Array
     edges: Array
     frequencies: Array
     changes: NDArray[np.bool_]
+    searched: tuple[float, float] = (0.0, np.inf)
 
 
 @quietly
@@ -197,6 +200,16 @@ def even_odd(c: Array) -> tuple[Array, Array]:
 def product(a: Array, b: Array) -> Array:
     """Coefficients of products of polynomials."""
     return np.stack(crossing.product(columns(a), columns(b)), axis=-1)
+
+
+def squared_size(c: Array) -> Array:
+    """Coefficients of |c(iω)|² in powers of ω², for polynomials c (..., n+1)."""
+    even, odd = even_odd(c)
+    found = np.zeros_like(c)
+    for part, first in ((product(even, even), 0), (product(odd, odd), 1)):
+        width = min(part.shape[-1], c.shape[-1] - first)
+        found[..., first : first + width] += part[..., :width]
+    return found
 
 
 @quietly

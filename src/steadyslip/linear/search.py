@@ -126,6 +126,7 @@ class Search:
         self.own = operating_point(rig, None, self.present, branch)
         self.share = _SCARCE if len(self.own.model.delays) > 1 else 1
         self.hides = False  # whether an edge lies, or may lie near, where roots under delays cannot be counted
+        self.decided = -np.inf, np.inf  # values beyond which windows under delays are too many to be searched
 
     def values(self, x: float | Array) -> OperatingPoint:
         return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
@@ -199,6 +200,7 @@ class Search:
             low, high = self.searched if between is None else between
             exact = self._exact(between)
             if exact is not None:
+                self.decided = exact.searched
                 return self._of_set(exact, low, high)
             return tuple(one for one in self._found(between) if low <= one.value <= high)
 

@@ -50,7 +50,7 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     -----
     With a delay, roots are counted, no rational function stands for it. All delays are found; of other parameters of a
     rig with delay, which may have windows without end, those up to a factor of a million from its own value in which no
-    oscillation turns more than a hundred times during the delay; the last interval ends there.
+    oscillation turns more than a hundred times during the delay; the last interval ends there. `boundary` says so.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def edge_along(rig: Slider | Machine, name: str, vary: Vary | None) -> tuple[Arr
     own = np.broadcast_to(np.asarray(point.named()[name], dtype=float), point.shape)
     if is_own_stiffness(rig, name):
         return np.asarray(critical_stiffness(rig, vary)), own
-    return nearest_value(stable_intervals(point, name), own), own
+    return nearest_value(in_chunks(point, lambda part: sets_of(part, name, edges=True)), own), own
 
 
 def intervals_along(rig: Slider | Machine, name: str, vary: Vary | None) -> Array:

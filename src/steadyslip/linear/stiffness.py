@@ -56,8 +56,9 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     Returns
     -------
     float, ndarray or xarray.DataArray
-        Pa/m along the sliding direction; NaN where stability has no edge at a positive stiffness, where steady
-        sliding does not exist, and where numbers leave the range of floating point; `stability` tells which.
+        Pa/m along the sliding direction; NaN where stability has no edge at a positive stiffness, or under a delay
+        none that is known, where steady sliding does not exist, and where numbers leave the range of floating point;
+        `stability` tells which.
 
     Raises
     ------
@@ -217,11 +218,15 @@ def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
     return stacked(both[:half], point), stacked(both[half:], point)
 
 
-def general_set(point: OperatingPoint) -> StableSet:
-    """Stable set in stiffness from the characteristic equation of any Model; with a delay intervals only, no edges."""
+def general_set(point: OperatingPoint, *, edges: bool = False) -> StableSet:
+    """Stable set in stiffness from the characteristic equation of any Model; with a delay intervals only.
+
+    With `edges` ends of these that are no edges are NaN, as in `sets_of`.
+    """
     if point.model.delays:
         nothing = np.empty(0)
-        return StableSet(sets_of(point, STIFFNESS, _size(point)), nothing, nothing, nothing.astype(bool))
+        intervals = sets_of(point, STIFFNESS, _size(point), edges=edges)
+        return StableSet(intervals, nothing, nothing, nothing.astype(bool))
     return stable_set(*stiffness_polynomials(point), spare_powers(point))
 
 
@@ -344,19 +349,19 @@ def set_of_one(point: OperatingPoint) -> StableSet:
 # --- intervals to answers, chunk by chunk -----------------------------------------------------------
 
 
-def interval_ends(point: OperatingPoint) -> tuple[Array, Array]:
-    """Lower and upper ends of the stable intervals, (..., m)."""
+def interval_ends(point: OperatingPoint, *, edges: bool = False) -> tuple[Array, Array]:
+    """Lower and upper ends of the stable intervals, (..., m); with `edges` NaN where they are none, as in `sets_of`."""
     if has_closed_form(point.model):
         low, high = closed_form_interval(point)
         return np.asarray(low)[..., None], np.asarray(high)[..., None]
-    intervals = general_set(point).intervals
+    intervals = general_set(point, edges=edges).intervals
     return intervals[..., 0], intervals[..., 1]
 
 
 def _nearest_edge(point: OperatingPoint) -> Array:
     """Finite positive end of a stable interval (Pa/m) nearest to the rig's own stiffness, (...); NaN without one."""
     own = point.named()["slider.stiffness"]
-    low, high = interval_ends(point)
+    low, high = interval_ends(point, edges=True)
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # shortcut for the common case, for speed

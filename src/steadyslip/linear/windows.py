@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.crossing import is_ill_posed
-from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish, corners
-from steadyslip.linear.polynomials import StableSet, columns
+from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish, corners, highest, leads
+from steadyslip.linear.polynomials import StableSet, columns, squared_size
 from steadyslip.linear.quasipolynomial import (
     count_right_if_feasible,
     crossing_delays,
@@ -31,6 +31,12 @@ from steadyslip.linear.waves import difference_of_squares, im_of_product
 # Limits of the search, chosen by trial: computing time against how many windows are found.
 _TURNS = 100  # periods of an oscillation during the longest delay beyond which windows are not searched
 _STEPS = 8  # values of θ per decade at which the fastest possible oscillation is estimated
+_FEW = 8  # largest number of growing roots at which a window may be near (as in `search`)
+_TOWARDS = 10.0 ** -np.arange(1, 9)  # distances from an edge, relative to it, at which the equations become ill-posed
+_CLOSE = 1e-3  # the same up to which roots near it must be counted, for it to be the next edge
+_HALVINGS = 50  # of a bracket of an eighth of a decade, down to rounding
+_SPARE = 1e-3  # share of what the term without delay has ahead, by which weights of terms that lack it exceed nothing
+_ON_AXIS = 1e-3  # relative error of a root of a polynomial that counts as real: that of a double one is some 1e-8
 _MANY = 20_000  # such periods of the rig itself beyond which the search is refused
 _ROUNDING, _CORNER = 1e-12, 1e-8  # relative distance of values of θ that rounding may make; at infinite s by products
 _PLAIN = 1e-6  # share of ds/dθ across the axis below which a root may run along it, so that roots are counted anew
@@ -93,33 +99,86 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: 
     """Stable set of θ in P + θ Q between `low` and `high`; the rig's own value is θ = 1.
 
     P and Q are (m, n+1), with delays h (m,), whose terms `sets` (m, d) tells; the `spare` highest powers may be
-    missing. The range is cut where there may be windows without end, at the same places whatever the range. An interval
-    that begins at an uncut `low` is given as from zero, one that ends at an uncut `high` as to infinity. None where the
-    delay is so long for the rig itself that its windows are too many.
+    missing. The set is known within `searched`, which ends where there may be windows without end, at the same places
+    whatever the range. An interval that begins at an uncut `low` is given as from zero, one that ends at an uncut
+    `high` as to infinity. None where the delay is so long for the rig itself that its windows are too many.
     """
-    scale = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
-    low, high = float(scale[0]), float(scale[-1])
-    bound = _frequency_bound(p, q, sets, scale)
+    theta = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
+    low, high = float(theta[0]), float(theta[-1])
+    edges = _edges_of_ill_posed(p, q, sets, spare, theta)
+    beside = edges[:, None] * np.concatenate([1 - _TOWARDS, 1 + _TOWARDS])
+    theta = np.unique(np.append(theta, beside[(beside > low) & (beside < high)]))
+    lost = _ill_posed(p, q, sets, spare, theta)
+    bound = np.where(lost, 0.0, _frequency_bound(p, q, sets, theta))
     turn = 2 * np.pi / max(float(np.max(h)), 1e-300)
-    own = float(np.interp(0.0, np.log(scale), bound))
+    own = float(np.interp(0.0, np.log(theta), bound))
     most = turn * max(_TURNS, 2 * own / turn)
     if not most < turn * _MANY:
         return None
-    above, below = np.flatnonzero((bound > most) & (scale > 1)), np.flatnonzero((bound > most) & (scale < 1))
-    end = high if not above.size else float(scale[above[0] - 1])
-    start = low if not below.size else float(scale[below[-1] + 1])
-    found = _windows(p, q, h, start, end, min(most, float(np.max(bound))), sets, spare)
+    start, end = _known(p, q, h, sets, theta, bound <= most, edges)
+    found = _windows(p, q, h, start, end, float(np.max(bound[bound <= most])), sets, spare, edges)
     if found is None:
         return None
-    cut = [0.0 if start == low else start, np.inf if end == high else end]
+    cut = (0.0 if start == low else start, np.inf if end == high else end)
     intervals = np.where(found.intervals == 0, cut[0], np.where(np.isinf(found.intervals), cut[1], found.intervals))
-    return StableSet(intervals, found.edges, found.frequencies, found.changes)
+    return StableSet(intervals, found.edges, found.frequencies, found.changes, cut)
+
+
+def _ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array) -> NDArray[np.bool_]:
+    """True for each θ (n,) at which the equations are ill-posed."""
+    c = p + theta[:, None, None] * q
+    return np.asarray(can_vanish(c, sets) | is_ill_posed(columns(c[:, 0]), spare))
+
+
+def _edges_of_ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array) -> Array:
+    """Values between those of `theta` at which the equations become ill-posed; corners of P to the last digit."""
+    top = int(np.flatnonzero(np.any((p != 0) | (q != 0), axis=0))[-1])
+    tops = -(p[:, top] @ corners(sets)) / (q[:, top] @ corners(sets))
+    tops = np.unique(tops[(tops > theta[0]) & (tops < theta[-1])])
+    sides = _ill_posed(p, q, sets, spare, np.append(tops * (1 - _CORNER), tops * (1 + _CORNER))).reshape(2, -1)
+    tops = tops[sides[0] != sides[1]]
+    lost = _ill_posed(p, q, sets, spare, theta)
+    at = np.flatnonzero(lost[1:] != lost[:-1])
+    at = at[np.searchsorted(tops, theta[at]) == np.searchsorted(tops, theta[at + 1])]  # without a corner between
+    left, right = theta[at], theta[at + 1]
+    for _ in range(_HALVINGS if at.size else 0):
+        middle = 0.5 * (left + right)
+        before = _ill_posed(p, q, sets, spare, middle) == lost[at]
+        left, right = np.where(before, middle, left), np.where(before, right, middle)
+    return np.sort(np.append(tops, 0.5 * (left + right)))
+
+
+def _known(
+    p: Array, q: Array, h: Array, sets: Sets, theta: Array, known: NDArray[np.bool_], edges: Array
+) -> tuple[float, float]:
+    """Lowest and highest θ, around 1, up to which windows are known.
+
+    They are at samples `known`, whose oscillations are slow enough to be followed. At others roots are counted: many of
+    them grow, so that nothing near is stable; or an edge at which the equations become ill-posed is so close, with as
+    many roots as at the sample before, that it is the next.
+    """
+    ends = []
+    for order in (np.arange(len(theta))[theta >= 1], np.arange(len(theta))[theta <= 1][::-1]):
+        last, place = float(theta[order[0]]), int(order[0])
+        for at in order:
+            if not known[at]:
+                count = int(count_right_if_feasible(p + theta[at] * q, h, sets))
+                near = np.min(np.abs(edges / theta[at] - 1), initial=np.inf)
+                if count == UNKNOWN and near > _CLOSE:
+                    break
+                if UNKNOWN < count <= _FEW:
+                    before = int(count_right_if_feasible(p + theta[place] * q, h, sets))
+                    if near > 2 * _TOWARDS[0] or (count == 0) != (before == 0):
+                        break
+            last, place = float(theta[at]), int(at)
+        ends.append(last)
+    return ends[1], ends[0]
 
 
 def _windows(
-    p: Array, q: Array, h: Array, low: float, high: float, fast: float, sets: Sets, spare: int
+    p: Array, q: Array, h: Array, low: float, high: float, fast: float, sets: Sets, spare: int, ill_posed: Array
 ) -> StableSet | None:
-    candidates = _candidates(p, q, h, low, high, fast, sets)
+    candidates = _candidates(p, q, h, low, high, fast, ill_posed)
     if candidates is None:
         return None
     theta, beta = candidates
@@ -165,26 +224,45 @@ def _count_by_crossings(
 
 
 def _frequency_bound(p: Array, q: Array, sets: Sets, theta: Array) -> Array:
-    """Upper bound of frequencies of roots on the axis, for each θ; where there is no bound, the largest."""
-    bound = bound_on_axis(p + theta[:, None, None] * q, sets)
-    return np.asarray(np.where(np.isfinite(bound), bound, np.nanmax(bound) if np.any(np.isfinite(bound)) else 1.0))
+    """Upper bound of frequencies of roots on the axis, for each θ; inf where there is none."""
+    c = p + theta[:, None, None] * q
+    bound = bound_on_axis(c, sets)
+    where = leads(c) & np.isfinite(bound)
+    bound[where] = np.minimum(bound[where], _last_crossing(c[where]))
+    return np.asarray(np.where(np.isfinite(bound), bound, np.inf))
+
+
+def _last_crossing(c: Array) -> Array:
+    """Frequency (rows,) beyond which at iω the term without delay is larger than all others, for c (rows, m, n+1).
+
+    Of its highest power it must be (`leads`). By Cauchy and Schwarz (Σ|p_j|)² <= Σ w_j Σ|p_j|²/w_j, exact for two terms
+    and, with the highest coefficients as w_j, nearly so at high frequency.
+    """
+    sizes = np.abs(highest(c)[0])
+    weights = sizes[:, 1:] + _SPARE * (sizes[:, :1] - np.sum(sizes[:, 1:], axis=-1, keepdims=True))
+    factor = np.sum(weights, axis=-1, keepdims=True) / weights
+    squares = squared_size(c[:, 0]) - np.sum(factor[..., None] * squared_size(c[:, 1:]), axis=1)
+    w = roots(squares)
+    highest_root = np.max(np.where((np.abs(w.imag) <= _ON_AXIS * np.abs(w)) & (w.real > 0), w.real, 0.0), axis=-1)
+    return np.asarray((1 + _ON_AXIS) * np.sqrt(highest_root))
 
 
 def _candidates(
-    p: Array, q: Array, h: Array, low: float, high: float, fast: float, sets: Sets
+    p: Array, q: Array, h: Array, low: float, high: float, fast: float, ill_posed: Array
 ) -> tuple[Array, Array] | None:
-    """Values of θ at which a root may be on the axis, rising, and its frequency: 0 at s = 0, inf at infinite s."""
-    zeros = im_of_product(p, q, h).zeros(fast)
+    """Values of θ at which a root may be on the axis, rising, and its frequency: 0 at s = 0, inf at infinite s.
+
+    The last are those at which the equations become `ill_posed`.
+    """
+    zeros = im_of_product(p, q, h).zeros(fast) if fast else (np.empty(0),)
     if zeros is None:
         return None
     beta = zeros[0]
     above, below = value(p, h, 1j * beta), value(q, h, 1j * beta)
     theta = -(above * np.conj(below)).real / np.abs(below) ** 2
     static = -np.sum(p[:, 0]) / np.sum(q[:, 0])
-    top = int(np.flatnonzero(np.any((p != 0) | (q != 0), axis=0))[-1])
-    tops = -(p[:, top] @ corners(sets)) / (q[:, top] @ corners(sets))
-    theta = np.concatenate([theta, [static], tops])
-    beta = np.concatenate([beta, [0.0], np.full(len(tops), np.inf)])
+    theta = np.concatenate([theta, [static], ill_posed])
+    beta = np.concatenate([beta, [0.0], np.full(len(ill_posed), np.inf)])
     inside = np.isfinite(theta) & (theta > low) & (theta < high)
     theta, beta = theta[inside], beta[inside]
     order = np.argsort(theta, kind="stable")

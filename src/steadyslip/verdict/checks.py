@@ -217,7 +217,7 @@ def edge_checks(
     edges = [(margin, edge) for margin in margins for edge in margin.edges]
     checks = []
     if missing:
-        how = "counts of roots under delays, which would take too long; steadyslip boundary looks for one at a time"
+        how = "too many roots under delays to be counted in time; steadyslip.boundary(rig, name) looks for one alone"
         checks.append(Check(f"edges of {', '.join(missing)}", how, np.inf, 0.0, False))
     if not edges:
         return tuple(margins), tuple(checks)

@@ -1,0 +1,201 @@
+"""Random machines with bodies without mass on which a controller acts late, and the count of their growing roots by an
+equation typed here: the matrix of a chain of bodies, in s and z = exp(−s delay), and how its determinant winds.
+
+``python tests/helpers/late_light_machines.py COUNT SEED`` compares status and edges of many with that count.
+"""
+
+import sys
+
+import numpy as np
+
+import steadyslip as ss
+from steadyslip.core.errors import SteadyslipError
+
+INFINITE = -1  # count where infinitely many roots grow
+NAMES = ("drive.kp", "drive.kd", "drive.ki", "drive.delay", "links.l0.stiffness", "links.l0.damping",
+         "links.l1.damping", "bodies.b0.mass")  # fmt: skip
+
+
+def drawn(seed):
+    """A chain of one to three bodies between a controller and the ground, at most one of them with mass, none damped
+    with certainty."""
+    chance = np.random.default_rng(seed)
+
+    def size(low=-1.0, high=1.0):
+        return float(10 ** chance.uniform(low, high))
+
+    def some(share, *ends):
+        return size(*ends) if chance.random() < share else 0.0
+
+    count = int(chance.integers(1, 4))
+    mass = [some(0.5) for _ in range(count)]
+    mass[0] = 0.0
+    links, oil = {}, some(0.6)
+    if chance.random() < 0.4:
+        links["l0"] = ss.machine.Spring(between=("drive", "b0"), stiffness=size(), damping=oil)
+    elif oil:
+        links["l0"] = ss.machine.Spring(between=("ground", "b0"), damping=oil)
+    for i in range(1, count):
+        links[f"l{i}"] = ss.machine.Spring(between=(f"b{i - 1}", f"b{i}"), stiffness=size(), damping=some(0.5))
+    touched = [i for i in range(count) if chance.random() < 0.5 or i == count - 1]
+    contacts = {}
+    for i in touched:
+        level = chance.uniform(0.2, 0.5)
+        if chance.random() < 0.5:
+            law = ss.laws.RateState(a=size(-2, -1), b=size(-2, -1), d_c=size(), mu_ref=level, v_ref=1.0)
+        else:
+            law = ss.laws.CoulombStribeck(
+                mu_coulomb=level, mu_static=level + size(-2, -1), v_stribeck=size(-0.3, 0.5), viscous=size(-2, 0)
+            )
+        contacts[f"c{i}"] = ss.machine.Surface(
+            body=f"b{i}", friction=law, contact=ss.laws.ConstantNormalStress(preload=size())
+        )
+    seen, speed = (f"b{int(chance.integers(0, count))}" for _ in range(2))
+    given = {
+        "velocity": 1.0, "body": "b0", "measured": seen, "velocity_of": speed, "kp": size(), "kd": some(0.7),
+        "delay": size(-1.5, 0.7),
+    }  # fmt: skip
+    drive = ss.machine.PositionPID(**given, ki=size()) if chance.random() < 0.4 else ss.machine.PositionPD(**given)
+    bodies = {f"b{i}": ss.machine.SlidingBody(mass=m) for i, m in enumerate(mass)}
+    return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=drive)
+
+
+def friction(law, load, s):
+    """Friction force over displacement, of a law that slides at 1 m/s under a load."""
+    if isinstance(law, ss.laws.RateState):
+        return load * s * (law.a - law.b / (1 + s * law.d_c))
+    part = (law.mu_static - law.mu_coulomb) * np.exp(-(1 / law.v_stribeck**2))
+    return load * s * (law.viscous - 2 * part / law.v_stribeck**2)
+
+
+def determinant(machine, s, z):
+    """Of the chain's matrix at s (...), with z (...) in place of exp(−s delay)."""
+    bodies = list(machine.bodies)
+    at = {name: i for i, name in enumerate(bodies)}
+    matrix = np.zeros((*np.shape(s), len(bodies), len(bodies)), dtype=complex)
+    for name, body in machine.bodies.items():
+        matrix[..., at[name], at[name]] += body.mass * s * s
+    for link in machine.links.values():
+        pulls = (link.stiffness or 0.0) + link.damping * s
+        ends = [at[end] for end in link.between if end in at]
+        for i in ends:
+            for j in ends:
+                matrix[..., i, j] += pulls if i == j else -pulls
+    for touch in machine.contacts.values():
+        i = at[touch.body]
+        matrix[..., i, i] += friction(touch.friction, touch.contact.preload, s)
+    drive = machine.drive
+    if not isinstance(drive, ss.machine.Pull):
+        integral = drive.ki if isinstance(drive, ss.machine.PositionPID) else 0.0
+        matrix[..., at[drive.body], at[drive.measured or drive.body]] += (drive.kp + integral / s) * z
+        matrix[..., at[drive.body], at[drive.velocity_of or drive.measured or drive.body]] += drive.kd * s * z
+    found = np.linalg.det(matrix)
+    return found * s if getattr(drive, "ki", 0.0) else found
+
+
+def growing(machine):
+    """Number of growing roots, `INFINITE` if there are infinitely many; None where this count is not sure.
+
+    det ~ sⁿ (a + b z) at large s. The argument of det/[(s + 1)ⁿ] is followed along the axis; beyond, a + b z returns to
+    a on the way to infinite Re s as |b z| < |a|.
+    """
+    delay = machine.drive.delay
+    far = 1e7 * np.array([1.0, 2.0])
+    ends = [determinant(machine, far, np.full(2, z)) for z in (0.0, 1.0, -1.0)]
+    degree = round(max(np.log2(abs(one[1] / one[0])) for one in ends if np.all(one)))
+    a = (ends[0][1] / far[1] ** degree).real
+    b = ((ends[1][1] - ends[2][1]) / (2 * far[1] ** degree)).real
+    if abs(a) < 1e-5 * abs(b):
+        return INFINITE
+    if abs(abs(b) - abs(a)) < 1e-3 * abs(a):
+        return None
+    if abs(b) > abs(a) or a < 0:
+        return INFINITE
+
+    def at(omega):
+        s = 1j * omega
+        return determinant(machine, s, np.exp(-s * delay)) / (s + 1) ** degree
+
+    end = 10.0
+    while True:
+        some = end * (1 + np.linspace(0, 1, 50))
+        limit = a + b * np.exp(-1j * some * delay)
+        if np.all(np.abs(at(some) - limit) < 0.05 * (abs(a) - abs(b))):
+            break
+        end *= 2
+        if end * delay > 1e5 or end > 1e7:
+            return None
+    omega = np.unique(
+        np.concatenate([np.geomspace(1e-9, end, 20000), np.linspace(0, end, int(end * delay * 20) + 2)[1:]])
+    )
+    value = at(omega)
+    for _ in range(20):
+        steps = np.angle(value[1:] / value[:-1])
+        rough = np.flatnonzero(np.abs(steps) > 0.5)
+        if not len(rough):
+            break
+        middle = 0.5 * (omega[rough] + omega[rough + 1])
+        omega, value = np.insert(omega, rough + 1, middle), np.insert(value, rough + 1, at(middle))
+    else:
+        return None  # a root on the axis, or next to it
+    total = np.sum(steps) + np.angle(a / value[-1])
+    found = -total / np.pi
+    return round(found) if abs(found - round(found)) < 1e-3 else None
+
+
+def status(machine):
+    """ "stable", "unstable" or None where the count is not sure."""
+    found = growing(machine)
+    return None if found is None else "stable" if found == 0 else "unstable"
+
+
+def differences(seed):
+    """Number of comparisons, and words on each that differs."""
+    machine = drawn(seed)
+    compared, wrong = 0, []
+
+    def compare(what, said, own):
+        nonlocal compared
+        if own is not None and said in ("stable", "unstable"):
+            compared += 1
+            if said != own:
+                wrong.append(f"{seed}: {what}: {said}, not {own}")
+
+    try:
+        compare("status", ss.stability(machine), status(machine))
+    except SteadyslipError as error:
+        return 0, [f"{seed}: {error}"]
+    known = machine.parameters()
+    for name in NAMES:
+        if name not in known or not known[name].value:
+            continue
+        try:
+            edges = ss.boundary(machine, name)
+        except SteadyslipError as error:
+            print(f"{seed}: {name}: {error}")
+            continue
+        value = known[name].value
+        places = value * np.geomspace(1e-2, 1e2, 13)
+        said = ss.stability(machine, {name: places})
+        sides = np.array([one.value for one in edges])
+        for place, by_count in zip(places, said, strict=True):
+            own = status(machine.with_values({name: place}))
+            compare(f"{name} = {place:.6g}", by_count, own)
+            above, below = sides[sides > place], sides[sides < place]
+            words = [edges[list(sides).index(above[0])].stable] if len(above) else []
+            by_edges = {"below": "stable"}.get(words[0], "unstable") if words else None
+            if by_edges is None and len(below):
+                by_edges = "stable" if edges[-1].stable == "above" else "unstable"
+            compare(f"{name} = {place:.6g} by its edges {sides}", by_edges or ss.stability(machine), own)
+    return compared, wrong
+
+
+if __name__ == "__main__":
+    count, first = (int(one) for one in sys.argv[1:3])
+    total = 0
+    for seed in range(first, first + count):
+        compared, wrong = differences(seed)
+        total += compared
+        for words in wrong:
+            print(words, flush=True)
+    print(total, "compared")

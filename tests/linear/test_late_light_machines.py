@@ -1,0 +1,61 @@
+"""Controllers that act late on bodies without mass: edges by an equation typed elsewhere, and words on unknown ones."""
+
+import numpy as np
+import pytest
+
+import late_light_machines as late
+import steadyslip as ss
+from machines import coulomb, surface
+
+
+def motor(kd=0.36, damping=1.63, stiffness=40.0, delay=2.61):
+    """A motor without mass in oil that a late controller holds, and a table on a spring."""
+    return ss.Machine(
+        bodies={"motor": ss.machine.SlidingBody(), "table": ss.machine.SlidingBody(mass=1.0)},
+        links={
+            "l0": ss.machine.Spring(between=("ground", "motor"), damping=damping),
+            "l1": ss.machine.Spring(between=("motor", "table"), stiffness=stiffness),
+            "hose": ss.machine.Spring(between=("ground", "table"), damping=0.5),
+        },
+        contacts={"guide": surface("table", coulomb(0.3))},
+        drive=ss.machine.PositionPD(velocity=1.0, body="motor", kp=0.02, kd=kd, delay=delay),
+    )
+
+
+@pytest.mark.parametrize("damping", [0.5, 1.63, 20.0])
+def test_the_damping_that_a_late_gain_outweighs_is_an_edge(damping):
+    """At c = kd the highest power s³ (c + kd exp(−s delay)) can vanish: told from any damping above."""
+    (edge,) = ss.boundary(motor(damping=damping), "links.l0.damping")
+    assert (edge.kind, edge.stable, edge.value) == ("ill-posed", "above", pytest.approx(0.36, rel=1e-12))
+    (gain, *_) = ss.boundary(motor(damping=damping), "drive.kd")
+    assert late.status(motor(kd=gain.value * 0.99, damping=damping)) == "stable"
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [1, 157, 162])
+def test_random_machines_have_the_edges_of_their_typed_equations(seed):
+    compared, wrong = late.differences(seed)
+    assert wrong == []
+    assert compared > 50
+
+
+def endless(stiffness):
+    """theory 10's lag check: stable and unstable by turns for ever as the stiffness rises."""
+    friction = ss.laws.CoulombStribeck(mu_coulomb=0.6, mu_static=0.6 - 0.05 * np.e, v_stribeck=1.0, lag=1.0)
+    return ss.Machine(
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=stiffness, damping=0.05)},
+        contacts={"guide": surface("block", friction)},
+        drive=ss.machine.Pull(velocity=1.0),
+    )
+
+
+def test_where_windows_are_too_many_is_said():
+    name = "links.spring.stiffness"
+    with pytest.warns(ss.UndecidedWarning, match=r"edges of links\.spring\.stiffness above 316\.2 kN/m are not decid"):
+        edges = ss.boundary(endless(10.0), name)
+    assert 0.9 * 316.2e3 < edges[-1].value < 316.3e3
+    assert len(ss.boundary(endless(10.0), name, between=(1.0, 300e3))) > 150
+    (margin,) = (one for one in ss.margins(endless(10.0)) if one.parameter == name)
+    assert margin.searched[1] == pytest.approx(316.2278e3, rel=1e-6)
+    assert ss.safety_factor(endless(10.0), along=name) == pytest.approx(10.0 / 4.2051, rel=1e-4)

@@ -12,7 +12,7 @@ import steadyslip as ss
 from steadyslip.core.errors import SteadyslipError
 
 INFINITE = -1  # count where infinitely many roots grow
-NAMES = ("drive.kp", "drive.kd", "drive.ki", "drive.delay", "links.l0.stiffness", "links.l0.damping",
+NAMES = ("drive.kp", "drive.kd", "drive.ki", "drive.kv", "drive.delay", "links.l0.stiffness", "links.l0.damping",
          "links.l1.damping", "bodies.b0.mass")  # fmt: skip
 
 
@@ -55,7 +55,12 @@ def drawn(seed):
         "velocity": 1.0, "body": "b0", "measured": seen, "velocity_of": speed, "kp": size(), "kd": some(0.7),
         "delay": size(-1.5, 0.7),
     }  # fmt: skip
-    drive = ss.machine.PositionPID(**given, ki=size()) if chance.random() < 0.4 else ss.machine.PositionPD(**given)
+    kind = chance.random()
+    if kind < 0.2:
+        given = {name: one for name, one in given.items() if name not in ("velocity_of", "kd")}
+        drive = ss.machine.Cascade(**given, speed_measured=speed, kv=size(), tn=size())
+    else:
+        drive = ss.machine.PositionPID(**given, ki=size()) if kind < 0.4 else ss.machine.PositionPD(**given)
     bodies = {f"b{i}": ss.machine.SlidingBody(mass=m) for i, m in enumerate(mass)}
     return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=drive)
 
@@ -86,17 +91,32 @@ def determinant(machine, s, z):
         matrix[..., i, i] += friction(touch.friction, touch.contact.preload, s)
     drive = machine.drive
     if not isinstance(drive, ss.machine.Pull):
-        integral = drive.ki if isinstance(drive, ss.machine.PositionPID) else 0.0
-        matrix[..., at[drive.body], at[drive.measured or drive.body]] += (drive.kp + integral / s) * z
-        matrix[..., at[drive.body], at[drive.velocity_of or drive.measured or drive.body]] += drive.kd * s * z
+        place, speed = gains(drive, s)
+        matrix[..., at[drive.body], at[drive.measured or drive.body]] += place * z
+        matrix[..., at[drive.body], at[seen_speed(drive)]] += speed * z
     found = np.linalg.det(matrix)
-    return found * s if getattr(drive, "ki", 0.0) else found
+    return found if isinstance(drive, ss.machine.PositionPD) else found * s
 
 
-def growing(machine):
-    """Number of growing roots, `INFINITE` if there are infinitely many; None where this count is not sure.
+def gains(drive, s):
+    """Force of a controller over the place, and over the place whose speed it measures."""
+    if isinstance(drive, ss.machine.Cascade):
+        integral = 1 + 1 / (drive.tn * s)
+        return drive.kp * drive.kv * integral, drive.kp * s * integral
+    return drive.kp + getattr(drive, "ki", 0.0) / s, drive.kd * s
 
-    det ~ sⁿ (a + b z) at large s. The argument of det/[(s + 1)ⁿ] is followed along the axis; beyond, a + b z returns to
+
+def seen_speed(drive):
+    """Body whose speed a controller measures."""
+    if isinstance(drive, ss.machine.Cascade):
+        return drive.speed_measured or drive.body
+    return drive.velocity_of or drive.measured or drive.body
+
+
+def growing(machine, rate=0.0):
+    """Number of roots right of Re s = `rate` (1/s), `INFINITE` if infinitely many; None where this count is not sure.
+
+    det ~ sⁿ (a + b z) at large s. The argument of det/[(s + 1)ⁿ] is followed along it; beyond, a + b z returns to
     a on the way to infinite Re s as |b z| < |a|.
     """
     delay = machine.drive.delay
@@ -105,6 +125,7 @@ def growing(machine):
     degree = round(max(np.log2(abs(one[1] / one[0])) for one in ends if np.all(one)))
     a = (ends[0][1] / far[1] ** degree).real
     b = ((ends[1][1] - ends[2][1]) / (2 * far[1] ** degree)).real
+    b *= np.exp(-rate * delay)
     if abs(a) < 1e-5 * abs(b):
         return INFINITE
     if abs(abs(b) - abs(a)) < 1e-3 * abs(a):
@@ -113,8 +134,8 @@ def growing(machine):
         return INFINITE
 
     def at(omega):
-        s = 1j * omega
-        return determinant(machine, s, np.exp(-s * delay)) / (s + 1) ** degree
+        s = rate + 1j * omega
+        return determinant(machine, s, np.exp(-s * delay)) / (1j * omega + 1) ** degree
 
     end = 10.0
     while True:
@@ -149,6 +170,20 @@ def status(machine):
     return None if found is None else "stable" if found == 0 else "unstable"
 
 
+def rate_differences(seed, machine):
+    """Words where there are roots right of the growth rate told, or none left of it next to it."""
+    rate = float(ss.growth_rate(machine))
+    if not np.isfinite(rate):
+        own = growing(machine)
+        return (
+            [f"{seed}: rate {rate}, {own} roots grow"]
+            if own not in ((None, INFINITE) if rate > 0 else (None, 0))
+            else []
+        )
+    right, left = (growing(machine, rate + way * 1e-3 * abs(rate)) for way in (1, -1))
+    return [f"{seed}: rate {rate}: {right} and {left} roots right of it"] if right or left == 0 else []
+
+
 def differences(seed):
     """Number of comparisons, and words on each that differs."""
     machine = drawn(seed)
@@ -165,6 +200,7 @@ def differences(seed):
         compare("status", ss.stability(machine), status(machine))
     except SteadyslipError as error:
         return 0, [f"{seed}: {error}"]
+    wrong += rate_differences(seed, machine)
     known = machine.parameters()
     for name in NAMES:
         if name not in known or not known[name].value:

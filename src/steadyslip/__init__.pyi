@@ -28,7 +28,6 @@ from .core.errors import (
     QuantityError as QuantityError,
     RigFileError as RigFileError,
     SteadyslipError as SteadyslipError,
-    UndecidedWarning as UndecidedWarning,
     UnknownNameError as UnknownNameError,
 )
 from .experiments import (

@@ -165,21 +165,34 @@ def growing(machine, rate=0.0):
 
 
 def status(machine):
-    """ "stable", "unstable" or None where the count is not sure."""
-    found = growing(machine)
+    """Status, None where the count is not sure."""
+    found = growing(with_little_mass(machine))
     return None if found is None else "stable" if found == 0 else "unstable"
+
+
+def with_little_mass(machine):
+    """The machine, where only springs hold the driven body, which measures itself, with a mass that is as good as none.
+
+    Its oscillation on the springs turns some hundred times during the delay and a late pull changes it at once.
+    """
+    name, drive = machine.drive.body, machine.drive
+    links = [one for one in machine.links.values() if name in one.between]
+    rubbed = any(one.body == name for one in machine.contacts.values()) or any(one.damping for one in links)
+    if machine.bodies[name].mass or rubbed or name not in (drive.measured or name, seen_speed(drive)):
+        return machine
+    stiffness = sum(one.stiffness for one in links)
+    return machine.with_values(
+        {f"bodies.{name}.mass": 1e-3 * min(drive.kp, stiffness) ** 2 * drive.delay**2 / stiffness}
+    )
 
 
 def rate_differences(seed, machine):
     """Words where there are roots right of the growth rate told, or none left of it next to it."""
     rate = float(ss.growth_rate(machine))
     if not np.isfinite(rate):
-        own = growing(machine)
-        return (
-            [f"{seed}: rate {rate}, {own} roots grow"]
-            if own not in ((None, INFINITE) if rate > 0 else (None, 0))
-            else []
-        )
+        own = growing(with_little_mass(machine))
+        right = own is None or (own if rate > 0 else not own)
+        return [] if right else [f"{seed}: rate {rate}, {own} roots grow"]
     right, left = (growing(machine, rate + way * 1e-3 * abs(rate)) for way in (1, -1))
     return [f"{seed}: rate {rate}: {right} and {left} roots right of it"] if right or left == 0 else []
 

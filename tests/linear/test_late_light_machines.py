@@ -52,7 +52,9 @@ def endless(stiffness):
 
 def test_where_windows_are_too_many_is_said():
     name = "links.spring.stiffness"
-    with pytest.warns(ss.UndecidedWarning, match=r"edges of links\.spring\.stiffness above 316\.2 kN/m are not decid"):
+    with pytest.warns(
+        ss.linear.UndecidedWarning, match=r"edges of links\.spring\.stiffness above 316\.2 kN/m are not decid"
+    ):
         edges = ss.boundary(endless(10.0), name)
     assert 0.9 * 316.2e3 < edges[-1].value < 316.3e3
     assert len(ss.boundary(endless(10.0), name, between=(1.0, 300e3))) > 150

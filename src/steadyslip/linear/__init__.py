@@ -5,6 +5,7 @@ Knows nothing of motion, which knows nothing of it: the two meet in tests, and i
 
 from __future__ import annotations
 
+from steadyslip.core.errors import UndecidedWarning
 from steadyslip.linear import paper
 from steadyslip.linear.boundary import Margin, boundary, margins
 from steadyslip.linear.formula import formula
@@ -26,6 +27,7 @@ __all__ = [
     "Margin",
     "Mode",
     "Response",
+    "UndecidedWarning",
     "boundary",
     "critical_stiffness",
     "eigenvalues",

@@ -84,8 +84,8 @@ def boundary(
     Returns
     -------
     tuple of Boundary
-        By rising value; empty if stability does not change in the range. An `UndecidedWarning` tells where that is not
-        known: roots under long delays may be too many to be counted.
+        By rising value; empty if stability does not change in the range. Where that is not known, as roots under long
+        delays may be too many to be counted, a `linear.UndecidedWarning` says so.
 
     Raises
     ------

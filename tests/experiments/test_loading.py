@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import lab_records as lab
 import steadyslip as ss
@@ -343,6 +344,17 @@ def test_a_flank_of_a_glitch_is_no_change_of_rate(offset):
     pieces = list(pairwise(places))
     runs = [fitted_run(Run(members), time, x) for members in (pieces[:2], pieces[2:3], pieces[3:])]
     assert len(_joined_across_flanks(runs, time, x, 3e-8)) == (1 if offset == 0.0 else 3)
+
+
+@pytest.mark.parametrize("seed", [3, 5, 16, 17, 20])
+def test_noise_that_lasts_makes_no_slips_of_the_sensor_and_no_rates(seed):
+    """As slips and glitches it left rates up to 5.7 errors off, and a hold that moved by five."""
+    memory, time = 0.8, np.arange(0, 60, 1 / 40)
+    pushes = np.random.default_rng(seed).standard_normal(len(time))
+    noise = lfilter([np.sqrt(1 - memory**2)], [1, -memory], pushes)
+    course = load_course(time, 1e-5 * np.interp(time, [0, 30, 31, 60], [0, 30, 30, 59]) + 6e-9 * noise)
+    assert (course.levels[1], course.slips, course.glitches) == (0.0, 0, 0)
+    assert np.all(np.abs(course.levels[[0, 2]] - 1e-5) < 3 * course.errors[[0, 2]])
 
 
 def test_a_brief_stop_is_no_glitch():

@@ -150,6 +150,18 @@ def test_a_search_that_rounding_kept_from_its_end_has_errors():
         assert one.error == pytest.approx(same.error, rel=0.05)
 
 
+def test_a_minimum_at_a_kink_has_errors():
+    """Where a step passes a sample, the sum of squares may rise to both sides, and no step of a search is good."""
+    step = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=59.98, to=5e-6),), until=150.0)
+    found = noisy(lab.columns(lab.rig(), step, 1001), 1)
+    at = int(np.argmin(np.abs(found["time"] - 60.0)))
+    found["friction"][at] -= 5 * lab.NOISE
+    fit, _ = fitted(found)
+    assert fit.values["step.1.at"] == pytest.approx(60.0, abs=1e-6)
+    assert fit.search.converged
+    assert np.max(np.abs(lab.deviations(fit, lab.rig(), (59.98,)))) < 3.5
+
+
 def test_the_test_of_structure_does_not_make_any():
     """White residuals are rarely told as structure, and a hum of the same size mostly."""
     chance = np.random.default_rng(3)

@@ -63,7 +63,12 @@ def test_a_column_of_slip_is_noted(tmp_path):
 
 def test_changes_that_are_waviness_of_the_sensor_are_named_as_perhaps_none():
     found = measured(2e10, 2e-8, False)
-    wavy = replace(found, displacement=found.displacement + 3e-7 * np.sin(found.displacement * (2 * np.pi / 2e-5)))
+    slightly, wavy = (
+        replace(found, displacement=found.displacement + size * np.sin(found.displacement * (2 * np.pi / 2e-5)))
+        for size in (3e-7, 1e-6)
+    )
+    course = load_course(slightly.time, slightly.displacement)  # rates vary by 9 % in both directions
+    assert [change.time for change in course.changes] == pytest.approx([60.13, 100.13], abs=0.1)
     few = {"starts": 2, "free": ["a", "b", "d_c"]}
     told = [" ".join(str(ss.fit(lab.rig(), record, **few)).split()) for record in (found, wavy)]
     assert ["waviness of the sensor" in text for text in told] == [False, True]

@@ -67,7 +67,8 @@ def record(
     piece = ss.protocol.LoadPointTable(time=tuple(fine), displacement=tuple(place))
     times = np.arange(0, until, 1 / rate)
     run = ss.simulate(source, ss.Protocol(pieces=(piece,), until=until), times=times, rtol=1e-9, events=False)
-    assert run.status == "done"
+    if run.status != "done":
+        raise ValueError("a burst: a matter of inertia")
     friction = run["friction"] + noise * chance.standard_normal(len(times))
     displacement = run["load_displacement"] + sensor * chance.standard_normal(len(times))
     return ss.record_from_arrays(

@@ -23,6 +23,7 @@ from steadyslip.experiments.fitting.search import (
     SearchSummary,
     find_minimum,
     first_computable,
+    times_of_changes,
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
@@ -225,6 +226,37 @@ def _level_uncertainty(plan: Plan, comparison: Comparison, z: Array, rows: Array
     return found
 
 
+def _is_minimum(
+    comparison: Comparison, z: Array, bounds: tuple[Array, Array], information: Array, gradient: Array,
+    deviations: Array,
+) -> bool:  # fmt: skip
+    """True if coordinates (p,) where a search ended are a minimum to within `ARRIVED` standard deviations.
+
+    A step of Gauss and Newton is then that short, or its way over a kink: the sum of squares has one where the time of
+    a change passes that of a sample. Such a time is held if the sum rises to both of its sides, the others following.
+    """
+    free = (bounds[0] < z) & (z < bounds[1])
+    ssq = float(np.sum(comparison.residuals(z[None])[0] ** 2))
+    times = times_of_changes(comparison.space)
+    while np.any(free):
+        own = information[np.ix_(free, free)]
+        length = np.zeros(len(z))
+        length[free] = np.abs(np.linalg.lstsq(own, gradient[free])[0]) / deviations[free]
+        if np.all(length <= ARRIVED):
+            break
+        worst = int(np.argmax(np.where(times, length, 0.0)))
+        if not length[worst] > ARRIVED:
+            return False
+        along = np.zeros(len(z))
+        along[free] = np.linalg.lstsq(own, (np.flatnonzero(free) == worst).astype(float))[0]
+        along *= ARRIVED * deviations[worst] / along[worst]
+        beside = np.sum(comparison.residuals(z + np.array([[-1.0], [1.0]]) * along)[0] ** 2, axis=1)
+        if not np.all(beside > ssq):
+            return False
+        free[worst] = False
+    return True
+
+
 def fit_with_errors(
     plan: Plan, comparison: Comparison, z: Array, search: SearchSummary, errors: str, bounds: tuple[Array, Array]
 ) -> Fit:
@@ -250,9 +282,7 @@ def fit_with_errors(
     scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
     if not search.converged:
-        inside = (bounds[0] < z) & (z < bounds[1])
-        step = np.linalg.lstsq(information[np.ix_(inside, inside)], rows[inside] @ residuals)[0]
-        if np.all(np.abs(step) <= ARRIVED * np.sqrt(np.diag(covariance)[inside])):
+        if _is_minimum(comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))):
             search = replace(search, converged=True)
         else:  # curvature beside the minimum says nothing of errors
             covariance = np.diag(np.full(free, np.inf))

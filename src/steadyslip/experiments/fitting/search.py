@@ -329,18 +329,21 @@ class _Search:
     def _minimise_on_all(self, begin: Array) -> Minima:
         """Minimise on all samples; after condensed samples with few iterations, and more if those do not converge."""
 
-        def ends(start: Array, most: int) -> Minima:
+        def ends(start: Array, most: int, held: Array | None = None) -> Minima:
             report = self.reporter("refining", self.whole)
             return minimise(
                 lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, callback=report,
-                stop=self.allowance, damping=DAMPING_NEAR,
+                stop=self.allowance, damping=DAMPING_NEAR, held=held,
             ).sorted()  # fmt: skip
 
-        if self.condensed is self.whole:
-            return ends(begin, MAX_ITERATIONS)
-        found = ends(begin, FINAL_ITERATIONS)
-        if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0]:
+        found = ends(begin, MAX_ITERATIONS if self.condensed is self.whole else FINAL_ITERATIONS)
+        if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0] and self.condensed is not self.whole:
             found = (ends(found.coordinates[:1], MAX_ITERATIONS) + found).sorted()
+        times = times_of_changes(self.whole.space)
+        if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0] and np.any(times):
+            beside = ends(found.coordinates[:1], MAX_ITERATIONS, times[None])  # a time at a kink keeps all others
+            beside.converged[:] = False
+            found = (ends(beside.coordinates, FINAL_ITERATIONS) + beside + found).sorted()
         return found
 
     def summary(self, found: Minima) -> SearchSummary:
@@ -360,12 +363,16 @@ def _moved_inside(space: Space, coordinates: Array, low: Array, high: Array) -> 
 
     Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
     """
-    times = np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
-    ended = times & ((coordinates <= low) | (coordinates >= high))
+    ended = times_of_changes(space) & ((coordinates <= low) | (coordinates >= high))
     if not np.any(ended):
         return np.empty((0, len(coordinates)))
     share = np.array(WINDOW_SHARES)[:, None]
     return np.where(ended, low + share * np.where(ended, high - low, 0.0), coordinates)
+
+
+def times_of_changes(space: Space) -> Array:
+    """True for unknowns (p,) that are the time or the duration of a change of the loading."""
+    return np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
 
 
 def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:

@@ -79,7 +79,7 @@ def features(record: Record, rate: float) -> Features:
     moved = _displacement(record, 0.0 if resting_rate(record.loading) is not None else rate)
     first = max(5, len(mu) // 50)
     level = float(np.median(mu[:first]))
-    steps = [s for s in record.steps if s.kind == "velocity step"]
+    steps = [s for s in record.steps if s.kind == "velocity step" and min(s.before, s.after) > 0]
     steps.sort(key=lambda s: -abs(np.log(s.after / s.before)))
     slope = max((_slope_after_step(record, moved, s) for s in record.steps), default=_steepest_slope(moved, mu))
     total = max(float(moved[-1]), 1e-12)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -15,7 +15,7 @@ from steadyslip.experiments.loading.ends import REST_SHARE, reversed_column, sam
 from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
 from steadyslip.experiments.loading.servo import GAIN, fitted_servo, settling, travel
-from steadyslip.experiments.numerics.noise import describe
+from steadyslip.experiments.numerics.noise import Noise, describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
 
@@ -35,6 +35,7 @@ AROUND = 3.0  # times in which a servo settles that count as around a change
 LAG_ERROR = 0.1  # of a servo, relative, by which the time of its command is uncertain too
 NEAR = 30.0  # samples on each side of a change that are kept one by one where a servo is looked for
 PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
+LASTING = 2.0  # samples per independent sample from which correlation is taken into account where runs are found
 EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
 
 
@@ -47,16 +48,21 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     if not np.ptp(displacement) > 0:
         return Course(0.0)
     runs = straight_runs(time, displacement)
-    between = sum(time[b.first] - time[a.last - 1] for a, b in pairwise(runs))
-    if len(runs) - 1 > MOST_CHANGES or between > MOST_BETWEEN * (time[-1] - time[0]):
+    if not _piecewise_linear(runs, time):
         return smooth_load(time, displacement)
     strays, errors, inflation = _errors(runs, time, displacement)
+    if max(inflation) > LASTING:  # noise that looks like slips and glitches of the sensor
+        lasting = max(size * float(np.sqrt(many)) for size, many in zip(strays, inflation, strict=True))
+        if _piecewise_linear(others := straight_runs(time, displacement, lasting), time):
+            runs = others
+            strays, errors, inflation = _errors(runs, time, displacement)
     rates = np.array([run.rate for run in runs])
     top = float(np.max(np.abs(rates)))
     slow = np.array([SLOW if len(run.rows) >= ENOUGH_SAMPLES else REST_SHARE for run in runs]) * top
     travel = np.abs(rates) * [time[run.last - 1] - time[run.first] for run in runs]
     still = (np.abs(rates) <= AT_REST * top) & (travel <= STILL * np.ptp(displacement))
-    rest = still | (np.abs(rates) <= np.minimum(4 * np.array(errors), slow))
+    known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # backward and so slowly: a sensor that drifts in a hold
+    rest = still | (np.abs(rates) <= np.minimum(known, slow))
     rest &= len(runs) > 1
     rates = np.where(rest, 0.0, rates)
     kinks = [
@@ -80,6 +86,11 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     )  # fmt: skip
 
 
+def _piecewise_linear(runs: list[Run], time: Array) -> bool:
+    between = sum(time[b.first] - time[a.last - 1] for a, b in pairwise(runs))
+    return bool(len(runs) - 1 <= MOST_CHANGES and between <= MOST_BETWEEN * (time[-1] - time[0]))
+
+
 def smooth_load(time: Array, displacement: Array) -> Course:
     """Course of the load-point rate from a smoothing curve through its displacement."""
     spline = smoothing_curve(time, displacement, displacement_noise(time, displacement))
@@ -90,36 +101,56 @@ def smooth_load(time: Array, displacement: Array) -> Course:
 def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[float], list[float], list[float]]:
     """Standard deviations of runs from their lines, errors of their rates, and samples per independent sample.
 
-    A run of few samples does not determine its noise; it gets that of the longest run.
+    A run of few samples does not determine its noise; it gets that of the longest run. Neither does a run that seems
+    white determine the correlation of its noise where the longest run has one.
     """
-    found = [_error(run, time, displacement) for run in runs]
-    longest = max(range(len(runs)), key=lambda k: len(runs[k].rows))
-    scale, _, inflation = found[longest]
-    for k, run in enumerate(runs):
-        count = len(run.rows)
-        if count < ENOUGH_SAMPLES and count < len(runs[longest].rows) and found[k][0] < scale:
-            size = float(np.sum((time[run.rows] - time[run.rows].mean()) ** 2))
-            noisy = scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300)
-            found[k] = scale, scale * float(np.sqrt(inflation / size)) if noisy else 0.0, inflation
-    strays, errors, worth = (list(one) for one in zip(*found, strict=True))
-    return strays, errors, worth
+    found = [_Scatter.of(run, time, displacement) for run in runs]
+    longest = found[max(range(len(runs)), key=lambda k: len(runs[k].rows))]
+    noisy = longest.scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300)
+    for k, own in enumerate(found):
+        few = len(own.share) < ENOUGH_SAMPLES and len(own.share) < len(longest.share) and own.scale < longest.scale
+        if few:
+            found[k] = own = replace(own, scale=longest.scale, noise=longest.noise if noisy else None)
+        elif own.noise and longest.noise and longest.noise.correlated and not own.noise.correlated:
+            like = longest.noise.covariance * (own.scale / longest.scale) ** 2
+            found[k] = replace(own, noise=replace(longest.noise, covariance=like))
+    return [one.scale for one in found], [one.error for one in found], [one.inflation for one in found]
 
 
-def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, float]:
-    """Deviation, error of the rate and samples per independent sample of one run."""
-    rows = run.rows
-    own = np.repeat(run.groups, [j - i for i, j in run.members])
-    t = time[rows] - time[0]
-    r = displacement[rows] - run.levels[own] - run.rate * t
-    scale = MAD_TO_SIGMA * float(np.median(np.abs(r)))
-    count = np.bincount(own)
-    u = t - (np.bincount(own, t) / count)[own]
-    size = float(np.sum(u * u))
-    if not (scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300) and size > 0):
-        return scale, 0.0, 1.0
-    noise = describe(np.clip(r, -4 * scale, 4 * scale), rows=np.stack([np.ones_like(u), u]))
-    variance = float(noise.spread((u / size)[None])[0, 0])
-    return scale, float(np.sqrt(max(variance, 0.0))), max(noise.inflation, 1.0)
+@dataclass(frozen=True, eq=False)
+class _Scatter:
+    """Scatter of a run about its line: standard deviation, noise, and each sample's share (n,) in the rate (1/s)."""
+
+    scale: float
+    noise: Noise | None
+    share: Array
+
+    @property
+    def error(self) -> float:
+        """Standard deviation of the rate, m/s."""
+        variance = float(self.noise.spread(self.share[None])[0, 0]) if self.noise else 0.0
+        return float(np.sqrt(max(variance, 0.0)))
+
+    @property
+    def inflation(self) -> float:
+        """Samples per independent sample."""
+        return max(self.noise.inflation, 1.0) if self.noise else 1.0
+
+    @classmethod
+    def of(cls, run: Run, time: Array, displacement: Array) -> _Scatter:
+        rows = run.rows
+        own = np.repeat(run.groups, [j - i for i, j in run.members])
+        t = time[rows] - time[0]
+        r = displacement[rows] - run.levels[own] - run.rate * t
+        scale = MAD_TO_SIGMA * float(np.median(np.abs(r)))
+        count = np.bincount(own)
+        u = t - (np.bincount(own, t) / count)[own]
+        size = float(np.sum(u * u))
+        share = u / max(size, 1e-300)
+        if not (scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300) and size > 0):
+            return cls(scale, None, share)
+        levels = (own == np.arange(len(count))[:, None]).astype(float)  # they and the rate took slow noise out
+        return cls(scale, describe(np.clip(r, -4 * scale, 4 * scale), rows=np.vstack([levels, u])), share)
 
 
 def _servo_of(kinks: list[_ChangeFit]) -> tuple[float, float] | None:

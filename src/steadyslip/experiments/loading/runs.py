@@ -100,32 +100,37 @@ class _Pieces:
         self.lengths = np.maximum(self.duration / self.span, np.abs(self.slope) * self.duration / self.extent)
 
 
-def straight_runs(time: Array, displacement: Array) -> list[Run]:
+def straight_runs(time: Array, displacement: Array, lasting: float = 0.0) -> list[Run]:
     """Runs of a displacement, in order of time; neighbours differ in rate.
 
     Parameters
     ----------
     time, displacement : ndarray (n,)
         s, m.
+    lasting : float
+        Standard deviation (m) of independent noise of each sample that hides as much as that of the sensor does, where
+        it is correlated and the difference of neighbours shows a part of it only.
     """
     step = -(-len(time) // COARSE)
     if step > 1:
-        runs = straight_runs(*(_means(values, step) for values in (time, displacement)))
+        means = (_means(values, step) for values in (time, displacement))
+        runs = straight_runs(*means, lasting / np.sqrt(step))
         for run in runs:
             run.members = [(i * step, min(j * step, len(time))) for i, j in run.members]
-        return _with_exact_boundaries(runs, step, time, displacement)
-    noise = displacement_noise(time, displacement)
+        return _with_exact_boundaries(runs, step, time, displacement, lasting)
+    noise = max(displacement_noise(time, displacement), lasting)
     pieces = _Pieces(time, displacement, split(time, displacement, noise, linear=True), noise)
     groups = _with_holds(_segmented(pieces), pieces)
     count = len(groups) + 1
     while len(groups) < count:
         count = len(groups)
         groups = _joined_across_wander(_without_glitches(_joined_by_rate(groups, pieces), pieces), pieces)
-    runs = [fitted_run(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
-    return _with_ends(_joined_across_flanks(runs, time, displacement, pieces.usual), time, displacement, pieces.usual)
+    runs = [fitted_run(Run([pieces.ends[k] for k in members]), time, displacement, lasting) for members in groups]
+    runs = _joined_across_flanks(runs, time, displacement, pieces.usual, lasting)
+    return _with_ends(runs, time, displacement, pieces.usual, lasting)
 
 
-def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
+def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float, lasting: float) -> list[Run]:
     """Add runs of the few samples before the first run and after the last, where they determine a rate.
 
     A very short run at an end is examined again, because its ranges may contain a change of rate.
@@ -141,15 +146,15 @@ def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float) 
     )
     own = [run_at_start(t, x, run, noise) for run, t, x in sides]
     if own[0]:
-        found.insert(0, fitted_run(Run([(0, own[0])]), time, displacement))
+        found.insert(0, fitted_run(Run([(0, own[0])]), time, displacement, lasting))
     if own[1]:
-        found.append(fitted_run(Run([(count - own[1], count)]), time, displacement))
+        found.append(fitted_run(Run([(count - own[1], count)]), time, displacement, lasting))
     return found
 
 
-def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement: Array) -> list[Run]:
+def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement: Array, lasting: float) -> list[Run]:
     """Runs found on means of `step` samples, with each boundary moved to the sample where the lines meet."""
-    runs = [fitted_run(run, time, displacement) for run in runs]
+    runs = [fitted_run(run, time, displacement, lasting) for run in runs]
     for before, after in pairwise(runs):
         if before.last != after.first or before.rate == after.rate:
             continue
@@ -158,10 +163,12 @@ def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement
         first, last = before.members[-1][0], after.members[0][1]
         if abs(sample - before.last) <= 2 * step and first + 1 < sample < last - 1:
             before.members[-1], after.members[0] = (first, sample), (sample, last)
-    return [fitted_run(run, time, displacement) for run in runs]
+    return [fitted_run(run, time, displacement, lasting) for run in runs]
 
 
-def _joined_across_flanks(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
+def _joined_across_flanks(
+    runs: list[Run], time: Array, displacement: Array, noise: float, lasting: float = 0.0
+) -> list[Run]:
     """Join runs across a short one after which the displacement continues as before: the flank of a glitch.
 
     The bottom of a glitch may look like a sensor level, so that its flank alone looks like a change of rate.
@@ -170,7 +177,7 @@ def _joined_across_flanks(runs: list[Run], time: Array, displacement: Array, noi
     while i < len(runs) - 2:
         before, middle, after = runs[i : i + 3]
         if _is_continued(before, middle, after, time, noise):
-            runs[i : i + 3] = [fitted_run(Run(before.members + after.members), time, displacement)]
+            runs[i : i + 3] = [fitted_run(Run(before.members + after.members), time, displacement, lasting)]
             i = max(i - 1, 0)
         else:
             i += 1
@@ -350,11 +357,14 @@ def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list
     return groups
 
 
-def fitted_run(run: Run, time: Array, displacement: Array) -> Run:
-    """Run with its rate and sensor levels from a robust line; members on one level share it."""
+def fitted_run(run: Run, time: Array, displacement: Array, lasting: float = 0.0) -> Run:
+    """Run with its rate and sensor levels from a robust line; members on one level share it.
+
+    Levels are told apart by the scatter of the samples, or by `lasting` (see `straight_runs`) if that is more.
+    """
     groups = list(range(len(run.members)))
     for _ in range(3):
-        rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement)
+        rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement, lasting)
         merged = [0]
         for k in range(1, len(run.members)):
             one, other = groups[k - 1], groups[k]
@@ -364,12 +374,12 @@ def fitted_run(run: Run, time: Array, displacement: Array) -> Run:
         if merged == groups:
             break
         groups = merged
-    rate, levels, *_ = _robust_line(run, groups, time, displacement)
+    rate, levels, *_ = _robust_line(run, groups, time, displacement, lasting)
     return Run(run.members, rate, groups, levels)
 
 
 def _robust_line(
-    run: Run, groups: list[int], time: Array, displacement: Array
+    run: Run, groups: list[int], time: Array, displacement: Array, lasting: float
 ) -> tuple[float, Array, Array, Array, float]:
     """Rate, levels, their mean times and errors, error of the rate; outliers have low weight."""
     rows = run.rows
@@ -389,5 +399,5 @@ def _robust_line(
         if not scale > 0:
             break
         weight = 1.0 / (1.0 + (r / (2 * scale)) ** 2)
-    inside = np.bincount(own, minlength=count)
+    inside, scale = np.bincount(own, minlength=count), max(scale, lasting)
     return rate, levels, mean_t, scale / np.sqrt(inside), scale / np.sqrt(size)

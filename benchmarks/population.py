@@ -30,7 +30,7 @@ def trial(rng: np.random.Generator, count: int, spread: np.ndarray, seed: int) -
         )
         truth.append(own)
     found = pooled(told, 2, np.ones(2), 1000, seed)
-    other = found.mean[:, :, 0] + found.spread * rng.standard_normal((1000, 2))
+    other = found.another(seed)
     wanted = [(found.mean[:, 0, 0], MEAN[0]), (found.spread[:, 0], spread[0]), (found.members[:, 0, 0], truth[0][0]),
               (other[:, 0], MEAN[0] + spread[0] * rng.standard_normal())]  # fmt: skip
     return [bool(np.quantile(draws, 0.025) <= value <= np.quantile(draws, 0.975)) for draws, value in wanted]

@@ -33,7 +33,7 @@ def experiments(seed, count, errors=(0.03, 0.04), slope=None):
 
 @pytest.mark.campaign
 def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
-    """The other route: mean, spreads and all members sampled together, nothing integrated out."""
+    """The other route: mean, spreads, correlation and all members sampled together, nothing integrated out."""
     import emcee
 
     told, _ = experiments(3, 3)
@@ -43,23 +43,28 @@ def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
     values = np.array([one.values for one in told])
 
     def log_probability(z):
-        mean, log_spread, members = z[:, None, :2], z[:, 2:4], z[:, 4:].reshape(-1, 3, 2)
-        spread = np.exp(log_spread)
+        mean, log_spread, members = z[:, None, :2], z[:, 2:4], z[:, 4:10].reshape(-1, 3, 2)
+        spread, correlation = np.exp(log_spread), z[:, 10]
+        inside = np.all((log_spread > -16) & (log_spread < 4), axis=1) & (np.abs(correlation) < 1)
+        left = 1 - np.where(inside, correlation, 0.0) ** 2
         r = values - members
-        value = np.sum(log_spread - 0.5 * spread**2, axis=1) - 3 * np.sum(log_spread, axis=1)
-        value -= 0.5 * np.sum(((members - mean) / spread[:, None]) ** 2, axis=(1, 2))
-        value -= 0.5 * np.einsum("mjk,jkl,mjl->m", r, inverse, r)
-        return np.where(np.all((log_spread > -16) & (log_spread < 4), axis=1), value, -np.inf)
+        value = np.sum(log_spread - 0.5 * spread**2, axis=1) - 3 * (np.sum(log_spread, axis=1) + 0.5 * np.log(left))
+        u = (members - mean) / spread[:, None]
+        value += 2 * np.log(left)  # the prior of the correlation
+        square = np.sum(u**2, axis=2) - 2 * correlation[:, None] * u[:, :, 0] * u[:, :, 1]
+        value -= 0.5 * np.sum(square, axis=1) / left + 0.5 * np.einsum("mjk,jkl,mjl->m", r, inverse, r)
+        return np.where(inside, value, -np.inf)
 
     rng = np.random.default_rng(0)
-    centre = np.concatenate([MEAN, np.log([0.1, 0.1]), np.concatenate([one.values for one in told])])
+    centre = np.concatenate([MEAN, np.log([0.1, 0.1]), np.concatenate([one.values for one in told]), [0.0]])
     sampler = emcee.EnsembleSampler(
-        64, 10, log_probability, vectorize=True, moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2)]
+        64, 11, log_probability, vectorize=True, moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2)]
     )
     sampler._random = np.random.RandomState(4)
-    sampler.run_mcmc(centre + 0.02 * rng.standard_normal((64, 10)), 2500)
+    sampler.run_mcmc(centre + 0.02 * rng.standard_normal((64, 11)), 3000)
     chain = sampler.get_chain(discard=700, flat=True)
-    ours = np.column_stack([found.mean[:, :, 0], np.log(found.spread), found.members.reshape(-1, 6)])
+    correlation = found.root[:, 1, 0] / found.spread[:, 1]
+    ours = np.column_stack([found.mean[:, :, 0], np.log(found.spread), found.members.reshape(-1, 6), correlation])
     for level in (0.1, 0.5, 0.9):
         theirs = np.quantile(chain, level, axis=0)
         np.testing.assert_allclose(
@@ -70,7 +75,7 @@ def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
 def test_known_spreads_leave_generalised_least_squares():
     """Given the spread, the mean is that of weighted least squares of stacked estimates."""
     told, _ = experiments(5, 6, slope=np.array([0.02, -0.01]))
-    _, precision, best = log_evidence(told, SPREAD[None])
+    _, precision, best = log_evidence(told, np.diag(SPREAD**2)[None])
     rows = np.concatenate([one.slopes(2) for one in told])
     variance = np.zeros((12, 12))
     for j, one in enumerate(told):
@@ -136,6 +141,7 @@ def fits():
 
 def test_a_population_of_fits(fits):
     everyone = ss.population(fits, count=400)
+    assert everyone.draws.mixed
     assert set(everyone.names) == {"friction.a", "friction.mu_ref", "friction.b", "friction.d_c"}
     assert everyone.spread("a")[0] == pytest.approx(0.13, abs=0.08)
     assert everyone.mean("d_c").low < 12e-6 < everyone.mean("d_c").high
@@ -148,7 +154,7 @@ def test_a_population_of_fits(fits):
     assert "run 1" in text
     assert by_stress.to_dict()["parameters"]["friction.a"]["mean"]["low"] > 0
     panels = everyone.plot()
-    assert len(panels) == 4
+    assert len(panels) == 5  # four parameters, and a - b
     assert panels[0].get_xlabel()
 
 
@@ -166,6 +172,53 @@ def test_a_population_for_arviz(fits):
     assert np.median(posterior["friction.a.normal stress"]) == pytest.approx(rock.slope("a", "normal stress")[0])
     assert np.median(posterior["friction.mu_ref.spread"]) == pytest.approx(rock.spread("mu_ref")[0])
     assert float(arviz.rhat(posterior["friction.a.mean"].values)) < 1.1
+
+
+def test_rocks_that_have_a_minus_b_alike_tell_of_the_next_one():
+    """However a and b differ: the spread of a - b is its own, and verdicts on machines with another rock follow."""
+    rng = np.random.default_rng(2)
+    fits, level = {}, -0.003
+    for j in range(4):
+        a = 0.011 * np.exp(0.3 * rng.standard_normal())
+        fits[f"p{j}"] = ss.fit(ss.lab_rig(), lab.record(lab.rig(a=a, b=a - level), lab.STEP, j, count=400), starts=4)
+    rock = ss.population(fits, ["a", "b", "d_c"], count=400)
+    own, negative = rock.another("a - b"), rock.another("b-a")
+    assert own.low < level < own.high
+    assert own.error < 0.05 * rock.another("a").error
+    assert (negative.value, negative.low, negative.high) == pytest.approx((-own.value, -own.high, -own.low), rel=1e-9)
+    assert rock.weakening > 0.98
+    assert rock.spread("b")[0] == pytest.approx(0.0033, rel=0.5)
+    middle, low, high = rock.correlation("a", "b")
+    assert 0 < low < middle < high
+    assert middle > 0.95
+    text = str(rock)
+    assert "a - b: mean -0.003" in text
+    assert "differ together friction.a and friction.b" in text
+    found = rock.others(3)
+    np.testing.assert_allclose(found["a - b"], found["friction.a"] - found["friction.b"], rtol=1e-12)
+    soft, stiff = (ss.predict(lab.rig().with_values({"slider.stiffness": k}), rock) for k in (1e9, 1e10))
+    assert soft.probability_stable < 0.05
+    assert stiff.probability_stable > 0.95
+    critical = lab.STRESS * -rock.others()["a - b"] / rock.others()["friction.d_c"]
+    np.testing.assert_allclose(stiff.critical_stiffness, np.where(critical > 0, critical, np.nan), rtol=1e-9)
+    assert "another experiment of a population" in str(stiff)
+    with pytest.raises(ss.NotAvailable, match=r"friction\.d_c was fitted, but is not in the population"):
+        ss.predict(lab.rig(), ss.population(fits, ["a", "b"], count=100))
+
+
+def test_conditions_by_label_and_the_same_record_twice(fits):
+    given = dict(zip(fits, (20.0, 20.0, 150.0, 150.0, 250.0, 250.0), strict=True))
+    by_label = ss.population(fits, ["a"], conditions={"temperature": dict(reversed(given.items()))}, count=100)
+    listed = ss.population(fits, ["a"], conditions={"temperature": list(given.values())}, count=100)
+    assert str(by_label) == str(listed)
+    assert "  run 3  temperature 150\n" in str(by_label)
+    assert by_label.to_dict()["conditions"]["temperature"] == given
+    with pytest.raises(
+        ss.ParameterError, match=r"temperature: got those of run 1; allowed: one of each of run 1, run 2"
+    ):
+        ss.population(fits, ["a"], conditions={"temperature": {"run 1": 20.0}})
+    with pytest.raises(ss.ParameterError, match=r"fits\.again: has the record of run 1 again \(synthetic\)"):
+        ss.population(fits | {"again": fits["run 1"]})
 
 
 def test_a_population_read_back_says_the_same(fits, tmp_path):

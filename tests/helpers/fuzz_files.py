@@ -89,8 +89,8 @@ def small_fit():
 def small_population():
     """A population as it comes back, of two fits."""
     fits, count = {"p1": small_fit(), "µ": small_fit()}, 6
-    draws = Pooled(np.ones((count, 1, 2)), np.ones((count, 1)), np.ones((count, 2, 1)), 30.0, 2)
-    return Population(fits, ("friction.a",), {"T": np.array([1.0, 2.0])}, 1.0, fits["p1"].space.unknowns[:1], draws)
+    draws = Pooled(np.ones((count, 1, 2)), np.ones((count, 1, 1)), np.ones((count, 2, 1)), 30.0, 350, 2)
+    return Population(fits, ("friction.a",), {"T": np.array([1.0, 2.0])}, 1.0, draws)
 
 
 def make_sound(folder):

@@ -306,16 +306,14 @@ def populations(random, folder):
                                                     int(random.integers(1, 4)), replace=False))  # fmt: skip
     chains = int(random.integers(1, 4))
     count, members, size = chains * int(random.integers(1, 5)), len(fits), len(names)
-    spread = np.abs(odd_columns(random, count * size)).reshape(count, size)
     pooled = Pooled(
-        odd_columns(random, count * size * (1 + len(given))).reshape(count, size, -1), spread,
-        odd_columns(random, count * members * size).reshape(count, members, size), odd(random, 30.0), chains,
+        odd_columns(random, count * size * (1 + len(given))).reshape(count, size, -1),
+        odd_columns(random, count * size * size).reshape(count, size, size),
+        odd_columns(random, count * members * size).reshape(count, members, size), odd(random, 30.0),
+        int(random.integers(350, 8000)), chains,
     )  # fmt: skip
-    unknowns = tuple(
-        next(one for one in next(iter(fits.values())).space.unknowns if one.name == name) for name in names
-    )
     one = ss.experiments.Population(
-        fits, names, {name: odd_columns(random, members) for name in given}, odd(random, 1.0), unknowns, pooled
+        fits, names, {name: odd_columns(random, members) for name in given}, odd(random, 1.0), pooled
     )
     return saved_twice(one, ss.experiments.load_population, folder / "population.nc")
 

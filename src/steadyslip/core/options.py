@@ -139,7 +139,7 @@ PLACE = Tested("a path", lambda value: isinstance(value, (str, os.PathLike)) and
 CONTENT = Tested("the text of a file", lambda value: isinstance(value, str))
 MAKERS = {
     "Slider": "read_rig", "Machine": "read_rig", "Slider | Machine": "read_rig",
-    "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
+    "Fit": "fit", "Fit | Draws | Population": "fit", "Map": "read_map", "MapResult": "open_map",
     "Cycle": "cycles", "Protocol": "read_protocol", "StructureData": "machine.StructureData",
 }  # fmt: skip
 INTEGRATION = {"rtol": within(tolerance), "arrest": within(below_one), "most_steps": within(steps)}

@@ -112,12 +112,12 @@ def _comparison(result: LawComparison) -> Parts:
 @parts_of.register
 def _population(result: Population) -> Parts:
     rows, own = [], []
-    for name in result.names:
+    for name in result.axes.quantities:
         mean, other = result.mean(name), result.another(name)
         rows.append((name, mean.shown(), mean.range(), other.range()))
-        for label, fit in result.fits.items():
-            alone = fit[name].shown() if name in fit.names else "not fitted alone"
-            own.append((name, label, alone, result.experiment(label, name).shown()))
+        for label, alone in result.alone(name).items():
+            said = "not determined alone" if alone is None else alone.shown()
+            own.append((name, label, said, result.experiment(label, name).shown()))
     body = [
         heading("What was found"), table(rows, ("parameter", "mean", "mean, 95 %", "another experiment, 95 %")),
         figure(figure_html(result.plot, "population"), "Every experiment alone and with the others."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.answers.population import Population
 from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.linear.stable_values import safety_factor
@@ -29,6 +30,7 @@ from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 COUNT = 4000  # default number of draws: errors of a probability are below 1 %
 KICK_DRAWS = 200  # draws for which thresholds of kicks are computed, each by simulations
 LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, 68 % and 95 % intervals
+EFFECT, ROUNDING = 0.05, 1e-9  # relative change of a parameter, and of an answer that does not depend on it
 CLEAR_PROBABILITY = 0.95  # probability above which the text says stable or unstable
 
 
@@ -40,8 +42,8 @@ class Prediction(ReadOnly):
     ----------
     rig : Slider
         Rig with the best fitted friction.
-    draws : Draws
-        Draws of the fitted parameters.
+    draws : Draws or Population
+        Draws of the fitted parameters, or the population that a new experiment was drawn of.
     stable : ndarray of bool (m,)
         True for draws with stable steady sliding.
     exists : ndarray of bool (m,)
@@ -62,7 +64,7 @@ class Prediction(ReadOnly):
     """
 
     rig: Slider
-    draws: Draws
+    draws: Draws | Population
     stable: Array = field(repr=False)
     exists: Array = field(repr=False)
     critical_stiffness: Array = field(repr=False)
@@ -178,8 +180,8 @@ class Prediction(ReadOnly):
 
 @checked(record=whole(0, 10**6), count=whole(2, 10**7))
 def predict(
-    rig: Slider, fit: Fit | Draws, *, kick: str | Sequence[str] = (), transfer: Sequence[str] = (), record: int = 0,
-    count: int = COUNT, seed: int = 0,
+    rig: Slider, fit: Fit | Draws | Population, *, kick: str | Sequence[str] = (), transfer: Sequence[str] = (),
+    record: int = 0, count: int = COUNT, seed: int = 0,
 ) -> Prediction:  # fmt: skip
     """Predict the stability of a rig with fitted friction, carrying the uncertainty of the fit.
 
@@ -188,8 +190,9 @@ def predict(
     rig : Slider
         The machine or fault in question. Its friction is replaced by the fitted one; its memory of normal stress is
         kept where the fit has none.
-    fit : Fit or Draws
-        Draws from `bootstrap` or `posterior`, or a fit, whose covariance is drawn from.
+    fit : Fit, Draws or Population
+        Draws from `bootstrap` or `posterior`, or a fit, whose covariance is drawn from; of a population, the friction
+        is that of one more experiment on its rock, at mean conditions.
     kick : str or sequence of str, optional
         Kinds of kick whose thresholds to find, as for `steadyslip.threshold`.
     transfer : sequence of str, optional
@@ -209,7 +212,7 @@ def predict(
     ParameterError
         If a name is unknown.
     NotAvailable
-        If the fit does not determine what is needed.
+        If the fit does not determine what has an effect here.
 
     Examples
     --------
@@ -219,40 +222,80 @@ def predict(
     >>> print(ss.predict(rig, fit).probability_stable)
     1.0
     """
-    target, draws, vary = transferred(rig, fit, transfer, record, count, seed)
-    return _predicted(target, draws, vary, (kick,) if isinstance(kick, str) else tuple(kick))
+    kicks = (kick,) if isinstance(kick, str) else tuple(kick)
+    target, draws, vary = transferred(rig, fit, transfer, record, count, seed, linear=not kicks)
+    return _predicted(target, draws, vary, kicks)
 
 
 def transferred(
-    rig: Slider, fit: Fit | Draws, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT, seed: int = 0
-) -> tuple[Slider, Draws, dict[str, Array]]:
-    """Rig with the best fitted friction, the draws, and their values of the rig's parameters; see `predict`."""
-    draws = normal_draws(fit, count, seed) if isinstance(fit, Fit) else fit
-    source = draws.fit
+    rig: Slider, fit: Fit | Draws | Population, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT,
+    seed: int = 0, *, linear: bool = False,
+) -> tuple[Slider, Draws | Population, dict[str, Array]]:  # fmt: skip
+    """Rig with the best fitted friction, the draws, and their values of the rig's parameters; see `predict`.
+
+    A friction parameter that is not determined is refused, unless only what is `linear` is asked, and it has no effect
+    on that.
+    """
+    source = _source(fit)
     target = with_fitted_friction(rig, source, record)
     known = target.parameters()
     wanted = {name for name in known if name.startswith("friction.")} | {target.resolve(name) for name in transfer}
-    vary, problems = {}, []
-    for one in source.space.unknowns:
-        if one.record in (None, record) and one.parameter in wanted:
-            vary[one.parameter] = draws.values[one.name]
-    for name in transfer:
-        if target.resolve(name) not in vary:
-            problems.append(Problem("transfer", f"{name!r} was not fitted; fitted: {', '.join(source.names)}"))
-    if problems:
-        raise ParameterError(problems)
-    if not vary:
+    belonging = {
+        one.name: one.parameter
+        for one in source.space.unknowns
+        if one.record in (None, record) and one.parameter in wanted
+    }
+    missing = [name for name in transfer if target.resolve(name) not in belonging.values()]
+    if missing:
+        fitted = ", ".join(source.names)
+        raise ParameterError([Problem("transfer", f"{name!r} was not fitted; fitted: {fitted}") for name in missing])
+    if not belonging:
         raise NotAvailable("none of the fitted parameters belongs to this rig's friction")
-    best = {name: source.values[_name_of(source, name, record)] for name in vary if not name.startswith("friction.")}
+    if isinstance(fit, Population):
+        values = {name: own for name, own in fit.others(seed).items() if name in belonging}
+        best = {belonging[name]: fit.mean(name).value for name in values}
+        lost = {name for name in belonging if name not in values}
+        draws: Draws | Population = fit
+    else:
+        best = {belonging[n]: source.values[n] for n in belonging if not belonging[n].startswith("friction.")}
+        lost = {one.name for one in source.estimates if one.name in belonging and not one.determined}
     target = target.with_values(best)
-    return target, draws, vary
+    if linear:
+        lost -= _without_effect(target, {name: belonging[name] for name in lost})
+    if isinstance(fit, Population):
+        if lost:
+            message = f"{', '.join(sorted(lost))} was fitted, but is not in the population; name it in its parameters"
+            raise NotAvailable(message)
+        return target, draws, {belonging[name]: own for name, own in values.items()}
+    held = [one for one in source.names if one not in lost]
+    draws = normal_draws(fit, count, seed, held=held) if isinstance(fit, Fit) else fit
+    return target, draws, {name: draws.values[own] for own, name in belonging.items()}
 
 
-def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tuple[str, ...]) -> Prediction:
+def _source(fit: Fit | Draws | Population) -> Fit:
+    """Fit whose friction law a prediction takes."""
+    return fit if isinstance(fit, Fit) else fit.fit if isinstance(fit, Draws) else next(iter(fit.fits.values()))
+
+
+def _without_effect(target: Slider, names: Mapping[str, str]) -> set[str]:
+    """Keys of those parameters of a rig on which neither growth rate nor critical stiffness depends."""
+    found = set()
+    for key, name in names.items():
+        value = target.value(name) or 1.0
+        moved = {name: value * np.array([1.0, 1 + EFFECT, 1 - EFFECT])}
+        with np.errstate(all="ignore"):
+            numbers = [np.broadcast_to(one(target, moved), 3) for one in (growth_rate, critical_stiffness)]
+        if all(np.allclose(one, one[0], rtol=ROUNDING, atol=0, equal_nan=True) for one in numbers):
+            found.add(key)
+    return found
+
+
+def _predicted(target: Slider, draws: Draws | Population, vary: dict[str, Array], kicks: tuple[str, ...]) -> Prediction:
     with np.errstate(all="ignore"):
-        states = np.broadcast_to(np.asarray(status(operating_point(target, vary))), (len(draws),))
+        count = len(next(iter(vary.values())))
+        states = np.broadcast_to(np.asarray(status(operating_point(target, vary))), (count,))
         critical, safety, growth = (
-            np.broadcast_to(np.asarray(number(target, vary), dtype=float), (len(draws),))
+            np.broadcast_to(np.asarray(number(target, vary), dtype=float), (count,))
             for number in (critical_stiffness, safety_factor, growth_rate)
         )
     few = {name: values[:KICK_DRAWS] for name, values in vary.items()}
@@ -271,10 +314,6 @@ def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tupl
 def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
     """Rig with its friction law replaced by the fitted one."""
     return replace(rig, friction=fit.rig(record).friction.completed_by(rig.friction))
-
-
-def _name_of(fit: Fit, parameter: str, record: int) -> str:
-    return next(u.name for u in fit.space.unknowns if u.parameter == parameter and u.record in (None, record))
 
 
 def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:

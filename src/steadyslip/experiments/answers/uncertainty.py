@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -216,13 +217,21 @@ def load_draws(path: str | PathLike[str]) -> Draws:
 
 
 @checked(count=whole(1, 10**8))
-def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
+def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[str] = ()) -> Draws:
     """Draw parameters from the normal distribution with the covariance of a fit, in its coordinates.
+
+    Parameters
+    ----------
+    fit : Fit
+    count : int
+    seed : int
+    held : sequence of str, optional
+        Parameters that keep the fit's value where it does not determine them, as those without effect may.
 
     Raises
     ------
     NotAvailable
-        If a parameter is not determined.
+        If another parameter is not determined.
 
     Examples
     --------
@@ -232,11 +241,12 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     >>> draws.values["friction.a"].shape
     (1000,)
     """
-    lost = [e.name for e in fit.estimates if not e.determined]
+    lost = [e.name for e in fit.estimates if not e.determined and e.name not in {fit.names[fit.index(n)] for n in held}]
     if lost:
         raise NotAvailable(f"the fit does not determine {', '.join(lost)}; fix one of each combination that it names")
+    covariance = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)
     generator = np.random.default_rng(seed)
-    z = generator.multivariate_normal(fit.coordinates, fit.covariance, size=count, method="eigh")
+    z = generator.multivariate_normal(fit.coordinates, covariance, size=count, method="eigh")
     return _draws(fit, "normal", np.clip(z, fit.space.low, fit.space.high), {"seed": float(seed)})
 
 

@@ -1,8 +1,9 @@
-"""Estimates of several experiments as members of one population: normal in coordinates, spread unknown.
+"""Estimates of several experiments as members of one population: normal in coordinates, covariance unknown.
 
-Experiment j has true coordinates θ_j = X_j β + N(0, diag τ²) and says of some of them z_j = θ_j + N(0, C_j). The mean β
-is integrated out with a flat prior, the spreads τ have half-normal ones and are sampled; β and θ follow from them
-exactly (Gelman et al. 2013, Bayesian Data Analysis, ch. 5). Samples are drawn by emcee, which only this file imports.
+Experiment j has true coordinates θ_j = X_j β + N(0, Σ) and says of some of them z_j = θ_j + N(0, C_j). The mean β is
+integrated out with a flat prior. The spreads, roots of the diagonal of Σ, have half-normal priors, and correlation
+matrices R the density |R|² (Lewandowski, Kurowicka & Joe 2009); both are sampled. β and θ follow from them exactly
+(Gelman et al. 2013, Bayesian Data Analysis, ch. 5). Samples are drawn by emcee, which only this file imports.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ MIN_LOG_SPREAD = -16.0  # lower bound of ln(spread / prior scale): spreads below
 WALKERS, BURN = 40, 250  # least number of walkers, and steps discarded at the start; chosen by trial, for time
 THINNING = 20  # steps between the draws that are kept of a walker, about its autocorrelation time
 MIN_STEPS = 350  # least number of steps after the discarded ones, for a usable autocorrelation time
+FEWEST_TIMES = 20  # autocorrelation times that walkers need, of which each has few draws; chosen by trial
+MOST_ROUNDS = 3  # rounds of steps, each as long as all before, until there are as many
+ALIKE = 3.0  # exponent of the determinant of correlations in their prior, plus 1: with 1, spreads came out too large
+MOST_BEND = 8.0  # largest |artanh| of a partial correlation: closer to 1 than 1e-6 counts as 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,26 +63,44 @@ class Pooled:
     ----------
     mean : ndarray (m, p, q)
         β: at mean conditions, then per unit of each condition.
-    spread : ndarray (m, p)
-        τ.
+    root : ndarray (m, p, p)
+        Lower triangular root L of Σ = LLᵀ.
     members : ndarray (m, j, p)
         θ of every experiment.
     time : float
-        Autocorrelation time of the spreads, steps.
+        Longest autocorrelation time of the covariance's coordinates, steps.
+    steps : int
+        Steps of each walker.
     chains : int
         Walkers that the draws belong to, one after another and equally long.
     """
 
     mean: Array
-    spread: Array
+    root: Array
     members: Array
     time: float
+    steps: int = 0
     chains: int = 1
 
+    @property
+    def spread(self) -> Array:
+        """Standard deviations (m, p) of the coordinates between experiments."""
+        return np.asarray(np.linalg.norm(self.root, axis=2))
 
-def log_evidence(experiments: list[ExperimentEstimate], spread: Array) -> tuple[Array, Array, Array]:
-    """Log marginal likelihood (m,) for spreads (m, p); precision (m, p q, p q) and mean (m, p q) of β given them."""
-    count, size = spread.shape
+    @property
+    def mixed(self) -> bool:
+        """True if walkers made steps enough to forget where they began."""
+        return self.steps >= FEWEST_TIMES * self.time
+
+    def another(self, seed: int) -> Array:
+        """Coordinates (m, p) of an experiment that is not among them, at mean conditions."""
+        noise = np.random.default_rng(seed).standard_normal((*self.root.shape[:2], 1))
+        return np.asarray(self.mean[:, :, 0] + (self.root @ noise)[:, :, 0])
+
+
+def log_evidence(experiments: list[ExperimentEstimate], covariance: Array) -> tuple[Array, Array, Array]:
+    """Log marginal likelihood (m,) for covariances (m, p, p); precision (m, p q, p q) and mean (m, p q) of β then."""
+    count, size = covariance.shape[:2]
     width = size * len(experiments[0].design)
     precision, pull, rest = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count)
     for many in {len(one.indices) for one in experiments} - {
@@ -87,7 +110,8 @@ def log_evidence(experiments: list[ExperimentEstimate], spread: Array) -> tuple[
         seen = np.array([one.indices for one in alike])
         slopes = np.array([one.slopes(size) for one in alike])
         values = np.array([one.values for one in alike])
-        variance = np.eye(many) * spread[:, seen][..., None] ** 2 + np.array([one.covariance for one in alike])
+        among = covariance[:, seen[:, :, None], seen[:, None, :]]
+        variance = among + np.array([one.covariance for one in alike])
         root = np.linalg.cholesky(variance)
         right = np.concatenate([slopes, values[:, :, None]], axis=2)
         solved = np.linalg.solve(root, np.broadcast_to(right, (count, *right.shape)))
@@ -101,7 +125,7 @@ def log_evidence(experiments: list[ExperimentEstimate], spread: Array) -> tuple[
 
 
 def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count: int, seed: int) -> Pooled:
-    """Draw spreads, means and members of a population from their posterior, by affine-invariant MCMC.
+    """Draw covariances, means and members of a population from their posterior, by affine-invariant MCMC.
 
     Parameters
     ----------
@@ -122,26 +146,61 @@ def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count
 
     def log_probability(u: Array) -> Array:
         found = np.full(len(u), -np.inf)
-        inside = np.all((u > MIN_LOG_SPREAD) & (u < 4.0), axis=1)
+        logs, bends = u[:, :size], u[:, size:]
+        inside = np.all((logs > MIN_LOG_SPREAD) & (logs < 4.0), axis=1) & np.all(np.abs(bends) < MOST_BEND, axis=1)
         if np.any(inside):
-            share = np.exp(u[inside])  # of the prior's scale; the last term is the change to logarithms
-            found[inside] = log_evidence(experiments, scale * share)[0] + np.sum(u[inside] - 0.5 * share**2, axis=1)
+            share = np.exp(logs[inside])  # of the prior's scale; the next term is the change to logarithms
+            root = (scale * share)[:, :, None] * correlation_root(bends[inside], size)
+            prior = np.sum(logs[inside] - 0.5 * share**2, axis=1) + log_prior_of_correlation(bends[inside], size)
+            found[inside] = log_evidence(experiments, root @ root.transpose(0, 2, 1))[0] + prior
         return found
 
     generator = np.random.default_rng(seed)
-    walkers = max(WALKERS, 2 * size + 2)
+    pairs = size * (size - 1) // 2
+    walkers = max(WALKERS, 2 * (size + pairs) + 2)
     begin = np.log(_initial_spreads(experiments, size, scale) / scale) + 0.5 * generator.standard_normal(
         (walkers, size)
     )
+    begin = np.hstack([np.clip(begin, MIN_LOG_SPREAD + 1, 3.0), 0.5 * generator.standard_normal((walkers, pairs))])
     each = -(-count // walkers)
     steps = max(THINNING * each, MIN_STEPS)
-    sampler, time = run_walkers(
-        log_probability, np.clip(begin, MIN_LOG_SPREAD + 1, 3.0), BURN + steps, seed, "a population"
-    )
-    kept = sampler.get_chain(discard=BURN)
+    sampler, time = run_walkers(log_probability, begin, BURN + steps, seed, "a population", True)
+    for _ in range(MOST_ROUNDS):
+        if steps >= FEWEST_TIMES * time:
+            break
+        sampler.run_mcmc(None, steps)
+        steps *= 2
+        time = float(np.max(sampler.get_autocorr_time(discard=BURN, quiet=True, tol=0)))
     own = np.round(np.linspace(0, steps - 1, each)).astype(int)
-    spread = scale * np.exp(kept[own].transpose(1, 0, 2).reshape(-1, size))
-    return _conditional_draws(experiments, spread, time, walkers, generator)
+    kept = sampler.get_chain(discard=BURN)[own].transpose(1, 0, 2).reshape(walkers * each, -1)
+    spread = scale * np.exp(kept[:, :size])
+    root = spread[:, :, None] * correlation_root(kept[:, size:], size)
+    mean, members = _conditional_draws(experiments, root, generator)
+    return Pooled(mean, root, members, time, steps, walkers)
+
+
+def correlation_root(bends: Array, size: int) -> Array:
+    """Lower triangular roots (m, p, p) of correlation matrices, from artanh of partial correlations (m, p(p−1)/2)."""
+    root = np.zeros((len(bends), size, size))
+    partial = np.tanh(bends)
+    left = np.ones((len(bends), size))  # of the unit length of each row
+    k = 0
+    for i in range(size):
+        for j in range(i):
+            root[:, i, j] = partial[:, k] * np.sqrt(left[:, i])
+            left[:, i] *= 1 - partial[:, k] ** 2
+            k += 1
+        root[:, i, i] = np.sqrt(left[:, i])
+    return root
+
+
+def log_prior_of_correlation(bends: Array, size: int) -> Array:
+    """Logarithm (m,) of the density of artanh of partial correlations, if matrices R have the density |R|^(η − 1).
+
+    Partial correlation j of a row then has (1 − r²)^(η − 1 + (p − 1 − j)/2), j from 1 (Lewandowski et al. 2009).
+    """
+    power = np.array([ALIKE - 1 + 0.5 * (size + 1 - j) for i in range(size) for j in range(1, i + 1)])
+    return np.asarray(-2 * np.log(np.cosh(bends)) @ power)
 
 
 def _initial_spreads(experiments: list[ExperimentEstimate], size: int, scale: Array) -> Array:
@@ -155,30 +214,29 @@ def _initial_spreads(experiments: list[ExperimentEstimate], size: int, scale: Ar
 
 
 def _conditional_draws(
-    experiments: list[ExperimentEstimate], spread: Array, time: float, chains: int, generator: np.random.Generator
-) -> Pooled:
-    """Draw means and members from their exact distributions given the spreads (m, p)."""
-    count, size = spread.shape
-    _, precision, best = log_evidence(experiments, spread)
-    root = np.linalg.cholesky(precision)
+    experiments: list[ExperimentEstimate], root: Array, generator: np.random.Generator
+) -> tuple[Array, Array]:
+    """Draw means (m, p, q) and members (m, j, p) from their exact distributions given roots of the covariance."""
+    count, size = root.shape[:2]
+    covariance = root @ root.transpose(0, 2, 1)
+    _, precision, best = log_evidence(experiments, covariance)
+    upper = np.linalg.cholesky(precision).transpose(0, 2, 1)
     noise = generator.standard_normal((count, precision.shape[1], 1))
-    mean = best + np.linalg.solve(root.transpose(0, 2, 1), noise)[:, :, 0]
-    mean = mean.reshape(count, size, -1)
+    mean = (best + np.linalg.solve(upper, noise)[:, :, 0]).reshape(count, size, -1)
     members = np.empty((count, len(experiments), size))
     for j, one in enumerate(experiments):  # a draw from the prior, moved by what it misses (Hoffman & Ribak 1991)
-        drawn = mean @ one.design + spread * generator.standard_normal((count, size))
+        drawn = mean @ one.design + (root @ generator.standard_normal((count, size, 1)))[:, :, 0]
         seen = drawn[:, one.indices] + generator.multivariate_normal(
             np.zeros(len(one.indices)), one.covariance, size=count, method="eigh"
         )
-        variance = one.covariance + np.eye(len(one.indices)) * spread[:, None, one.indices] ** 2
-        weight = np.linalg.solve(variance, (one.values - seen)[:, :, None])[:, :, 0]
-        drawn[:, one.indices] += spread[:, one.indices] ** 2 * weight
-        members[:, j] = drawn
-    return Pooled(mean, spread, members, time, chains)
+        variance = one.covariance + covariance[:, one.indices[:, None], one.indices]
+        missed = np.linalg.solve(variance, (one.values - seen)[:, :, None])
+        members[:, j] = drawn + (covariance[:, :, one.indices] @ missed)[:, :, 0]
+    return mean, members
 
 
 def run_walkers(
-    log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str
+    log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str, differences: bool = False
 ) -> tuple[Any, float]:
     """Run the walkers of an affine-invariant MCMC sampler.
 
@@ -193,6 +251,9 @@ def run_walkers(
     seed : int
     what : str
         Name of the task, for the error message where emcee is missing.
+    differences : bool
+        Whether walkers move along differences of others (ter Braak & Vrugt 2008), which in 10 to 15 dimensions took a
+        third of the steps of stretches.
 
     Returns
     -------
@@ -208,7 +269,8 @@ def run_walkers(
         import emcee
     except ImportError as error:
         raise NotAvailable(f"{what} needs the package emcee; install steadyslip[lab]") from error
-    sampler = emcee.EnsembleSampler(*begin.shape, log_density, vectorize=True)
+    moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)] if differences else None
+    sampler = emcee.EnsembleSampler(*begin.shape, log_density, vectorize=True, moves=moves)
     sampler._random = np.random.RandomState(seed % 2**32)
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
     return sampler, float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))

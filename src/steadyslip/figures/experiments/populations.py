@@ -25,18 +25,19 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
     ----------
     result : Population
     ax : array of matplotlib Axes, optional
-        One for each parameter, in a row.
+        One for each parameter, and a - b, in a row.
 
     Returns
     -------
     ndarray of matplotlib.axes.Axes
     """
-    count, rows = len(result.names), len(result.fits)
+    names, rows = tuple(result.axes.quantities), len(result.fits)
+    count = len(names)
     panels = panel_grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.2 + 2.2 * count, 2.2 + 0.3 * rows))[
         0
     ]
     place = np.arange(rows)[::-1]
-    for panel, name in zip(panels, result.names, strict=True):
+    for panel, name in zip(panels, names, strict=True):
         mean, other = result.mean(name), result.another(name)
         size, unit = display_unit(mean.unit, abs(mean.value) or mean.error, mean.area)
         panel.axvspan(
@@ -44,10 +45,10 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
         )
         panel.axvspan(mean.low / size, mean.high / size, color=SKY, alpha=0.6, linewidth=0, label="mean, 95 %")
         panel.axvline(mean.value / size, color=BLUE, linewidth=1)
-        for y, (label, own) in zip(place, result.fits.items(), strict=True):
-            if name in own.names and own[name].determined:
+        for y, (label, alone) in zip(place, result.alone(name).items(), strict=True):
+            if alone is not None:
                 _draw_interval(
-                    panel, y + ROW_OFFSET, own[name], size, VERMILION, "o", "alone, 95 %" if y == place[0] else ""
+                    panel, y + ROW_OFFSET, alone, size, VERMILION, "o", "alone, 95 %" if y == place[0] else ""
                 )
             _draw_interval(
                 panel,

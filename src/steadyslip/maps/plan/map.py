@@ -357,11 +357,11 @@ def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
 
 def _fit_draws(rig: Slider | Machine, given: Any) -> tuple[Slider, dict[str, Any]]:
     """Rig with a fit's friction, and draws of its parameters."""
-    from steadyslip.experiments import Draws, Fit
+    from steadyslip.experiments import Draws, Fit, Population
     from steadyslip.experiments.answers.predict import transferred
 
-    if not isinstance(given, (Fit, Draws)):
-        message = f"got {given!r}; allowed: Samples, names and their values, a Fit or Draws of one"
+    if not isinstance(given, (Fit, Draws, Population)):
+        message = f"got {given!r}; allowed: Samples, names and their values, a Fit, Draws of one, or a Population"
         raise ParameterError([Problem("map.samples", message)])
     if not isinstance(rig, Slider):
         message = "a fit is of one block's friction; of a machine, give values for the parameters of a contact by name"

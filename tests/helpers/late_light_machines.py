@@ -178,7 +178,8 @@ def with_little_mass(machine):
     name, drive = machine.drive.body, machine.drive
     links = [one for one in machine.links.values() if name in one.between]
     rubbed = any(one.body == name for one in machine.contacts.values()) or any(one.damping for one in links)
-    if machine.bodies[name].mass or rubbed or name not in (drive.measured or name, seen_speed(drive)):
+    outweighs = seen_speed(drive) == name and gains(drive, 1.0)[1]
+    if machine.bodies[name].mass or rubbed or outweighs or (drive.measured or name) != name:
         return machine
     stiffness = sum(one.stiffness for one in links)
     return machine.with_values(

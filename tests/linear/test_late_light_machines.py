@@ -1,5 +1,7 @@
 """Controllers that act late on bodies without mass: edges by an equation typed elsewhere, and words on unknown ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,3 +63,20 @@ def test_where_windows_are_too_many_is_said():
     (margin,) = (one for one in ss.margins(endless(10.0)) if one.parameter == name)
     assert margin.searched[1] == pytest.approx(316.2278e3, rel=1e-6)
     assert ss.safety_factor(endless(10.0), along=name) == pytest.approx(10.0 / 4.2051, rel=1e-4)
+
+
+def test_a_late_pull_on_a_motor_without_mass_that_only_a_spring_holds_is_ill_posed():
+    """m s² + k + kp exp(−s delay): of smaller masses ever more roots grow, ever faster; without mass they were told to
+    decay. A dashpot beside the spring gives the massless machine's answer to any small mass."""
+    bare = replace(motor(kd=0.0), links={name: one for name, one in motor().links.items() if name != "l0"})
+    small = {"bodies.motor.mass": np.array([1e-5, 1e-7, 1e-9])}
+    growing = [late.growing(bare.with_values({"bodies.motor.mass": m, "drive.kp": 5.0})) for m in (1e-3, 1e-4)]
+    assert growing[1] > growing[0] > 2
+    assert np.all(np.diff(ss.growth_rate(bare, small)) > 0)
+    assert ss.stability(bare) == "unstable"
+    assert ss.growth_rate(bare) == np.inf
+    assert "only springs hold" in ss.analyze(bare).reason
+    assert len(ss.stable_values(bare, "drive.kp")) == 0
+    damped = motor(kd=0.0)
+    assert ss.stability(damped) == "stable"
+    assert ss.growth_rate(damped, small) == pytest.approx(np.full(3, ss.growth_rate(damped)), rel=1e-3)

@@ -17,6 +17,7 @@ from steadyslip.core.errors import SteadyslipError
 from steadyslip.linear.boundary import margins
 from steadyslip.linear.digits import precise_eigenvalues
 from steadyslip.linear.pencil import checked_spectrum
+from steadyslip.linear.response import response_numbers
 from steadyslip.model.point import operating_point
 from steadyslip.verdict import checks, numbers
 from steadyslip.verdict.checks import critical_check, edge_checks, net_forces, spectrum_checks, steady_check
@@ -206,3 +207,25 @@ def test_random_verdicts_pass_their_checks():
         found += [(seed, one) for one in analysis.checks]
     assert len(found) > 100
     assert [(seed, str(one)) for seed, one in found if not one.passed] == []
+
+
+def bristles(mu_static, mass=0.0):
+    law = ss.laws.LuGre(
+        bristle_stiffness=1e5, bristle_damping=0.0, mu_coulomb=0.3, mu_static=mu_static, v_stribeck=1e-3, viscous=0.0
+    )
+    contact = ss.laws.ConstantNormalStress(preload=1e4)
+    return ss.Slider(friction=law, contact=contact, stiffness=1e6, mass=mass, drive=ss.machine.SteadyDrive(1e-3))
+
+
+def test_undamped_bristles_without_mass_are_judged_by_the_limit_of_small_masses():
+    """Real part of the oscillation of a small mass on them: −r² S/(2(k + r S)), whatever the mass (theory 3, f = 0)."""
+    found = ss.analyze(bristles(0.25))
+    assert (found.stable, found.growth_rate) == (None, None)
+    assert found.reason.startswith("not decided: without mass")
+    assert "slider.mass" in found.reason
+    own = ss.eigenvalues(bristles(0.25), {"slider.mass": [1e-6, 1e-3]})
+    part = response_numbers(operating_point(bristles(0.25)))
+    assert own[:, -1].real == pytest.approx(-(part.r**2) * part.S / (2 * (part.k + part.r * part.S)), rel=1e-6)
+    falling = ss.analyze(bristles(0.35))
+    assert (falling.stable, falling.growth_rate) == (False, np.inf)
+    assert ss.stability(bristles(0.35, 1e-6)) == "unstable"

@@ -11,9 +11,9 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.crossing import APART, linear_split
 from steadyslip.linear.polynomials import StableSet, columns, most_intervals, stable_set
 from steadyslip.linear.roots import Array, quietly
-from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
+from steadyslip.linear.windows import delay_set, delay_set_among, empty_set, linear_windows
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.posed import spare_powers
+from steadyslip.model.posed import late_on_springs, spare_powers
 from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
 _FAR = 1e12  # edges beyond this factor from the size of a parameter, up or down, are rounding of infinity or zero
@@ -131,7 +131,11 @@ def linear_set(
     `size` is the value to start from, by default the rig's own. Windows of rigs with delay are searched up to a factor
     of a million from it, or in the range `reach` if that is wider.
     """
+    place = list(point.model.parameters).index(name)
     value = float(point.named()[name]) if size is None else size
+    own = point.with_arguments([value if i == place else one for i, one in enumerate(point.arguments)], ())
+    if point.model.delays and late_on_springs(own):
+        return empty_set()
     symbol = point.model.parameters[name]
     if any(delay.has(symbol) for delay in point.model.delays):
         return _delay_set(point, symbol)

@@ -15,7 +15,7 @@ from steadyslip.linear.roots import Array, ComplexArray, quietly, roots
 from steadyslip.model.eigenvalues import digits_lost, eigenvalues_of
 from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.posed import spare_powers
+from steadyslip.model.posed import late_on_springs, spare_powers
 from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
 _ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the axis: a conjugate pair
@@ -52,6 +52,7 @@ def growth(point: OperatingPoint) -> Array:
 @question
 def _rightmost(point: OperatingPoint) -> ComplexArray:
     c, h = quasipolynomial(point)
+    c = np.where(late_on_springs(point)[..., None, None], np.nan, c)
     return with_delays.rightmost(c, h, delays_in_terms(point.model), c.shape[-1] - 1)
 
 
@@ -88,7 +89,8 @@ def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
 @question
 def counts(point: OperatingPoint) -> NDArray[np.int64]:
     """As `unstable_roots`, with `UNKNOWN` where roots cannot be counted."""
-    return with_delays.count_right_if_feasible(*quasipolynomial(point), delays_in_terms(point.model))
+    found = with_delays.count_right_if_feasible(*quasipolynomial(point), delays_in_terms(point.model))
+    return np.where(late_on_springs(point) & point.exists, with_delays.INFINITE, found)
 
 
 @question

@@ -85,17 +85,63 @@ def spare_powers(point: OperatingPoint) -> np.ndarray:
     rise with velocity, and dampings determine of their velocities; springs determine the rest. If more are lost,
     friction does not rise at once, and the equations are ill-posed.
     """
-    model, inertial = point.model, _inertial(point.model)
-    light = np.broadcast_to(~inertial, (*point.shape, len(inertial))).copy()
-    masses = point.evaluate(model.function([one.inertia for one in model.coordinates if one.inertial]))
-    for i, mass in zip(np.flatnonzero(inertial), masses, strict=True):
-        light[..., i] = np.asarray(mass) == 0
+    model, light = point.model, _light(point)
     powers = np.sum(np.where(light, 1, 2), axis=-1)
     if np.any(alone := np.any(light & ~_of_contacts(model), axis=-1)):
         values = [np.broadcast_to(one, point.shape)[alone] for one in point.evaluate(_dissipation(model))]
         powers = np.array(powers)
         powers[alone] = np.sum(~light[alone], axis=-1) * 2 + _determined(np.array(values), light[alone])
-    return np.asarray(2 * np.sum(inertial) + _determined_in_general(model) - powers)
+    return np.asarray(2 * np.sum(_inertial(model)) + _determined_in_general(model) - powers)
+
+
+@question
+def late_on_springs(point: OperatingPoint) -> np.ndarray:
+    """True where a force acts late on what it measures, a motion of bodies without mass that only springs hold, (...).
+
+    With a mass on the springs k, m s² + k + kp exp(−s delay) has ever more growing roots, which grow ever faster, the
+    smaller m is: without mass the equations are ill-posed, though their own roots may decay.
+    """
+    model, n = point.model, len(point.model.coordinates)
+    late, found = _late_entries(model), np.zeros(point.shape, dtype=bool)
+    if not late:
+        return found
+    light = (_light(point) & ~_of_contacts(model)).reshape(-1, n)
+    if not np.any(light):
+        return found
+    both = [[np.broadcast_to(one, point.shape).ravel() for one in point.evaluate(model.function(part))]
+            for part in (_dissipation_entries(model), late)]  # fmt: skip
+    values, gains = (np.nan_to_num(np.array(one), posinf=0.0, neginf=0.0) for one in both)
+    size, vectors = np.linalg.eigh(_damped(values, light))
+    free = np.where(size[:, None, :] <= _UNDETERMINED**2, vectors, 0.0) * light[:, :, None]
+    gains = np.moveaxis(gains.reshape(-1, n, n, len(light)), -1, 0)
+    inside = np.swapaxes(free, 1, 2)[:, None] @ gains @ free[:, None]
+    shares = np.max(np.abs(inside), axis=(1, 2, 3)) > _UNDETERMINED * np.max(np.abs(gains), axis=(1, 2, 3))
+    return np.asarray(shares.reshape(point.shape))
+
+
+@question
+def _late_entries(model: Model) -> list[sp.Expr]:
+    """Slope of the force on each coordinate by each place and speed, at each delay, by rows (n, n); empty without."""
+    linear = linearise(model)
+    places = {symbol: one for one in model.coordinates for symbol in (one.displacement, one.velocity)}
+    found = []
+    for symbol, (base, _) in model.late.items():
+        if base in places:
+            found += [
+                linear.rows[row.velocity][symbol] if column is places[base] else sp.Integer(0)
+                for row in model.coordinates for column in model.coordinates
+            ]  # fmt: skip
+    return found
+
+
+def _light(point: OperatingPoint) -> np.ndarray:
+    """True for each coordinate without inertia, (..., n)."""
+    model, inertial = point.model, _inertial(point.model)
+    light = np.broadcast_to(~inertial, (*point.shape, len(inertial))).copy()
+    masses = point.evaluate(model.function([one.inertia for one in model.coordinates if one.inertial]))
+    for i, mass in zip(np.flatnonzero(inertial), masses, strict=True):
+        light[..., i] = np.asarray(mass) == 0
+    return light
 
 
 def _inertial(model: Model) -> np.ndarray:
@@ -139,6 +185,17 @@ def _determined_in_general(model: Model) -> int:
 
 def _determined(values: np.ndarray, light: np.ndarray) -> np.ndarray:
     """Rank (rigs,) of dampings and contacts on the coordinates `light` (rigs, n); values (entries, rigs)."""
+    return np.asarray(np.linalg.matrix_rank(_resistance(values, light), tol=_UNDETERMINED))
+
+
+def _damped(values: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Symmetric matrix (rigs, n, n) that vanishes for motions which neither dampings nor contacts resist."""
+    whole = _resistance(values, light)
+    return np.asarray(np.swapaxes(whole, 1, 2) @ whole + np.eye(light.shape[-1]) * ~light[:, None, :])
+
+
+def _resistance(values: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Dampings and contacts on the coordinates `light` (rigs, n), made dimensionless, (rigs, n, n)."""
     n = light.shape[-1]
     table = np.moveaxis(values.reshape(-1, n, len(light)), -1, 0) * light[:, None, :]
     dampings, slips = table[:, :n] * light[..., None], table[:, n:]
@@ -146,8 +203,7 @@ def _determined(values: np.ndarray, light: np.ndarray) -> np.ndarray:
     size = np.where(size > 0, size, 1.0)
     lengths = np.linalg.norm(slips, axis=-1, keepdims=True)
     slips = slips / np.where(lengths > 0, lengths, 1.0)
-    whole = dampings / (size[:, :, None] * size[:, None, :]) + np.swapaxes(slips, 1, 2) @ slips
-    return np.asarray(np.linalg.matrix_rank(whole, tol=_UNDETERMINED))
+    return np.asarray(dampings / (size[:, :, None] * size[:, None, :]) + np.swapaxes(slips, 1, 2) @ slips)
 
 
 @question

@@ -26,6 +26,7 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import steady_states
 from steadyslip.model.steady_results import SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
+from steadyslip.verdict.causes import undecided_without_mass
 from steadyslip.verdict.checks import critical_check, edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import as_dict
 from steadyslip.verdict.findings import Findings
@@ -131,7 +132,8 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
         numbers = numbers_of(rig, values)
         on_the_edge = bool(on_edge(values)) or decided_by_rounding(values)
         checks = verdict_checks(rig, values, numbers["stable"], on_the_edge)
-        if doubt := undecided(checks):
+        posed = numbers["growth_rate"] != math.inf
+        if doubt := undecided(checks) or ("" if posed else undecided_without_mass(rig, branch)):
             return Analysis(rig=rig, stable=None, reason=doubt, margins=(), checks=checks, version=__version__)
         distances, of_edges = edge_checks(rig, *margins_and_missing(rig, branch), branch)
         checks += of_edges

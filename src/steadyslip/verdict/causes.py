@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from steadyslip.core.checks import UNDECIDED
 from steadyslip.linear.cubic import coefficients, hopf_line
 from steadyslip.linear.response import Response, has_closed_form, response_numbers
 from steadyslip.linear.roots import quietly
-from steadyslip.linear.spectrum import outweighing_delays
+from steadyslip.linear.search import Search
+from steadyslip.linear.spectrum import is_stable, outweighing_delays
 from steadyslip.linear.stiffness import stiffness_polynomials
+from steadyslip.machine.rig import Rig
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.posed import late_on_springs
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
@@ -116,11 +120,45 @@ DELAY_IS_ILL_POSED = (
 )
 """Reason given for a rig that a delay makes ill-posed; {delays} are dotted parameter names."""
 
+LATE_ON_SPRINGS = (
+    "the equations are ill-posed: on a body without mass that only springs hold, a force follows its motion late, so "
+    "that with a mass, however small, ever faster oscillations grow; give that body damping, or the mass that it has"
+)
+"""Reason given for a rig that is ill-posed by a delayed force on a body without mass and without damping."""
+
+NEEDS_MASS = (
+    UNDECIDED + "without mass nothing slows down a change of velocity at once (no direct effect, no damping), and the "
+    "equations are ill-posed; with mass, however small, steady sliding is stable: give {names} a value"
+)
+"""Reason given where steady sliding is not judged without mass; {names} are dotted parameter names."""
+
+_SMALL = np.array([1e-3, 1e-6, 1e-9])  # masses relative to their natural sizes, as samples of ever smaller ones
+
 
 def why_delay_is_ill_posed(point: OperatingPoint) -> str:
-    """Sentence that names the delays which make a single rig ill-posed; empty where none does."""
+    """Sentence on the delays which make a single rig ill-posed; empty where none does."""
+    if late_on_springs(point):
+        return LATE_ON_SPRINGS
     delays = outweighing_delays(point)
     return DELAY_IS_ILL_POSED.format(delays=" and ".join(delays)) if delays else ""
+
+
+@quietly
+def undecided_without_mass(rig: Rig, branch: int = 0) -> str:
+    """Why an ill-posed rig without delay is not judged: it is stable with masses, however small, where it has none.
+
+    So are bristles without damping whose friction rises with velocity: nothing slows a change of velocity down at once,
+    yet the oscillation of a small mass on them decays at a rate that does not depend on the mass. Empty for others.
+    """
+    massless = [
+        name for name, one in rig.parameters().items()
+        if one.value == 0 and one.role.structural and one.role.unit.startswith("kg")
+    ]  # fmt: skip
+    if not massless or operating_point(rig, branch=branch).model.delays:
+        return ""
+    sizes = {name: Search(rig, name, (name,), branch).natural_size() for name in massless}
+    light = operating_point(rig, {name: size * _SMALL for name, size in sizes.items()}, branch=branch)
+    return NEEDS_MASS.format(names=" and ".join(massless)) if np.all(is_stable(light)) else ""
 
 
 @quietly

@@ -27,7 +27,7 @@ from steadyslip.model.range import require_range
 from steadyslip.model.sliding import steady_machine
 from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
-from steadyslip.verdict.causes import why_delay_is_ill_posed
+from steadyslip.verdict.causes import undecided_without_mass, why_delay_is_ill_posed
 from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, finite, onset_dict
 from steadyslip.verdict.findings import MachineFindings
@@ -134,14 +134,15 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
         numbers = linear_numbers(point)  # refuses what cannot be counted, before the edges are looked for
         edged = bool(on_edge(point)) or decided_by_rounding(point)
         checks = verdict_checks(machine, point, numbers["stable"], edged, steady)
-        if doubt := undecided(checks):
+        posed = numbers["growth_rate"] != math.inf
+        if doubt := undecided(checks) or ("" if posed else undecided_without_mass(machine)):
             return MachineAnalysis(
                 rig=machine, stable=None, reason=doubt, margins=(), checks=checks, version=__version__
             )
         distances, of_edges = edge_checks(machine, *margins_and_missing(machine), 0)
         undamped = bool(is_undamped(point))
-        posed = numbers["growth_rate"] not in (math.inf, None)
-        leading = next(iter(numbers["eigenvalues"] if posed else ()), None)
+        known = numbers["growth_rate"] not in (math.inf, None)
+        leading = next(iter(numbers["eigenvalues"] if known else ()), None)
         onset = None if point.model.delays or undamped else _onset(machine, distances)
         found = MachineAnalysis(
             rig=machine,

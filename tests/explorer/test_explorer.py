@@ -10,7 +10,7 @@ import sympy as sp
 from hypothesis import assume, given, settings, strategies as st
 
 import steadyslip as ss
-from explored import Explored, compared, library
+from explored import Explored, compared, library, page_modules
 from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from moved import motion_text
@@ -19,7 +19,7 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.quantities import parse
 from steadyslip.explorer.assembly import page_parts
 from steadyslip.explorer.equations import _stable_set_programs, _verdict_values, linear_part
-from steadyslip.explorer.minify import minify, minify_generated, share_numbers, shorten_names
+from steadyslip.explorer.minify import minify, minify_generated, share_numbers, shorten_declared, shorten_names
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
@@ -173,6 +173,17 @@ def test_what_cannot_be_printed_is_refused_in_words():
         linear_part(rig(contact=Turning(preload=SIGMA)))
 
 
+def test_names_of_modules_are_shortened_where_they_name_nothing_else():
+    """Not those of properties, methods and fields, in text, or in use elsewhere; also in templates, after spreads."""
+    own = "const LIMIT=3,SHARED=4;const sizes=(many)=>[...many,LIMIT];class Box{kept=1;measured(){return SHARED}}\n"
+    own += "const kept=2,measured=`text ${sizes([LIMIT])[0]} {}`,text='a';const known=(a)=>a?LIMIT:SHARED;"
+    declared = ("LIMIT", "SHARED", "sizes", "Box", "kept", "measured", "text", "known")
+    assert shorten_declared(own, declared, {"known"}) == (
+        "const b=3,c=4;const d=(many)=>[...many,b];class e{kept=1;measured(){return c}}\n"
+        "const kept=2,measured=`text ${d([b])[0]} {}`,text='a';const known=(a)=>a?b:c;"
+    )
+
+
 def test_shortened_code_says_the_same():
     """Comments, types and spaces go; what is within a line of code, and text in quotes, stays."""
     text = (
@@ -227,9 +238,13 @@ TEXT = st.text(max_size=200) | st.lists(
 @pytest.fixture(scope="module")
 def page_of_own():
     """The Rig of a page, as it is on the page."""
-    code, known = page_parts(OWN, "A rig", 0)
+    known = page_parts(OWN, "A rig", 0)[1]
+    return scripted(OWN, known), known
+
+
+def scripted(own, known):
     made = f"const known = {json.dumps(known)};\nconst rig = new Rig(known, programs);"
-    return Script(f"{code}\n{made}"), known
+    return Script(f"{page_modules()}\nconst programs = {linear_part(own)[0]};\n{made}")
 
 
 @settings(max_examples=60, deadline=None)
@@ -284,8 +299,8 @@ velocity = "86.4 mm/day"
 def page_of_user():
     """The same of a user's file, in units of all kinds."""
     own = ss.rig_from_text(WRITTEN)
-    code, known = page_parts(own, "A rig", 0, WRITTEN)
-    return Script(f"{code}\nconst known = {json.dumps(known)};\nconst rig = new Rig(known, programs);"), known, own
+    known = page_parts(own, "A rig", 0, WRITTEN)[1]
+    return scripted(own, known), known, own
 
 
 VARIED = [f"friction.{name}" for name in ("a", "d_c", "v_ref")]
@@ -319,8 +334,7 @@ const once = turns.slice(0, 9);"""
 
 def test_a_path_that_goes_round_and_round_is_as_long_as_the_drawing_can_show():
     """Tens of thousands of turns over the same way would take a browser seconds at each repaint."""
-    code = page_parts(OWN, "A rig", 0)[0]
-    script = Script(f"{code}\n{TURNS}")
+    script = Script(f"{page_modules()}\n{TURNS}")
     path = script("drawn")
     assert len(path) < 60_000
     points = np.array([part.split() for part in re.findall(r"[\d.]+ [\d.]+", path)], dtype=float)

@@ -11,6 +11,7 @@ import pytest
 
 import steadyslip as ss
 from javascript import Script
+from steadyslip.explorer.assembly import MODULES
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import driver, motion_part
 from steadyslip.kernels.printers import javascript
@@ -28,6 +29,14 @@ BAR = 1e-12
 def library():
     web = files("steadyslip.explorer.web")
     modules = [web.joinpath(name).read_text(encoding="utf-8") for name in ("polynomials.js", "modes.js", "linear.js")]
+    return javascript.as_script(javascript.runtime(), *modules)
+
+
+@cache
+def page_modules():
+    """Modules of a page in one scope, with the names that their files have."""
+    web = files("steadyslip.explorer.web")
+    modules = [web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in MODULES]
     return javascript.as_script(javascript.runtime(), *modules)
 
 

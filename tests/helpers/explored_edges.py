@@ -14,7 +14,6 @@ import re
 import time
 import warnings
 from functools import cache
-from importlib.resources import files
 from itertools import product
 from pathlib import Path
 
@@ -22,13 +21,13 @@ import numpy as np
 
 import steadyslip as ss
 import users_laws
+from explored import page_modules
 from javascript import Script
 from machines import at_random
 from rigs_of_theory import CONTACTS, LAWS, V0, rig
 from steadyslip.core.format import typeset
-from steadyslip.explorer.assembly import MODULES, _data
+from steadyslip.explorer.assembly import _data
 from steadyslip.explorer.equations import linear_part
-from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
@@ -67,10 +66,7 @@ class Edges:
         self.data = _data(rig, "rig", 0, facts, "")
         self.names = [one["name"] for one in self.data["parameters"]]
         self.home = [one["value"] for one in self.data["parameters"]]
-        web = files("steadyslip.explorer.web")
-        modules = [web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in MODULES]
-        whole = javascript.as_script(javascript.runtime(), *modules)
-        self.script = Script(f"{whole}\nconst programs = {text}, data = {json.dumps(self.data)};\n{_ASK}")
+        self.script = Script(f"{page_modules()}\nconst programs = {text}, data = {json.dumps(self.data)};\n{_ASK}")
 
     def __call__(self, values, coarse=False):
         """`found` of each parameter, `edges` as listed with their words, and the `status`."""

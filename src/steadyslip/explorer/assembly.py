@@ -23,6 +23,7 @@ from steadyslip.explorer.minify import (
     minify_css,
     minify_generated,
     share_numbers,
+    shorten_declared,
     shorten_names,
 )
 from steadyslip.explorer.motion import DRIVER, driver, motion_part
@@ -52,6 +53,8 @@ MODULES = (
     "page",
 )  # fmt: skip
 """Modules of the page in `web/`, each after those that it imports."""
+ENTRIES = ("mount", "render")
+"""Functions of the modules that the page and its widget call."""
 DEFAULTS = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
 """Entries of a parameter that a page leaves out; `web/rig.js` has the same defaults."""
 WORKER_MODULES = ("motion",)
@@ -139,7 +142,12 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
         still = str(refused)
     modules = [_read_web(f"{name}.js") for name in MODULES]
     library = [_read_web(f"{name}.js") for name in WORKER_MODULES]
-    script = minify(javascript.as_script(javascript.runtime(), *modules))
+    modules.insert(0, javascript.runtime())
+    script = shorten_declared(
+        minify(javascript.as_script(*modules)),
+        javascript.declared_names(*modules),
+        {*ENTRIES, *javascript.runtime_names()},
+    )
     worker = minify(javascript.as_script(javascript.runtime(), *library)) + _minified(driven, DRIVER)
     known = _data(rig, title, branch, facts, file) | {
         "motion": moving,

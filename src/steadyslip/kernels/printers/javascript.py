@@ -32,6 +32,14 @@ def runtime_names() -> set[str]:
     return set(_EXPORTED.findall(runtime()))
 
 
+def declared_names(*modules: str) -> list[str]:
+    """Names that modules declare at their outermost level."""
+    names = [name for module in modules for name in _DECLARED.findall(module)]
+    return names + [
+        name for module in modules for line in _FURTHER[0].findall(module) for name in _FURTHER[1].findall(line)
+    ]
+
+
 def as_script(*modules: str) -> str:
     """Join modules into one scope, without their imports from each other and `export`.
 
@@ -40,8 +48,7 @@ def as_script(*modules: str) -> str:
     InternalError
         If two modules declare the same name at their outermost level.
     """
-    names = [name for module in modules for name in _DECLARED.findall(module)]
-    names += [name for module in modules for line in _FURTHER[0].findall(module) for name in _FURTHER[1].findall(line)]
+    names = declared_names(*modules)
     if twice := {name for name in names if names.count(name) > 1}:
         raise InternalError(f"one JavaScript module to declare {', '.join(sorted(twice))}, not several")
     return "\n".join(_EXPORT.sub("", _IMPORT.sub("", module)) for module in modules)

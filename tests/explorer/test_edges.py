@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+import users_laws
 from explored_edges import Edges, judged, other_edges, walked
+from rigs_of_theory import SIGMA, V0, rate_state, rig
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.verdict.words import BEYOND
 
@@ -85,7 +87,8 @@ def test_while_a_hand_moves_a_slider_the_nearest_edges_are_those_at_rest(name):
 def test_every_kind_of_edge_has_the_words_of_python():
     """Also where what is asked for words is not what the list says."""
     there = page("inclined-spring")
-    words = "beyondWords({ i: 0, beyond, behind }, { rig, answer: { status: now }, with: (i, x) => rig.values })"
+    as_page = "{ rig, answer: { status: now }, with: (i, x) => rig.values }"
+    words = f"beyondWords({{ i: 0, at: data.parameters[0].value, beyond, behind }}, {as_page})"
     for beyond, now, allowed in (
         (STABLE, UNSTABLE, {"becomes stable"}),
         (UNSTABLE, STABLE, {BEYOND[kind] for kind in ("oscillatory", "divergence", "ill-posed")}),
@@ -109,6 +112,30 @@ def test_a_curve_that_has_died_out_has_no_slope():
     for exponent in (500.3, 546.8, 549.3, 551.3):
         values = [exponent if n == i else one for n, one in enumerate(there.home)]
         assert there.script("rig.status(i, x)", i=i, x=exponent) == STABLE == judged(there.own(values))[0]
+
+
+def test_beside_lock_up_growth_is_told_as_in_python():
+    """A thousandth beyond the edge in a or b the pair that crossed is real already; it began as an oscillation."""
+    memory = ss.laws.PrakashClifton()
+    gripped = rig(
+        friction=rate_state(normal_memory=memory), contact=ss.laws.SelfEnergising(preload=SIGMA, gain=0.4),
+        stiffness=9e9, drive=ss.machine.PD(V0, kp=2e10, kd=1e9),
+    )  # fmt: skip
+    there = Edges(gripped)
+    (locks,) = [one for one in there(there.home)["edges"] if there.names[one["i"]] == "friction.mu_ref"]
+    values = [locks["landing"] if i == locks["i"] else one for i, one in enumerate(there.home)]
+    wrong, edges = other_edges(there, values)
+    assert wrong == []
+    words = {there.names[one["i"]]: one["words"] for one in edges}
+    assert words["friction.a"] == words["friction.b"] == BEYOND["oscillatory"]
+
+
+def test_edges_far_from_a_value_are_found_near_its_natural_size():
+    """Python searches six decades to each side of both."""
+    there = Edges(users_laws.USERS["contact law"])
+    (edge,) = [one["at"] for one in there(there.home)["edges"] if there.names[one["i"]] == "contact.share"]
+    assert edge == pytest.approx(ss.boundary(there.rig, "contact.share")[0].value, rel=1e-9)
+    assert edge > 1e6 * there.rig.value("contact.share")
 
 
 def test_thin_parts_of_a_track_are_seen_and_leave_the_own_place():

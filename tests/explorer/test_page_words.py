@@ -6,11 +6,8 @@ from functools import cache
 import pytest
 
 import steadyslip as ss
-from explored_edges import Edges
+from explored_edges import Edges, in_python, written
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
-from steadyslip.core.format import typeset
-from steadyslip.verdict.causes import why_always_stable, why_never_stable
-from steadyslip.verdict.words import headline
 
 BRISTLES = ss.laws.LuGre(
     mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
@@ -46,33 +43,15 @@ def page(name):
     return Edges(RIGS[name])
 
 
-def on_page(there, values):
-    ask = """(() => {
-      rig.values = values;
-      const answer = rig.assess(), speed = Banner.prototype.speed.call({ data, page: { rig } }, answer);
-      return [headline(answer, speed, data), reason(answer, data)].map((text) => text.replaceAll("−", "-"));
-    })()"""
-    return there.script(ask, values=values)
-
-
-def in_python(own):
-    """Without the cause of a verdict on every stiffness, which a page does not look for."""
-    found = ss.analyze(own)
-    why = found.reason
-    if found.stable is not None:
-        why = why.removesuffix(why_always_stable(found) or ":").removesuffix(why_never_stable(found) or ":")
-    else:  # the hint of a contact in its own terms
-        why = why.partition(";")[0]
-    return [
-        typeset(text).replace("−", "-") for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")
-    ]
-
-
 def compared(name, **changes):
     there = page(name)
     own = {there.own(there.home).resolve(key): value for key, value in changes.items()}
     values = [own.get(key, value) for key, value in zip(there.names, there.home, strict=True)]
-    mine, theirs = on_page(there, values), in_python(there.own(values))
+    told = there(values)
+    mine, theirs = (
+        [written(told["headline"]), written(told["reason"])],
+        in_python(ss.analyze(there.own(values)), is_machine=False),
+    )
     assert mine == theirs
     return " ".join(mine)
 

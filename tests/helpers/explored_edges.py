@@ -10,6 +10,7 @@ edges and refusals there were.
 
 import argparse
 import json
+import math
 import re
 import time
 import warnings
@@ -31,7 +32,7 @@ from steadyslip.explorer.equations import linear_part
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
-from steadyslip.verdict.causes import why_always_stable, why_never_stable
+from steadyslip.verdict.causes import ILL_POSED, why_always_stable, why_never_stable
 from steadyslip.verdict.words import edge_rows, headline, is_undecided
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -97,14 +98,13 @@ def judged(rig):
 
 
 def in_python(found, is_machine):
-    """First line and reason of an analysis as a page writes them: without causes, which a page does not look for."""
+    """First line and reason of an analysis as a page writes them: without causes and hints, which it does not have."""
     why = found.reason
-    if is_machine:
-        pass
-    elif found.stable is not None:
-        why = why.removesuffix(why_always_stable(found) or ":").removesuffix(why_never_stable(found) or ":")
-    else:  # the hint of a contact in its own terms
+    if found.stable is None:  # the hint of a contact in its own terms
         why = why.partition(";")[0]
+    elif not is_machine:
+        why = why.removesuffix(why_always_stable(found) or ":").removesuffix(why_never_stable(found) or ":")
+        why = ILL_POSED if found.growth_rate == math.inf else why
     return [written(text) for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")]
 
 

@@ -252,7 +252,7 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     one = rig.parameters()[name]
     domain, value = one.role.domain, float(one.value or 0.0)
     factor, unit = display_unit(rig, one.role.unit)
-    natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
+    natural = Search(rig, name, present_zeros(rig), branch).natural_size()
     group = _group(rig, name)
     found = {
         "name": name,

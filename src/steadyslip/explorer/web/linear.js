@@ -161,7 +161,7 @@ export class Linear {
     const observed = this.ask("observables", facts.observed.length);
     return {
       ...answer, eigenvalues, intervals, ends, p, q, critical, share, gain, stiffness: own,
-      illPosed, side,
+      illPosed, side, still: c[0],
       held: held && { ...held, ...nearestEnd(held.intervals, held.ends, gain) },
       frequency: critical === null ? null : edgewise,
       onEdge: !illPosed && this.edgeDecides(eigenvalues, statics <= facts.edge),
@@ -294,7 +294,7 @@ export class Linear {
 
 const NOTHING = {
   eigenvalues: /** @type {Complex[]} */ ([]), intervals: /** @type {Interval[]} */ ([]), ends: [], p: [], q: [], critical: null, side: null,
-  frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false, held: null,
+  frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, still: NaN, onEdge: false, held: null,
   observed: /** @type {Record<string, number>} */ ({}),
 };
 

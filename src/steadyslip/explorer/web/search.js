@@ -60,13 +60,13 @@ class Search {
 
   /** Search range and its sample values, as a function of the index 0 to `count`. @param {[number, number]} [range] */
   whole(range) {
-    const { one, rig: { values }, i, fewer } = this, value = Math.abs(values[i]) || one.natural;
+    const { one, rig: { values }, i, fewer } = this, value = Math.abs(values[i]) || one.natural, [least, most] = this.coarse ? [value, value] : [value, one.natural].sort((a, b) => a - b);
     if (one.high !== null) {
       const least = one.low ?? 0, inset = 1e-9 * (one.high - least), low = one.lowAllowed ? least : least + inset, high = one.highAllowed ? one.high : one.high - inset;
       return { low, high, stretches: [{ at: (n) => low + ((high - low) * n * fewer) / LINEAR, count: Math.floor(LINEAR / fewer) }] };
     }
     const [first, last] = range ?? [value, value], both = one.low === null || one.low < 0;
-    const low = Math.min(value / FURTHEST, first > 0 ? first : value) || Number.MIN_VALUE, high = Math.min(Number.MAX_VALUE, Math.max(value * FURTHEST, last, -first));
+    const low = Math.min(least / FURTHEST, first > 0 ? first : value) || Number.MIN_VALUE, high = Math.min(Number.MAX_VALUE, Math.max(most * FURTHEST, last, -first));
     const ratio = Math.log(high) - Math.log(low), count = Math.min(AT_MOST, Math.ceil((ratio / Math.LN10) * (PER_DECADE / fewer)));
     const above = (n) => (n < count ? low * Math.exp((ratio * n) / count) : high), stretches = [{ at: above, count }];
     if (both) stretches.push({ at: (n) => -above(n), count });

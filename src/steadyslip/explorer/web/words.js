@@ -1,5 +1,5 @@
 // Sentences of the page about verdicts and motions.
-import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { ABSENT, SAME, STABLE, UNKNOWN } from "./linear.js";
 import { fill } from "./modes.js";
 import { digits, shown, told } from "./quantities.js";
 import { NEW } from "./rig.js";
@@ -88,11 +88,14 @@ function kindBeyond(answer) {
 const ofContact = (words, answer, { contacts }) => (answer.status === ABSENT && contacts[answer.contact] ? words.replace(/^it /, `${contacts[answer.contact]} `) : words);
 
 /** Phrase for what happens beyond an edge, as in Python. @param {any} edge @param {any} page */
-export function beyondWords({ i, beyond, behind }, page) {
+export function beyondWords({ i, at, beyond, behind }, page) {
   if (beyond === STABLE) return "becomes stable";
   if (beyond !== ABSENT && page.answer.status === ABSENT) return "slides steadily, but unstable";
-  const answer = page.rig.assess(page.with(i, behind)), { beyond: words, facts } = page.rig.data;
-  return ofContact(words[kindBeyond({ ...answer, status: beyond })], answer, facts);
+  const { beyond: words, facts } = page.rig.data, there = (value) => page.rig.assess(page.with(i, value)), answer = there(behind);
+  if (beyond === ABSENT) return ofContact(words[kindBeyond({ ...answer, status: beyond })], answer, facts);
+  const step = SAME * Math.abs(at) || Math.abs(behind), below = there(at - step), above = there(at + step); // decided at the edge, as in steadyslip/linear/search.py
+  if (below.illPosed !== above.illPosed) return words["ill-posed"];
+  return words[below.still * above.still > 0 && below.eigenvalues.some(({ im }) => im) ? "oscillatory" : "divergence"];
 }
 
 /** Text of a ratio, with enough digits to differ from 1. */

@@ -12,6 +12,7 @@ import argparse
 import json
 import math
 import re
+import tempfile
 import time
 import warnings
 from functools import cache
@@ -22,7 +23,9 @@ import numpy as np
 
 import steadyslip as ss
 import users_laws
+from browser import chromium, driver
 from explored import page_modules
+from explored_pages import Visit
 from javascript import Script
 from machines import at_random
 from rigs_of_theory import CONTACTS, LAWS, V0, rig
@@ -180,6 +183,53 @@ def walked(page, chance, presses):
     return wrong
 
 
+def read_in_browser(visit):
+    """First line, reason and list of nearest edges (name, text) of a page that is open."""
+    rows = visit.page.locator(".edges li")
+    listed = rows.evaluate_all("all => all.map((one) => [one.firstChild.dataset.name, one.textContent])")
+    return visit.sentence(), visit.page.locator(".verdict p").first.inner_text(), dict(listed)
+
+
+def pressed(page, chance, browser, file):
+    """Differences of a page in a browser from V8 and from Python, at values drawn at random, each listed edge pressed.
+
+    Returns them in words, and how many edges were pressed.
+    """
+    home = page.at_random(chance)
+    wrong, edges = other_edges(page, home)
+    ss.explore(page.rig).save(file)
+    changed = [
+        f"{name}={value!r}" for name, value, own in zip(page.names, home, page.home, strict=True) if value != own
+    ]
+    with Visit(browser, file, f"#{'&'.join(changed)}") as visit:
+        for edge in [None, *edges]:
+            values = home
+            if edge is not None:
+                name = page.names[edge["i"]]
+                values = [edge["landing"] if i == edge["i"] else one for i, one in enumerate(home)]
+                visit.page.locator(f'.edges button[data-name="{name}"]').evaluate("one => one.click()")
+                wrong += [f"after {name} -> {edge['at']!r}: {one}" for one in other_edges(page, values)[0]]
+            wrong += [
+                f"in the browser at {values}: {one}" for one in _other_texts(page(values), page, read_in_browser(visit))
+            ]
+            if values != home:
+                visit.page.get_by_role("button", name="undo").click()
+        if "undefined" in visit.page.inner_text("body"):
+            wrong.append("undefined in the browser")
+    return wrong, len(edges)
+
+
+def _other_texts(told, page, seen):
+    """Texts of a page in V8 that are not in the browser."""
+    first, why, listed = seen
+    texts = {page.names[one["i"]]: (one["told"][1].replace(" ", "\xa0"), one["words"]) for one in told["edges"]}
+    wrong = [] if first == told["headline"] and why.startswith(told["reason"]) else [f"{first} {why} for {told}"]
+    wrong += [] if texts.keys() == listed.keys() else [f"edges of {sorted(listed)} for {sorted(texts)}"]
+    for name in texts.keys() & listed.keys():
+        wrong += [f"{name}: {text!r} not in {listed[name]!r}" for text in texts[name] if text not in listed[name]]
+    return wrong
+
+
 PAGES = sorted(path for path in EXAMPLES.glob("*.toml") if path.stem != "hunting-axis")
 PAGES += sorted(EXAMPLES.glob("machines/*.toml"))
 SLIDERS = list(product(LAWS.values(), (*CONTACTS, users_laws.CONTACT), (0.0, 1e6)))
@@ -207,22 +257,27 @@ def drawn(chance):
     return f"machine {seed}", Edges(at_random(seed)[0])
 
 
-def campaign(many, seed, presses):
-    """Print every difference; how many settings were read, and how many pages are refused in words."""
+def campaign(many, seed, presses, browser):
+    """Print every difference; how many settings were read, edges pressed, and pages refused in words."""
     chance = np.random.default_rng(seed)
-    counts = dict.fromkeys(("settings", "other", "refused"), 0)
+    counts = dict.fromkeys(("settings", "pressed", "other", "refused"), 0)
+    folder = Path(tempfile.mkdtemp())
     for _ in range(many):
         name = ""
         try:
             name, page = drawn(chance)
-            wrong = walked(page, chance, presses)
+            if browser:
+                found, count = pressed(page, chance, browser, folder / "rig.html")
+            else:
+                found, count = walked(page, chance, presses), presses
         except ss.NotAvailable as refused:
             counts["refused"] += 1
             print(f"{name}: refused, {str(refused)[:150]}", flush=True)
             continue
         counts["settings"] += 1
-        counts["other"] += bool(wrong)
-        for one in wrong:
+        counts["pressed"] += count
+        counts["other"] += bool(found)
+        for one in found:
             print(f"{name}: {one}", flush=True)
     print(counts, f"{time.process_time():.0f} CPU s")
 
@@ -232,6 +287,12 @@ if __name__ == "__main__":
     parser.add_argument("many", type=int)
     parser.add_argument("seed", type=int)
     parser.add_argument("--presses", type=int, default=1, help="listed edges pressed one after the other")
+    parser.add_argument("--browser", action="store_true", help="every listed edge is pressed, in Chromium")
     given = parser.parse_args()
     warnings.simplefilter("error")
-    campaign(given.many, given.seed, given.presses)
+    if given.browser:
+        with driver() as playwright:
+            opened = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+            campaign(given.many, given.seed, given.presses, opened)
+    else:
+        campaign(given.many, given.seed, given.presses, None)

@@ -20,7 +20,7 @@ from steadyslip.experiments.fitting.input_tables import MIN_RATE_STEP
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import FitSettings, faults
 from steadyslip.experiments.loading.loading import Loading, resting_rate
-from steadyslip.experiments.measured.clipped import without_clipped
+from steadyslip.experiments.measured.clipped import without_clipped, without_wild
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import spread
 from steadyslip.machine.input_units import in_units_of
@@ -77,7 +77,10 @@ def make_plan(
     if problems:
         raise ParameterError(problems)
     if weights is None:
-        many, options["weights"] = _averaged(tuple(without_clipped(record) for record in many))
+        many = tuple(without_clipped(record) for record in many)
+        if options.get("loss", "linear") == "linear":  # in other losses wild samples weigh little
+            many = tuple(without_wild(record) for record in many)
+        many, options["weights"] = _averaged(many)
     if options.get("calibrated") is not None:
         options["calibrated"] = FitSettings(calibrated=options["calibrated"]).calibrated
     if plan_protocol is not None:

@@ -19,7 +19,7 @@ from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, STRUCTURE
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
-from steadyslip.experiments.measured.clipped import CLIPPED
+from steadyslip.experiments.measured.clipped import CLIPPED, WILD
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 
@@ -113,13 +113,13 @@ def _chance(p: float) -> str:
     return f"{p:.2g}" if p > LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
 
 
-def _clipped(fit: FitNumbers) -> list[str]:
-    """Warnings on samples left out because their channel was full."""
+def _left_out(fit: FitNumbers) -> list[str]:
+    """Warnings on samples left out because their channel was full or they are wild."""
     return [
         f"{record.source}: {note}; give weights to keep them"
         for record in fit.plan.records
         for note in record.notes
-        if CLIPPED in note
+        if CLIPPED in note or WILD in note
     ]
 
 
@@ -133,7 +133,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _clipped(fit) + _outliers(fit) + _ends_off_model(fit)
+    found += list(fit.at_bounds) + _left_out(fit) + _outliers(fit) + _ends_off_model(fit)
     found += _vague_jumps(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
     found += loading_warnings(fit)
     if other := of_another(fit.version):

@@ -1,4 +1,4 @@
-"""Samples of a channel that was full: runs of its largest or smallest value, where no other samples are equal."""
+"""Samples of friction that are none: of a full channel (runs of its largest or smallest value), or wild ones."""
 
 from __future__ import annotations
 
@@ -8,12 +8,19 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.numerics.splitting import level_noise
 
 SHORTEST = 3  # samples of a run
 CHANCE = 1e-6  # of so long a run in a record whose samples are as often equal to their neighbour as the others of it
 GAP = 5  # samples between runs of one peak: noise brings the channel back below its limit for a moment
 STILL = 1e-3  # share of the median change from sample to sample below which a channel stands still
 CLIPPED = "at a limit of the channel"
+BESIDE = 2  # samples on each side with which a sample is compared
+WILD_SIZE, WILD_RANGE = 20.0, 4.0
+"""Least distance of a wild sample from the median of those beside it: in standard deviations of the noise, as
+`words.OUTLIER_SIZE`, and in ranges of those beside it, which a peak of friction raises too."""
+AFTER = 4  # samples after a change of the loading in which friction may have a peak of one sample
+WILD = "far off the samples beside"
 
 
 def without_clipped(record: Record) -> Record:
@@ -27,6 +34,33 @@ def without_clipped(record: Record) -> Record:
     first, last = record.time[full][[0, -1]]
     note = f"{np.sum(full)} samples from {first:.7g} to {last:.7g} s left out, friction is {CLIPPED}"
     return replace(record.taken(~full, note), commanded=record.loading)
+
+
+def without_wild(record: Record) -> Record:
+    """Record without single samples of friction that are far off those beside them, with a note.
+
+    Samples at a change of the loading are kept, and all where the displacement does not tell when it changes.
+    """
+    if record.loading.load is None or len(record) < 10 * BESIDE:
+        return record
+    out = wild(record.friction)
+    for _, _, change in record.loading.changes:
+        first, last = np.searchsorted(record.time, [change.earliest, change.latest + change.duration])
+        out[max(first - BESIDE, 0) : last + AFTER] = False
+    if not np.any(out):
+        return record
+    first, last = record.time[out][[0, -1]]
+    where = f"from {first:.7g} to {last:.7g} s" if last > first else f"at {first:.7g} s"
+    note = f"{np.sum(out)} of the samples {where} left out, friction is {WILD}"
+    return replace(record.taken(~out, note), commanded=record.loading)
+
+
+def wild(values: Array) -> Array:
+    """Mask (n,) of the samples of values (n,) that are far off those beside them."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, BESIDE, mode="reflect"), 2 * BESIDE + 1)
+    beside = np.delete(windows, BESIDE, axis=1)
+    away = np.abs(values - np.median(beside, axis=1))
+    return np.asarray((away > WILD_SIZE * level_noise(values)) & (away > WILD_RANGE * np.ptp(beside, axis=1)))
 
 
 def clipped(values: Array) -> Array:

@@ -106,8 +106,9 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: 
     theta = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(theta[0]), float(theta[-1])
     edges = _edges_of_ill_posed(p, q, sets, spare, theta)
-    beside = edges[:, None] * np.concatenate([1 - _TOWARDS, 1 + _TOWARDS])
-    theta = np.unique(np.append(theta, beside[(beside > low) & (beside < high)]))
+    if len(h) <= 2:  # counts are quick, also next to these edges
+        beside = edges[:, None] * np.concatenate([1 - _TOWARDS, 1 + _TOWARDS])
+        theta = np.unique(np.append(theta, beside[(beside > low) & (beside < high)]))
     lost = _ill_posed(p, q, sets, spare, theta)
     bound = np.where(lost, 0.0, _frequency_bound(p, q, sets, theta))
     turn = 2 * np.pi / max(float(np.max(h)), 1e-300)
@@ -155,16 +156,18 @@ def _known(
 
     They are at samples `known`, whose oscillations are slow enough to be followed. At others roots are counted: many of
     them grow, so that nothing near is stable; or an edge at which the equations become ill-posed is so close, with as
-    many roots as at the sample before, that it is the next.
+    many roots as at the sample before, that it is the next. With several delays counts there take too long, and it is
+    taken to be the next within the distance of two samples.
     """
-    ends = []
+    ends, close = [], _CLOSE if len(h) <= 2 else 10 ** (1 / _STEPS) - 1
     for order in (np.arange(len(theta))[theta >= 1], np.arange(len(theta))[theta <= 1][::-1]):
         last, place = float(theta[order[0]]), int(order[0])
         for at in order:
             if not known[at]:
-                count = int(count_right_if_feasible(p + theta[at] * q, h, sets))
                 near = np.min(np.abs(edges / theta[at] - 1), initial=np.inf)
-                if count == UNKNOWN and near > _CLOSE:
+                skipped = len(h) > 2 and near <= close
+                count = UNKNOWN if skipped else int(count_right_if_feasible(p + theta[at] * q, h, sets))
+                if count == UNKNOWN and near > close:
                     break
                 if UNKNOWN < count <= _FEW:
                     before = int(count_right_if_feasible(p + theta[place] * q, h, sets))

@@ -223,12 +223,15 @@ def edge_checks(
         return tuple(margins), tuple(checks)
     shares, touching = np.full(len(edges), np.inf), np.full(len(edges), np.inf)
     with at_most(_TERMS):
-        _find_sides(rig, edges, shares, SIDE_OFFSETS, branch)
-        lost = np.flatnonzero(np.isinf(shares))
+        posed = np.array([edge.kind != "ill-posed" for _, edge in edges])
+        several = len(operating_point(rig, branch=branch).model.delays) > 1  # too many roots close to ill-posed ones
+        _find_sides(rig, edges, shares, SIDE_OFFSETS, branch, posed | (not several))
+        lost = np.flatnonzero(np.isinf(shares) & posed)
         touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
         alone = [_room(*one) > max(FURTHER_OFFSETS) for one in edges]
-        slow = [edge.kind == "ill-posed" for _, edge in edges] | ((touching <= AXIS_TOLERANCE) & alone)
-        _find_sides(rig, edges, shares, FURTHER_OFFSETS, branch, slow)
+        slow = ~posed | ((touching <= AXIS_TOLERANCE) & alone)
+        for some in np.eye(len(edges), dtype=bool)[slow] if several else (slow,):  # as many roots as may be counted
+            _find_sides(rig, edges, shares, FURTHER_OFFSETS[::-1] if several else FURTHER_OFFSETS, branch, some)
     lost = np.flatnonzero(np.isinf(shares))
     for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
         where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")

@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 import steadyslip as ss
-from explored_edges import Edges, in_python, written
+from explored_edges import Edges, other_edges, written
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
 
 BRISTLES = ss.laws.LuGre(
@@ -47,13 +47,10 @@ def compared(name, **changes):
     there = page(name)
     own = {there.own(there.home).resolve(key): value for key, value in changes.items()}
     values = [own.get(key, value) for key, value in zip(there.names, there.home, strict=True)]
+    wrong, _ = other_edges(there, values)
+    assert wrong == []
     told = there(values)
-    mine, theirs = (
-        [written(told["headline"]), written(told["reason"])],
-        in_python(ss.analyze(there.own(values)), is_machine=False),
-    )
-    assert mine == theirs
-    return " ".join(mine)
+    return written(f"{told['headline']} {told['reason']}")
 
 
 @pytest.mark.parametrize(("name", "stiffness"), [

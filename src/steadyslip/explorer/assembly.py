@@ -45,7 +45,7 @@ from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import page_reasons
-from steadyslip.verdict.words import BEYOND, HEADLINES, REMOTE
+from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES, REMOTE
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
@@ -197,7 +197,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
         "absent": ABSENT,
         "remote": REMOTE,
-        "beyond": BEYOND,
+        "beyond": BEYOND | EDGE_WORDS,
         "judders": JUDDERS,
         "checks": _checks(rig, names, branch),
     }

@@ -29,7 +29,7 @@ from steadyslip.model.range import require_digits, require_range
 
 _TOO_MANY = "roots under the delays are too many there to be counted; shorten the delays"
 _TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
-_TIED = 6  # digits in which two distances are equal: an edge a thousandth away has lost three of its twelve
+_TIED = 6  # digits to which distances are compared, no closer than 1e-6: pages know edges to twelve
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,8 @@ def _urgency(margin: Margin) -> float:
         return np.inf
     if not margin.value and margin.unit != "rad":
         return 1e300
-    return float(f"{abs(margin.absolute if margin.unit == 'rad' else margin.relative):.{_TIED}g}")
+    distance = abs(margin.absolute if margin.unit == "rad" else margin.relative)
+    return float(f"{distance:.{_TIED}g}") if distance > 10.0**-_TIED else 0.0
 
 
 def present_zeros(rig: Rig) -> tuple[str, ...]:

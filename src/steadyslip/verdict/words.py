@@ -47,6 +47,14 @@ BEYOND = {
 }
 
 
+EDGE_WORDS = {
+    "stable": "becomes stable",
+    "unstable": "slides steadily, but unstable",
+    "here": "on the edge",
+    "beside": "on the edge, stable {side} it",
+}
+"""Phrases of the table of nearest edges beside those in `BEYOND`; pages use both."""
+
 QUIET = "no disturbance grows"
 """Phrase on the quiet side of an edge of an undamped rig."""
 
@@ -355,13 +363,13 @@ def _margin_row(analysis: Verdict, margin: Margin, edge: Boundary) -> tuple[str,
         change = f"{100 * margin.relative:+.4g} %"
     towards = "above" if margin.absolute > 0 or (margin.absolute == 0 and edge.stable == "below") else "below"
     if analysis.on_edge and abs(margin.absolute) <= NEXT_TO_IT * abs(margin.value):
-        change, words = "0", f"on the edge, stable {edge.stable} it" if edge.stable != "neither" else "on the edge"
+        change, words = "0", EDGE_WORDS["here" if edge.stable == "neither" else "beside"].format(side=edge.stable)
     elif edge.stable == towards:
-        words = "becomes stable"
+        words = EDGE_WORDS["stable"]
     elif edge.quiet == towards:
         words = QUIET
     elif analysis.stable is None:
-        words = "slides steadily, but unstable"
+        words = EDGE_WORDS["unstable"]
     else:
         words = beyond(edge)
     return (

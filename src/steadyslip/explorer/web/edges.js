@@ -1,9 +1,10 @@
 // Nearest edge of every parameter, and values just beside it.
 import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
 import { inside } from "./rig.js";
+import { NEXT_TO_IT } from "./words.js";
 
 export const BESIDE = 1e-3; // distance from an edge of the value set by "go there", over the value at the edge
-const TIED = 6; // digits in which two distances are equal, as in steadyslip/linear/boundary.py
+const TIED = 6; // digits to which distances are compared, as in steadyslip/linear/boundary.py
 
 /**
  * Nearest edge of every parameter, nearest first: value, status behind it, far or not, and two values close to it:
@@ -12,7 +13,7 @@ const TIED = 6; // digits in which two distances are equal, as in steadyslip/lin
  */
 export function edgesOf(page) {
   const { remote } = page.rig.data; // ratio to the own value above which an edge counts as far
-  const found = /** @type {{i: number, at: number, gap: number, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
+  const found = /** @type {{i: number, at: number, gap: number, stable: string, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
   page.rig.data.parameters.forEach((one, i) => {
     const value = page.rig.values[i], { edges, low, high } = page.found[i], size = one.unit === "rad" ? 1 : Math.abs(value);
     let best = null;
@@ -25,7 +26,7 @@ export function edgesOf(page) {
       const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < remote && times > 1 / remote);
       const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // true if the side to land on is behind the edge
       const room = (up) => (up ? (edges[n + 1]?.at ?? high) : (edges[n - 1]?.at ?? low)) - at;
-      best = { i, at, gap, distance: size ? Number((gap / size).toPrecision(TIED)) : Infinity, beyond, far, landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)) };
+      best = { i, at, gap, stable: above === STABLE ? "above" : below === STABLE ? "below" : "", distance: !size ? Infinity : gap > NEXT_TO_IT * size ? Number((gap / size).toPrecision(TIED)) : 0, beyond, far, landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)) };
     });
     if (best) found.push(best);
   });

@@ -6,7 +6,7 @@ import { Locus } from "./locus.js";
 import { words } from "./modes.js";
 import { digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
-import { beyondWords, named, quantity } from "./words.js";
+import { NEXT_TO_IT, beyondWords, named, quantity } from "./words.js";
 
 /** Legend of the root locus: meaning, path and class of each mark. */
 const MARKS = [
@@ -32,6 +32,7 @@ function change(one, value, at) {
   const sign = at < value ? "" : "+", ratio = at / value, few = (share) => `${sign}${digits(share, 3)}`;
   if (one.unit === "rad") return `${few(((at - value) * one.factor * 180) / Math.PI)}\u00a0deg`;
   if (!value) return "from zero";
+  if (Math.abs(ratio - 1) <= NEXT_TO_IT) return "0";
   return (ratio > 0 && ratio < 0.1) || Math.abs(ratio) > 10 ? `×\u00a0${digits(ratio, 3)}` : `${few(100 * (at - value) / Math.abs(value))}\u00a0%`;
 }
 

@@ -27,7 +27,7 @@ export function kindOf(answer) {
 }
 
 const UNFIT = "A number leaves its range, or breaks a condition that several obey together.";
-const NEXT_TO_IT = 1e-6; // relative distance from the edge that counts as on it; as in steadyslip/verdict/reasons.py, whose phrases are used here
+export const NEXT_TO_IT = 1e-6; // relative distance from the edge that counts as on it; as in steadyslip/verdict/reasons.py, whose phrases are used here
 
 /** Headline of the verdict. @param {string} speed velocity with its preposition, "at" or "of" */
 export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)] ?? "Numbers outside what a rig can have", { speed });
@@ -88,10 +88,12 @@ function kindBeyond(answer) {
 const ofContact = (words, answer, { contacts }) => (answer.status === ABSENT && contacts[answer.contact] ? words.replace(/^it /, `${contacts[answer.contact]} `) : words);
 
 /** Phrase for what happens beyond an edge, as in Python. @param {any} edge @param {any} page */
-export function beyondWords({ i, at, beyond, behind }, page) {
-  if (beyond === STABLE) return "becomes stable";
-  if (beyond !== ABSENT && page.answer.status === ABSENT) return "slides steadily, but unstable";
-  const { beyond: words, facts } = page.rig.data, there = (value) => page.rig.assess(page.with(i, value)), answer = there(behind);
+export function beyondWords({ i, at, gap, stable, beyond, behind }, page) {
+  const { answer: now, rig: { values, data: { beyond: words, facts } } } = page;
+  if (now.onEdge && gap <= NEXT_TO_IT * Math.abs(values[i])) return stable ? fill(words.beside, { side: stable }) : words.here;
+  if (beyond === STABLE) return words.stable;
+  if (beyond !== ABSENT && now.status === ABSENT) return words.unstable;
+  const there = (value) => page.rig.assess(page.with(i, value)), answer = there(behind);
   if (beyond === ABSENT) return ofContact(words[kindBeyond({ ...answer, status: beyond })], answer, facts);
   const step = SAME * Math.abs(at) || Math.abs(behind), below = there(at - step), above = there(at + step); // decided at the edge, as in steadyslip/linear/search.py
   if (below.illPosed !== above.illPosed) return words["ill-posed"];

@@ -24,6 +24,9 @@ def test_derived_numbers_are_those_of_the_rig_and_their_errors_those_of_draws():
     stress = fitted.contact.steady_normal_stress
     level = draws["friction.a"] - draws["friction.b"]
     edge = -stress * level / draws["friction.d_c"]
+    assert fit["k_c"] == found["k_c"]
+    np.testing.assert_allclose(draws["k_c"], edge, rtol=1e-9)
+    assert f"  a - b  {found['a - b'].value:.4g} ± {found['a - b'].error:.2g}" in str(draws)
     for name, drawn in (("a - b", level), ("k_c", edge), ("k/k_c", draws["slider.stiffness"] / edge)):
         assert found[name].error == pytest.approx(np.std(drawn), rel=0.03)
         assert (found[name].low, found[name].high) == pytest.approx(np.quantile(drawn, [0.025, 0.975]), rel=0.003)

@@ -255,6 +255,48 @@ def test_alpha_is_not_given_an_absurd_error_from_a_velocity_step():
     assert fit.to_dict()["parameters"]["friction.normal_memory.alpha"]["error"] is None
 
 
+PRESSED_ONCE = ss.Protocol(pieces=(ss.protocol.NormalStressStep(at=60.41, by=0.08 * lab.STRESS),), until=150.0)
+
+
+VALLEY = ("friction.normal_memory.alpha", "friction.b", "friction.d_c", "slider.stiffness")
+
+
+def pressed_once(seed):
+    """Fit to one step of the normal stress at constant rate, from the truth to the minimum beside it; and the truth."""
+    rig = lab.rig(alpha=0.3)
+    plan = make_plan(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(rig, PRESSED_ONCE, seed))
+    comparison, space = plan.comparison(), plan.space()
+    values = {name: one.value for name, one in rig.parameters().items()}
+    begin = np.array(
+        [[one.coordinate(values.get(one.parameter, 0.5 * (one.low + one.high))) for one in space.unknowns]]
+    )
+    found = minimise(lambda z, _: comparison.residuals(z), begin, space.low, space.high)
+    search = replace(lab.stepped().search, converged=bool(found.converged[0]))
+    fit = fit_with_errors(plan, comparison, found.coordinates[0], search, "auto", (space.low, space.high))
+    return fit, {name: values[name] for name in fit.names if name in values}
+
+
+def test_all_parameters_of_an_open_direction_are_marked():
+    """a, b, d_c, alpha and k can be exchanged over a long valley; none has an error, each names the others."""
+    fit, truth = pressed_once(0)
+    assert fit["mu_ref"].low < truth["friction.mu_ref"] < fit["mu_ref"].high
+    lost = {*VALLEY, "friction.a"}
+    assert {one.name for one in fit.estimates if not one.determined} >= lost
+    for name in lost:
+        assert set(fit[name].along) >= lost - {name}
+    assert "friction.normal_memory.alpha" in str(fit["b"]).partition("not determined by these data (with ")[2]
+    assert not {"a - b", "k_c"} & {one.name for one in fit.derived}
+
+
+@pytest.mark.parametrize("seed", [4, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(5, 12))])
+def test_errors_along_a_valley_are_as_long_as_the_valley(seed):
+    """No interval leaves the truth out, although the curvature at the minimum says a third of the valley's length."""
+    fit, truth = pressed_once(seed)
+    for name in VALLEY:
+        one, value = fit[name], truth[name]
+        assert not one.determined or one.low < value < one.high, one
+
+
 def test_a_normal_stress_history_leaves_one_direction_open():
     """At constant load-point velocity (a, b, d_c, alpha) have one direction without effect, to first order."""
     protocol = ss.Protocol(

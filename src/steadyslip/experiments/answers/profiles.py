@@ -156,8 +156,8 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
 def _unit_of_rise(fit: Fit, i: int) -> float:
     """Rise of the sum of squares at one standard deviation from the minimum, with correlation of the residuals."""
     _, jacobian = fit.comparison.residuals(fit.coordinates[None])
-    information = jacobian[0] @ jacobian[0].T
-    naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])
-    plain = fit.ssq / max(fit.degrees, 1)
-    variance = float(fit.covariance[i, i])
-    return variance / naive if np.isfinite(variance) and naive > 0 else plain
+    rows = jacobian[0]
+    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-13, hermitian=True)
+    spread = sum(noise.spread(rows[:, own]) for noise, own in zip(fit.noise, fit.comparison.slices, strict=True))
+    naive, variance = float(inverse[i, i]), float((inverse @ spread @ inverse)[i, i])
+    return variance / naive if np.isfinite(fit.covariance[i, i]) and naive > 0 else fit.ssq / max(fit.degrees, 1)

@@ -75,24 +75,37 @@ class Draws(ReadOnly):
         return len(next(iter(self.values.values())))
 
     def __getitem__(self, name: str) -> Array:
-        return self.values[self.fit.names[self.fit.index(name)]]
+        """Draws (m,) of a parameter, or of what follows from them (`derived`)."""
+        return self.derived[name] if name in self.derived else self.values[self.fit.names[self.fit.index(name)]]
+
+    @cached_property
+    def derived(self) -> dict[str, Array]:
+        """Draws (m,) of what follows from the parameters, as of ``a - b``, ``k_c``; NaN in draws without it."""
+        with np.errstate(all="ignore"):
+            return self.fit.derived_at(self._coordinates)
+
+    @property
+    def _coordinates(self) -> Array:
+        return self.fit.space.coordinates(np.column_stack([self.values[name] for name in self.fit.names]))
 
     def error(self, name: str) -> float:
         """Standard deviation, SI units."""
-        return float(np.std(self[name], ddof=1))
+        return float(np.nanstd(self[name], ddof=1))
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
         """Central interval of probability `level`, SI units."""
-        low, high = np.quantile(self[name], [0.5 - level / 2, 0.5 + level / 2])
+        low, high = np.nanquantile(self[name], [0.5 - level / 2, 0.5 + level / 2])
         return float(low), float(high)
 
     def __str__(self) -> str:
         details = ", ".join(f"{name} {value:.4g}" for name, value in self.details.items())
         stopped = ", stopped before all were done" if self.interrupted else ""
         lines = [f"{len(self)} draws, {self.kind} ({details}){stopped}"]
-        for one in self.fit.estimates:
+        for one in (*self.fit.estimates, *self.fit.derived):
             low, high = self.interval(one.name)
-            drawn = replace(one, value=float(np.mean(self[one.name])), error=self.error(one.name), low=low, high=high)
+            drawn = replace(
+                one, value=float(np.nanmean(self[one.name])), error=self.error(one.name), low=low, high=high
+            )
             lines.append(f"  {one.name}  {drawn.shown()}   95 %: {drawn.range()}")
         if (worst := max(self.chain_spread, key=self.chain_spread.__getitem__, default=None)) is not None:
             spread, lasting = self.chain_spread[worst], self.details.get("autocorrelation", 0.0)
@@ -157,9 +170,9 @@ class Draws(ReadOnly):
             If ArviZ is not installed, or draws and samples are too many for memory.
         """
         statistics = None if self.log_probability is None else {"lp": self.log_probability}
-        units = {one.name: one.unit for one in self.fit.space.unknowns}
+        units = {one.name: one.unit for one in (*self.fit.estimates, *self.fit.derived)}
         own = self._samples(seed) if samples else None
-        return inference_data(self.values, units, self.chains, statistics=statistics, samples=own)
+        return inference_data(self.values | self.derived, units, self.chains, statistics=statistics, samples=own)
 
     def _samples(self, seed: int) -> SampleDraws:
         """Likelihood and prediction of every sample of the records by every draw."""
@@ -167,7 +180,7 @@ class Draws(ReadOnly):
         if len(self) * fit.samples > MOST_POINTS:
             message = f"{len(self)} draws of {fit.samples} samples are too many numbers for memory"
             raise NotAvailable(f"{message}; fit a decimated record, draw less, or leave them out (samples=False)")
-        z = fit.space.coordinates(np.column_stack([self.values[name] for name in fit.names]))
+        z = self._coordinates
         comparison = fit.comparison
         model = np.concatenate([comparison.model(part)[0] for part in np.array_split(z, -(-len(z) // REFITS_AT_ONCE))])
         found = SampleDraws({}, {}, {}, {})

@@ -9,7 +9,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.format import format_quantity, format_range, format_with_error
 from steadyslip.core.pages import Displayed
-from steadyslip.experiments.fitting.unknowns import Space
+from steadyslip.experiments.fitting.unknowns import Space, Unknown
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Estimate(Displayed):
         Ends of the 95 % interval.
     area : float or None
         Contact area of the rig, m²; if given, text shows totals for the whole contact.
+    along : tuple of str
+        Parameters that change together with one that is not determined.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Estimate(Displayed):
     low: float
     high: float
     area: float | None = None
+    along: tuple[str, ...] = ()
 
     @property
     def determined(self) -> bool:
@@ -46,13 +49,19 @@ class Estimate(Displayed):
 
     def shown(self) -> str:
         """Format value and error with units, as printed."""
-        if self.unit == "s":  # a time on the record's clock needs its digits
-            return (
-                f"{self.value:.7g} ± {self.error:.2g} s" if self.determined else f"{self.value:.7g} s (not determined)"
-            )
         if not self.determined:
-            return f"{format_quantity(self.value, self.unit, area=self.area)} (not determined)"
+            time = self.unit == "s"  # one on the record's clock needs its digits
+            value = f"{self.value:.7g} s" if time else format_quantity(self.value, self.unit, area=self.area)
+            return f"{value} ({self.undetermined})"
+        if self.unit == "s":
+            return f"{self.value:.7g} ± {self.error:.2g} s"
         return format_with_error(self.value, self.error, self.unit, self.area)
+
+    @property
+    def undetermined(self) -> str:
+        """Words in place of an error that is infinite."""
+        together = f" (with {', '.join(self.along)})" if self.along else ""
+        return f"not determined by these data{together}"
 
     def range(self) -> str:
         """Format the 95 % interval with units, as printed."""
@@ -64,6 +73,8 @@ class Estimate(Displayed):
 UNDETERMINED = 0.5  # standard deviation, in e-folds or natural sizes, above which a direction is not determined
 MIN_WEIGHT = 0.15  # least weight of a parameter named in a combination; smaller ones only lengthen the message
 MIN_CHANGE = 0.1  # a parameter is also named if one standard deviation along the direction changes it by this much
+LEAST_CHANGE = 0.01  # e-folds or natural sizes by which an open direction changes what it leaves undetermined
+OPEN_SHARE = 0.1  # least share of a parameter's variance by which it belongs to an open direction: .3 of its error
 EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled information below this share of the largest are rounding errors
 DERIVATIVE_ROUNDING = 1e-10  # derivatives below this share of the largest are rounding errors of the integration
 
@@ -118,8 +129,9 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
     found, undetermined = [], np.zeros(len(space), dtype=bool)
     for i in np.flatnonzero(~known):
         direction = vectors[:, i] / scale
-        found.append(_combination(direction, np.inf, space))
-        undetermined |= np.abs(direction) > 1e-3 * np.max(np.abs(direction))
+        lost = np.abs(direction) > 1e-3 * np.max(np.abs(direction))
+        found.append(combination(direction, np.inf, space, lost))
+        undetermined |= lost
     usable = np.flatnonzero(~undetermined)
     if len(usable):
         deviations, axes = np.linalg.eigh(covariance[np.ix_(usable, usable)])
@@ -127,17 +139,27 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
             if variance > UNDETERMINED**2:
                 full = np.zeros(len(space))
                 full[usable] = axis
-                found.append(_combination(full, float(np.sqrt(variance)), space))
+                lost = variance * full**2 > OPEN_SHARE * np.maximum(np.diag(covariance), 1e-300)
+                lost &= np.abs(full) * np.sqrt(variance) > LEAST_CHANGE
+                lost &= ~np.array([is_time(one) for one in space.unknowns])
+                undetermined |= lost
+                found.append(combination(full, float(np.sqrt(variance)), space, lost))
     undetermined |= np.diag(covariance) > UNDETERMINED**2
     covariance[undetermined, :] = covariance[:, undetermined] = 0.0
     covariance[undetermined, undetermined] = np.inf
     return covariance, tuple(found)
 
 
-def _combination(direction: Array, deviation: float, space: Space) -> Combination:
+def is_time(one: Unknown) -> bool:
+    """True for times of changes, which samples bound on both sides whatever the other parameters are."""
+    return one.parameter.startswith(("jump.", "step."))
+
+
+def combination(direction: Array, deviation: float, space: Space, lost: Array) -> Combination:
+    """Combination of parameters along a direction (p,): those that it leaves without an error, and large parts."""
     weights = direction / direction[np.argmax(np.abs(direction))]
     least = min(MIN_WEIGHT, max(MIN_CHANGE / deviation, 0.01))
-    order = [i for i in np.argsort(-np.abs(weights)) if abs(weights[i]) >= least]
+    order = [i for i in np.argsort(-np.abs(weights)) if lost[i] or abs(weights[i]) >= least]
     return Combination({space.unknowns[i].name: float(weights[i]) for i in order}, deviation)
 
 
@@ -145,6 +167,6 @@ def prior_information(space: Space) -> Array:
     """Prior information (p, p) on times between two samples: inverse variances of uniform distributions."""
     known = np.zeros((len(space), len(space)))
     for i, one in enumerate(space.unknowns):
-        if one.parameter.startswith(("jump.", "step.")):
+        if is_time(one):
             known[i, i] = 12.0  # 1 / variance of a uniform distribution of width 1, the width in coordinates
     return known

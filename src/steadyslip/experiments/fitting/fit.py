@@ -27,6 +27,7 @@ from steadyslip.experiments.fitting.search import (
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
+from steadyslip.experiments.fitting.valleys import along_valleys
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.least_squares import minimise
@@ -287,4 +288,7 @@ def fit_with_errors(
         else:  # curvature beside the minimum says nothing of errors
             covariance = np.diag(np.full(free, np.inf))
     ssq = float(residuals @ residuals)
+    if search.converged:
+        covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
+        undetermined += opened
     return Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)

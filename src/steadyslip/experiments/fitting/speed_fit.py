@@ -190,8 +190,8 @@ def _estimate(
         which = "" if open_below and open_above else " from below" if open_below else " from above"
         remark = "; ".join(filter(None, [remark, f"not determined{which} by these speeds"]))
     return SpeedEstimate(
-        name, float(value), error, unit_told(role, table, bool(curve.logarithmic[i])), float(low), float(high), None,
-        (float(low68), float(high68)), remark,
+        name, float(value), error, unit_told(role, table, bool(curve.logarithmic[i])), float(low), float(high),
+        likely=(float(low68), float(high68)), remark=remark,
     )  # fmt: skip
 
 

@@ -71,7 +71,7 @@ def _over_stress(fit: FitNumbers, one: Any) -> str | None:
     stress = steady_state(fit.rig(int(record) - 1 if record else 0)).normal_stress
     value, error, low, high = (1e-6 * x / stress for x in (one.value, one.error, one.low, one.high))
     if not one.determined:
-        return f"{value:.4g} /um (not determined)"
+        return f"{value:.4g} /um ({one.undetermined})"
     return f"{value:.4g} ± {error:.2g} /um   95 %: {low:.4g} to {high:.4g} /um"
 
 

@@ -157,7 +157,7 @@ def test_wild_samples_are_left_out_and_a_loss_bears_them():
     for fit in (left, ss.fit(ss.lab_rig(), record, loss="cauchy")):
         for name in clean.names:
             assert fit.values[name] == pytest.approx(clean.values[name], abs=2 * clean.errors[name])
-    run["friction"][241] += 0.5
+    run["friction"][241] += 0.03
     told = " ".join(str(ss.fit(ss.lab_rig(), ss.record_from_arrays(**run))).split())
     assert "1 sample of friction is so far off all others that half of the misfit and more is there" in told
 

@@ -20,10 +20,10 @@ from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_est
 from steadyslip.experiments.fitting.estimates import Combination, Estimate
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
-from steadyslip.experiments.fitting.remedies import STRUCTURE, Remedy, remedies
+from steadyslip.experiments.fitting.remedies import Remedy, remedies
 from steadyslip.experiments.fitting.search import SearchSummary
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.numerics.noise import Noise, Whiteness, whiteness
+from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, Whiteness, whiteness
 from steadyslip.machine.slider import Slider
 
 

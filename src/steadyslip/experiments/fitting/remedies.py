@@ -16,10 +16,9 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
 from steadyslip.experiments.numerics.least_squares import minimise
-from steadyslip.experiments.numerics.noise import describe, whiteness
+from steadyslip.experiments.numerics.noise import STRUCTURE, describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
 
-STRUCTURE = 1e-3  # probability of the whiteness test below which residuals have structure
 STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass & Raftery 1995)
 ROUNDS = 2  # changes that are tried on top of each other
 TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3  # of each trial; on made records they end where the default ones do

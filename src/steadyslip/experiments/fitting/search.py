@@ -22,7 +22,7 @@ from steadyslip.experiments.fitting.starts import features_of, search_bounds, st
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SAME_SSQ, Minima, minimise
-from steadyslip.experiments.numerics.noise import SIGNIFICANT, lag_one
+from steadyslip.experiments.numerics.noise import SIGNIFICANT, STRUCTURE, lag_one, whiteness
 
 ROUGH_SAMPLES = 400  # samples, over all records, of the first stage
 ROUGH_PATIENCE = (
@@ -376,9 +376,12 @@ def times_of_changes(space: Space) -> Array:
 
 
 def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
-    """True if residuals are correlated from sample to sample: by the machine, or because a better minimum exists."""
+    """True if residuals are correlated, and not as noise that decays is: perhaps because a better minimum exists."""
     r = whole.residuals(coordinates[None])[0][0]
-    return any(abs(lag_one(r[where])) > SIGNIFICANT / np.sqrt(len(r[where])) for where in whole.slices)
+    parts = [r[where] for where in whole.slices]
+    if all(abs(lag_one(own)) <= SIGNIFICANT / np.sqrt(len(own)) for own in parts):
+        return False
+    return whiteness(parts).p < STRUCTURE
 
 
 def first_computable(comparison: Comparison, found: Minima) -> Minima:

@@ -74,7 +74,7 @@ class Features:
 @question
 def features(record: Record, rate: float) -> Features:
     """Features of a record; `rate` is the load-point velocity at its start, m/s."""
-    record = replace(record, friction=_without_spikes(record.friction))
+    record = replace(record, friction=_without_spikes(record.friction), commanded=record.loading)
     time, mu = record.time, record.friction
     moved = _displacement(record, 0.0 if resting_rate(record.loading) is not None else rate)
     first = max(5, len(mu) // 50)

@@ -15,11 +15,12 @@ from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.loading_words import enumerated, loading_warnings, own_rate
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, STRUCTURE
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
 from steadyslip.experiments.measured.clipped import CLIPPED, WILD
+from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 

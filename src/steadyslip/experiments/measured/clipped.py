@@ -20,6 +20,7 @@ WILD_SIZE, WILD_RANGE = 20.0, 4.0
 """Least distance of a wild sample from the median of those beside it: in standard deviations of the noise, as
 `words.OUTLIER_SIZE`, and in ranges of those beside it, which a peak of friction raises too."""
 AFTER = 4  # samples after a change of the loading in which friction may have a peak of one sample
+LARGEST_DIRECT = 0.05  # of such a peak, per e-fold of rate: twice the largest direct effect of rocks
 WILD = "far off the samples beside"
 
 
@@ -39,14 +40,20 @@ def without_clipped(record: Record) -> Record:
 def without_wild(record: Record) -> Record:
     """Record without single samples of friction that are far off those beside them, with a note.
 
-    Samples at a change of the loading are kept, and all where the displacement does not tell when it changes.
+    Kept are those at a change of the loading that may be a peak of friction, and all where the displacement does not
+    tell when it changes.
     """
     if record.loading.load is None or len(record) < 10 * BESIDE:
         return record
-    out = wild(record.friction)
-    for _, _, change in record.loading.changes:
+    away, out = _off_those_beside(record.friction)
+    for channel, _, change in record.loading.changes:
         first, last = np.searchsorted(record.time, [change.earliest, change.latest + change.duration])
-        out[max(first - BESIDE, 0) : last + AFTER] = False
+        near = slice(max(first - BESIDE, 0), last + AFTER)
+        if channel == "load" and min(change.before, change.after) > 0:  # a peak rises with the rate, or falls with it
+            share = away[near] / np.log(change.after / change.before)
+            out[near] &= (share < 0) | (share > LARGEST_DIRECT)
+        else:
+            out[near] = False
     if not np.any(out):
         return record
     first, last = record.time[out][[0, -1]]
@@ -55,12 +62,13 @@ def without_wild(record: Record) -> Record:
     return replace(record.taken(~out, note), commanded=record.loading)
 
 
-def wild(values: Array) -> Array:
-    """Mask (n,) of the samples of values (n,) that are far off those beside them."""
+def _off_those_beside(values: Array) -> tuple[Array, Array]:
+    """Deviations of values (n,) from the median of those beside each, and mask of those that are far off."""
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, BESIDE, mode="reflect"), 2 * BESIDE + 1)
     beside = np.delete(windows, BESIDE, axis=1)
-    away = np.abs(values - np.median(beside, axis=1))
-    return np.asarray((away > WILD_SIZE * level_noise(values)) & (away > WILD_RANGE * np.ptp(beside, axis=1)))
+    away = values - np.median(beside, axis=1)
+    least = np.maximum(WILD_SIZE * level_noise(values), WILD_RANGE * np.ptp(beside, axis=1))
+    return away, np.abs(away) > least
 
 
 def clipped(values: Array) -> Array:

@@ -23,6 +23,7 @@ at 4 and 1e-3 rms z was 1.10 for a lag-1 autocorrelation of .08 to .13, now 1.02
 MAX_ORDER = 40  # largest order of the autoregression; above about a tenth of the samples it is not determined
 LAGS = 20  # of tests for correlation, in samples; a tenth of the samples, if that is less
 MIN_CHANCE = 1e-3  # probability of such a test below which innovations of the simple noise model are not white
+STRUCTURE = 1e-3  # probability of the whiteness test below which residuals have structure
 FIRST_GUESSES = ((0.5, 0.0), (0.9, 0.7), (0.98, 0.7), (0.0, 0.3))  # decay and average from which they are sought
 LONGEST = 0.05  # correlation over a record that is sought at most: noise cannot be told from a level beyond
 FITTED_RANK = 1e-6  # singular values of derivatives, scaled, below which they are combinations of each other

@@ -9,7 +9,7 @@ import pytest
 
 import steadyslip as ss
 import users_laws
-from explored_edges import Edges, judged, other_edges, walked
+from explored_edges import Edges, drawn, judged, other_edges, walked
 from rigs_of_theory import SIGMA, V0, rate_state, rig
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.verdict.words import BEYOND
@@ -156,5 +156,14 @@ def test_thin_parts_of_a_track_are_seen_and_leave_the_own_place():
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", NAMES)
 def test_edges_of_pages_are_those_of_python(name):
-    """At values drawn at random, and beside an edge that is pressed then; `benchmarks/explorer.py` has more."""
+    """At values drawn at random, and beside an edge that is pressed then, with reasons and words."""
     assert walked(page(name), np.random.default_rng(len(name)), presses=1) == []
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(2))
+def test_pages_of_random_sliders_and_machines_answer_as_python(seed):
+    """A sample of what `tests/helpers/explored_edges.py` draws."""
+    chance = np.random.default_rng(seed)
+    name, there = drawn(chance)
+    assert walked(there, chance, presses=1) == [], name

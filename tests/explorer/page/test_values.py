@@ -5,9 +5,11 @@ import re
 import time
 from urllib.parse import quote
 
+import numpy as np
 import pytest
 
 import steadyslip as ss
+from explored_edges import EXAMPLES, example, pressed
 from explored_pages import FOLLOW, INCLINED, Visit, edges_of, middle
 
 
@@ -54,6 +56,15 @@ def test_sliders_and_the_chart_work_by_keyboard_and_by_pointer(browser, file):
         assert visit.sentence().startswith("Unstable")
         visit.page.get_by_role("button", name="undo").click()
         assert visit.sentence().startswith("Stable"), "a drag is one change"
+
+
+@pytest.mark.campaign
+def test_each_edge_in_the_list_leads_to_where_python_agrees(browser, tmp_path):
+    """A sample of what `tests/helpers/explored_edges.py --browser` does."""
+    page = example(EXAMPLES / "inclined-spring.toml")
+    wrong, many = pressed(page, np.random.default_rng(2), browser, tmp_path / "rig.html")
+    assert wrong == []
+    assert many
 
 
 def test_an_edge_in_the_list_goes_there(browser, file):

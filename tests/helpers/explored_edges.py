@@ -287,7 +287,8 @@ def campaign(many, seed, presses, browser):
         counts["other"] += bool(found)
         for one in found:
             print(f"{name}: {one}", flush=True)
-    print(counts, f"{time.process_time():.0f} CPU s")
+        if counts["settings"] % 10 == 0:
+            print(counts, f"{time.process_time():.0f} CPU s", flush=True)
 
 
 if __name__ == "__main__":

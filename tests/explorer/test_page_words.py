@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
 import steadyslip as ss
@@ -90,3 +91,36 @@ def test_away_from_edges_too(name, changes, words):
     text = compared(name, **changes)
     assert words in text
     assert text.startswith("On the edge") == ("restores" in words or "Neither" in words)
+
+
+def pressed_on(angle, mu):
+    law = ss.laws.RateState(a=0.01, b=0.012, d_c=1e-5, mu_ref=mu, v_ref=1e-3)
+    return ss.machine.Surface(body="p", friction=law, contact=ss.laws.InclinedSpring(preload=100.0, angle=angle))
+
+
+def test_of_contacts_that_press_on_each_other_a_page_names_the_one_that_python_names():
+    """Whether they lock up or one lifts off, at angles and frictions drawn at random."""
+    gripped = ss.Machine(
+        bodies={"p": ss.machine.SlidingBody(mass=1.0)},
+        links={"s": ss.machine.Spring(between=("drive", "p"), stiffness=1e5, damping=3.0)},
+        contacts={"c": pressed_on(-0.5, 0.7), "d": pressed_on(-0.6, 0.8)},
+        drive=ss.machine.Pull(velocity=1e-3),
+    )
+    there, chance, kinds = Edges(gripped), np.random.default_rng(2), set()
+    for _ in range(60):
+        values = list(there.home)
+        for n, name in enumerate(there.names):
+            if name.endswith("angle"):
+                values[n] = chance.uniform(-1.5, 1.5)
+            elif name.endswith(("mu_ref", "preload")):
+                values[n] *= 10 ** chance.uniform(-1, 1)
+        told = there.script(
+            "(rig.values = values, reason({ ...rig.assess(), own: rig.linear.R }, data))", values=values
+        )
+        try:
+            ss.steady_state(there.own(values))
+        except ss.NoSteadySliding as absent:
+            why = str(absent).removeprefix("no steady sliding: ")
+            assert written(told) == written(f"{why[0].upper()}{why[1:]}.")
+            kinds.add((absent.condition, absent.contact))
+    assert kinds == {(kind, contact) for kind in ("lock-up", "lift-off") for contact in "cd"}

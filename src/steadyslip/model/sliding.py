@@ -215,18 +215,15 @@ def _absence(kind: str, contact: str, words: str, margin: float = math.nan) -> N
 def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySliding:
     """Error for contacts with coupled steady normal stresses."""
     contacts = point.model.contacts
-    matrix, _ = joint.arrays(point.arguments)
     sigma, gain = joint.solve(point.arguments)
+    least = int(np.argmin(sigma))  # just beyond lock-up that which the others press most
+    name = contacts[least].name
     if not gain < 1:
-        gains, modes = np.linalg.eig(matrix)
-        leading = np.abs(modes[:, np.argmin(np.abs(gains - gain))])
-        name = contacts[int(np.argmax(leading))].name
         words = ABSENT["together"].format(at=_at(name), margin=f"{1 - gain:.4g}")
         return _absence("lock-up", name, words, float(1 - gain))
-    least = int(np.argmin(sigma))
     force = point.evaluate(point.model.function([contacts[least].area]))[0] * sigma[least]
-    words = ABSENT["lifted"].format(at=_at(contacts[least].name), left=format_quantity(float(force), "N"))
-    return _absence("lift-off", contacts[least].name, words, float(force))
+    words = ABSENT["lifted"].format(at=_at(name), left=format_quantity(float(force), "N"))
+    return _absence("lift-off", name, words, float(force))
 
 
 @question

@@ -74,7 +74,7 @@ def friction(law, load, s):
 
 
 def determinant(machine, s, z):
-    """Of the chain's matrix at s (...), with z (...) in place of exp(−s delay)."""
+    """Determinant of the chain's matrix at s (...), z (...) in place of exp(−s delay), times its denominators."""
     bodies = list(machine.bodies)
     at = {name: i for i, name in enumerate(bodies)}
     matrix = np.zeros((*np.shape(s), len(bodies), len(bodies)), dtype=complex)
@@ -94,8 +94,9 @@ def determinant(machine, s, z):
         place, speed = gains(drive, s)
         matrix[..., at[drive.body], at[drive.measured or drive.body]] += place * z
         matrix[..., at[drive.body], at[seen_speed(drive)]] += speed * z
-    found = np.linalg.det(matrix)
-    return found if isinstance(drive, ss.machine.PositionPD) else found * s
+    poles = [s] if isinstance(drive, (ss.machine.PositionPID, ss.machine.Cascade)) else []
+    poles += [1 + s * touch.friction.d_c for touch in machine.contacts.values() if hasattr(touch.friction, "d_c")]
+    return np.linalg.det(matrix) * np.prod(poles, axis=0)
 
 
 def gains(drive, s):

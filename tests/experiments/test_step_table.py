@@ -61,7 +61,7 @@ def test_latex_and_methods(joint, table, tmp_path):
     digits = 1 - int(np.floor(np.log10(1e6 * one.error)))
     assert rf"${1e6 * one.value:.{digits}f} \pm {1e6 * one.error:.{digits}f}$" in body[-1]
     assert table.methods in text.splitlines()[0]
-    assert "slip law, 1 state" in table.methods
+    assert "slip law, 1 state, linker-dieterich memory of normal stress" in table.methods
     assert "4 steps were fitted alone" in table.methods
 
 

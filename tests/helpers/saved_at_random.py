@@ -18,9 +18,11 @@ import pandas as pd
 import xarray as xr
 
 import fuzz_files
+import lab_records as lab
 import machines
 import machines_in_the_plane
 import scaled_machines
+import servo_records
 import steadyslip as ss
 from fuzz_rigs import DRIVES, FRICTION
 from moving_machines import two_tables
@@ -270,6 +272,71 @@ def answers(random, folder):
     return plain(asked(ss.analyze, rig_at_random(random)).to_dict())
 
 
+# -- fits
+
+
+def joint(random, record):
+    """A record and another, with stiffnesses of their own."""
+    other = lab.rig().with_values({"slider.stiffness": 3e10})
+    return [record, lab.record(other, lab.STEP, int(random.integers(10**6)), count=400)]
+
+
+FITS = {
+    "whole": ({}, lab.STEP, {}, None),
+    "cut": ({}, lab.STEP, {}, lambda random, one: one.between(20.0, 130.0)),
+    "decimated": ({}, lab.STEP, {"trend": 1}, lambda random, one: one.decimated(int(random.integers(200, 500)))),
+    "joint": ({}, lab.STEP, {"separate": ["slider.stiffness"]}, joint),
+    "hold": ({}, lab.HOLD, {"loss": "cauchy"}, None),
+    "lag": ({}, lab.STEP, {"lag": True, "offset": True}, None),
+    "weighted": ({}, lab.STEP, {"calibrated": "20 GPa/m"}, None),
+    "alpha": ({"normal_memory": "linker-dieterich"}, lab.PRESSED, {}, None),
+    "prakash": ({"normal_memory": "prakash-clifton"}, lab.PULSED, {}, None),
+    "two states": ({"states": 2}, lab.STEP, {}, None),
+    "measured": ({}, lab.STEP, {"drive": "measured"}, None),
+    "smoothed": ({}, lab.STEP, {"drive": "smoothed"}, None),
+    "protocol": ({}, lab.STEP, {"protocol": lab.STEP}, None),
+    "servo": ({}, None, {}, None),
+}
+"""Kinds of fits by name: the laws, what was done, options of the fit, and what is made of the record first."""
+
+
+def fits(random, folder):
+    """Fits of every kind of record: values, errors, residuals, what is printed, and the bootstrap of what is read."""
+    kind = str(random.choice(list(FITS)))
+    laws, protocol, options, made = FITS[kind]
+    noise, evolution = float(10 ** random.uniform(-4, -3.3)), str(random.choice(["slip", "aging"]))
+    if protocol is None:
+        law = {"slip": ss.laws.Slip(), "aging": ss.laws.Aging()}[evolution]
+        lag, seed = float(random.uniform(0.1, 0.4)), int(random.integers(10**6))
+        record, _ = asked(servo_records.record, seed, lag, 0.15, law, noise)
+    else:
+        source = lab.two_states() if "states" in laws else lab.rig(alpha=0.3 if "normal_memory" in laws else None)
+        record = lab.record(source, protocol, int(random.integers(10**6)), noise, count=int(random.integers(400, 900)))
+    if kind == "weighted":
+        options = options | {"weights": random.uniform(0.5, 2.0, len(record))}
+    records = record if made is None else made(random, record)
+    one = asked(ss.fit, ss.lab_rig(evolution, **laws), records, starts=8, **options)
+    path = folder / "fit.nc"
+    one.save(path)
+    content, again = path.read_bytes(), ss.load_fit(path)
+    pairs = {
+        "values": (one.values, again.values), "errors": (one.errors, again.errors), "model": (one.model, again.model),
+        "residuals": (one.residuals, again.residuals), "covariance": (one.covariance, again.covariance),
+        "text": (str(one), str(again)), "data": (one.to_dict(), again.to_dict()),
+        "computed": (one.model, again.plan.comparison().model(again.coordinates[None])[0][0]),
+    }  # fmt: skip
+    found = next((text for name, pair in pairs.items() if (text := differs(*pair, name))), "")
+    if not found:
+        found = differs(*({n: d[n] for n in d.values} for d in (bootstrapped(one), bootstrapped(again))), "bootstrap")
+    again.save(path)
+    found = found or ("" if path.read_bytes() == content else "the file of what was read is another")
+    return found and f"{kind}, {found}"
+
+
+def bootstrapped(fit):
+    return ss.experiments.bootstrap(fit, 3, seed=1, progress=False)
+
+
 # -- draws
 
 
@@ -333,7 +400,8 @@ def odd_columns(random, count):
 
 
 CAMPAIGNS = {
-    "rigs": rigs, "runs": runs, "maps": maps, "answers": answers, "draws": draws, "populations": populations,
+    "rigs": rigs, "runs": runs, "maps": maps, "answers": answers, "fits": fits, "draws": draws,
+    "populations": populations,
 }  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from rigs_of_theory import rig
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     ("what", "count"),
-    [("rigs", 30), ("runs", 5), ("maps", 1), ("answers", 2), ("draws", 2), ("populations", 2)],
+    [("rigs", 30), ("runs", 5), ("maps", 1), ("answers", 2), ("fits", 3), ("draws", 2), ("populations", 2)],
 )
 def test_what_is_saved_at_random_is_read_back(what, count):
     assert list(saved_at_random.found(what, count, 1)) == []

@@ -177,13 +177,23 @@ class StepTable(Displayed):
         kind = f"{law.name} friction"
         if evolution is not None:
             kind += f", {evolution.name} law, {states} state{'s' * (states > 1)}"
+        memory = getattr(law, "normal_memory", None)
+        kind += f", {memory.name} memory of normal stress" if memory is not None and not law.forgets_stress() else ""
         free = [name for name, one in line.estimates().items() if one not in self.joint.derived]
-        trend = f" A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else ""
+        further = [
+            f"A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else "",
+            "A constant was added to friction." if plan.offset else "",
+            "Friction was free to come later than the loading." if plan.lag else "",
+            "How far records begin from steady sliding was fitted." if plan.initial == "free" else "",
+            f"Outliers weighed less ({plan.loss} loss)." if plan.loss != "linear" else "",
+            "Samples were weighted." if plan.weights is not None else "",
+        ]
         noise = "allowing for correlated residuals" if self.joint.correlated else "for independent residuals"
         alone = f"{len(self.steps)} step{'s were' if len(self.steps) != 1 else ' was'} fitted alone"
+        added = "".join(f" {text}" for text in further if text)
         return (
             f"Friction was fitted by least squares with steadyslip {self.joint.version}: {kind}, coupled to a spring "
-            f"and driven by {driven}, with {', '.join(free)} free.{trend} {alone}, and all together; errors are one "
+            f"and driven by {driven}, with {', '.join(free)} free.{added} {alone}, and all together; errors are one "
             f"standard deviation, {noise}."
         )
 

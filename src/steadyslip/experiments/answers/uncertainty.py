@@ -161,7 +161,8 @@ class Draws(ReadOnly):
         Returns
         -------
         arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
-            Group ``posterior``, those of the samples and, where the log probability was computed, ``lp`` in
+            Group ``posterior``, with what follows from the parameters too (``k over k_c``: files take no slash in a
+            name), those of the samples and, where the log probability was computed, ``lp`` in
             ``sample_stats``.
 
         Raises
@@ -170,9 +171,10 @@ class Draws(ReadOnly):
             If ArviZ is not installed, or draws and samples are too many for memory.
         """
         statistics = None if self.log_probability is None else {"lp": self.log_probability}
-        units = {one.name: one.unit for one in (*self.fit.estimates, *self.fit.derived)}
+        units = {one.name.replace("/", " over "): one.unit for one in (*self.fit.estimates, *self.fit.derived)}
         own = self._samples(seed) if samples else None
-        return inference_data(self.values | self.derived, units, self.chains, statistics=statistics, samples=own)
+        values = self.values | {name.replace("/", " over "): own for name, own in self.derived.items()}
+        return inference_data(values, units, self.chains, statistics=statistics, samples=own)
 
     def _samples(self, seed: int) -> SampleDraws:
         """Likelihood and prediction of every sample of the records by every draw."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import NotAvailable
+from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.linear.stable_values import safety_factor
@@ -109,7 +109,7 @@ def _of_rig(space: Space, rig: Slider, record: int, calibrated: float | None, pl
         edge, share = (
             np.broadcast_to(np.asarray(number(rig, own)), len(places)) for number in (critical_stiffness, safety_factor)
         )
-    except NotAvailable:
+    except (NotAvailable, ParameterError):  # a law without an edge, or draws that no rig has
         edge = share = np.full(len(places), np.nan)
     found.append(_Derived("k_c", "Pa/m", edge, True, set(own) - {"slider.stiffness"}))
     found.append(_Derived("k/k_c", "1", share, True, set(own)))

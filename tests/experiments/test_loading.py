@@ -346,6 +346,17 @@ def test_a_flank_of_a_glitch_is_no_change_of_rate(offset):
     assert len(_joined_across_flanks(runs, time, x, 3e-8)) == (1 if offset == 0.0 else 3)
 
 
+def test_a_brief_fast_run_among_very_many_samples_is_one(monkeypatch):
+    """Its two means were a slip of the sensor, and the fit 40 % low."""
+    monkeypatch.setattr(runs, "COARSE", 400)
+    time = np.arange(6000) * 1e-3
+    gone = 1e-6 * np.interp(time, [0, 2.5, 2.53, 6], [0, 2.5, 32.5, 35.97])
+    course = load_course(time, gone + 2e-8 * np.random.default_rng(1).standard_normal(6000))
+    assert course.levels == pytest.approx([1e-6, 1e-3, 1e-6], rel=0.01)
+    assert [change.time for change in course.changes] == pytest.approx([2.5, 2.53], abs=5e-4)
+    assert course.slips == 0
+
+
 @pytest.mark.parametrize("seed", [3, 5, 16, 17, 20])
 def test_noise_that_lasts_makes_no_slips_of_the_sensor_and_no_rates(seed):
     """As slips and glitches it left rates up to 5.7 errors off, and a hold that moved by five."""

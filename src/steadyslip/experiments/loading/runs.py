@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import reversed_column, run_at_start
-from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, split
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, split, spread
 
 RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
 LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
@@ -27,9 +27,12 @@ SHORTEST = 0.05  # share of the record (time or displacement) that costs as much
 SLIP = 0.01  # longest slip of the sensor, as share of the time of a record; chosen by trial
 MAIN = 0.6  # share of what is left out between two pieces that a piece needs to be a run of its own; chosen by trial
 LEAD = 8.0  # displacement by which rates must differ over a run, in standard deviations of the noise; chosen by trial
+STRAIGHT = 20  # samples on one line from which a part that is over soon is no slip of the sensor, which is over at once
 PLAIN = 100.0  # the same displacement that makes a piece a run of its own, however short; chosen by trial
 RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record; chosen by trial
 COARSE = 20_000  # samples above which means are segmented, to bound the time; chosen by trial
+BRIEFLY = 33  # means of which a fast part is the lesser half, so that its samples are kept instead, and
+FAST = 10.0  # multiple of what the load point moves from mean to mean around it, and of the scatter of that
 
 
 @dataclass
@@ -113,11 +116,19 @@ def straight_runs(time: Array, displacement: Array, lasting: float = 0.0) -> lis
     """
     step = -(-len(time) // COARSE)
     if step > 1:
-        means = (_means(values, step) for values in (time, displacement))
-        runs = straight_runs(*means, lasting / np.sqrt(step))
+        starts, brief = _ranges(displacement, step)
+        means = (np.add.reduceat(values, starts) / np.diff(starts, append=len(time)) for values in (time, displacement))
+        own = displacement_noise(time, displacement) if brief else 0.0
+        runs = _runs_of(*means, max(lasting / np.sqrt(step), own))
+        ends = np.append(starts, len(time)).tolist()
         for run in runs:
-            run.members = [(i * step, min(j * step, len(time))) for i, j in run.members]
+            run.members = [(ends[i], ends[j]) for i, j in run.members]
         return _with_exact_boundaries(runs, step, time, displacement, lasting)
+    return _runs_of(time, displacement, lasting)
+
+
+def _runs_of(time: Array, displacement: Array, lasting: float) -> list[Run]:
+    """Runs of a displacement of few samples."""
     noise = max(displacement_noise(time, displacement), lasting)
     pieces = _Pieces(time, displacement, split(time, displacement, noise, linear=True), noise)
     groups = _with_holds(_segmented(pieces), pieces)
@@ -200,9 +211,23 @@ def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: floa
     return bool(np.min(np.abs(lines[0] - lines[1][0])) <= known)
 
 
-def _means(values: Array, step: int) -> Array:
-    whole = len(values) // step * step
-    return np.asarray(values[:whole].reshape(-1, step).mean(axis=1))
+def _ranges(displacement: Array, step: int) -> tuple[Array, bool]:
+    """First samples of ranges whose means are segmented, and whether there are brief parts whose samples are kept.
+
+    A range is `step` samples long, and a single one where a load point moves briefly and so fast that a few means would
+    not show it.
+    """
+    from scipy.ndimage import median_filter, uniform_filter1d
+
+    starts = np.arange(0, len(displacement), step)
+    moved = np.abs(np.diff(np.add.reduceat(displacement, starts) / np.diff(starts, append=len(displacement))))
+    usual = median_filter(moved, BRIEFLY)
+    fast = moved > FAST * usual + FAST * spread(moved - usual)
+    kept = uniform_filter1d(np.append(fast, False).astype(float), 2 * FEWEST) > 1e-9
+    if not np.any(kept) or np.sum(kept) * step > COARSE:
+        return starts, False
+    single = np.repeat(kept, step)[: len(displacement)]
+    return np.flatnonzero(single | (np.arange(len(displacement)) % step == 0)), True
 
 
 def _segmented(pieces: _Pieces) -> list[list[int]]:
@@ -278,7 +303,7 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
     # at rest within its error, which must be small beside the rate
     still = abs(slope) < 0.02 * abs(rate) + RATE_SIGMAS * error and RATE_SIGMAS * error < 0.05 * abs(rate)
     far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
-    long = (gap is None or gap > SLIP * pieces.span) and far
+    long = (gap is None or gap > SLIP * pieces.span or pieces.size[longest] >= STRAIGHT) and far
     return [int(k) for k in main] if lasting and whole and (still or long) else []
 
 

@@ -121,7 +121,7 @@ def growing(machine, rate=0.0):
     a on the way to infinite Re s as |b z| < |a|.
     """
     delay = machine.drive.delay
-    far = 1e7 * np.array([1.0, 2.0])
+    far = 1e12 * np.array([1.0, 2.0])
     ends = [determinant(machine, far, np.full(2, z)) for z in (0.0, 1.0, -1.0)]
     degree = round(max(np.log2(abs(one[1] / one[0])) for one in ends if np.all(one)))
     a = (ends[0][1] / far[1] ** degree).real
@@ -172,19 +172,30 @@ def status(machine):
 
 
 def with_little_mass(machine):
-    """The machine, where only springs hold the driven body, which measures itself, with a mass that is as good as none.
+    """The machine, where the controller pulls at what it measures and only springs hold, with masses as good as none.
 
-    Its oscillation on the springs turns some hundred times during the delay and a late pull changes it at once.
+    Their oscillation on the springs turns some hundred times during the delay, and a late pull changes it at once.
     """
-    name, drive = machine.drive.body, machine.drive
-    links = [one for one in machine.links.values() if name in one.between]
-    rubbed = any(one.body == name for one in machine.contacts.values()) or any(one.damping for one in links)
-    outweighs = seen_speed(drive) == name and gains(drive, 1.0)[1]
-    if machine.bodies[name].mass or rubbed or outweighs or (drive.measured or name) != name:
+    drive, names = machine.drive, list(machine.bodies)
+    light = np.array([body.mass == 0 for body in machine.bodies.values()])
+    held = np.diag(~light) * 1.0  # what resists velocities of bodies without mass
+    for link in machine.links.values():
+        row = np.array([(name == link.between[1]) * 1.0 - (name == link.between[0]) for name in names]) * light
+        held += link.damping * np.outer(row, row)
+    for touch in machine.contacts.values():
+        held[names.index(touch.body), names.index(touch.body)] += 1.0
+    sizes, ways = np.linalg.eigh(held)
+    free = ways[:, sizes < 1e-9]
+    place, speed = gains(drive, 1e9)
+    pull = free[names.index(drive.body)] * abs(place)
+    if not np.any(pull @ free[names.index(drive.measured or drive.body)]) or free[names.index(seen_speed(drive))] @ (
+        free[names.index(drive.body)] * abs(speed)
+    ):
         return machine
-    stiffness = sum(one.stiffness for one in links)
+    stiffness = sum(one.stiffness or 0.0 for one in machine.links.values())
+    mass = 1e-3 * min(abs(place), stiffness) ** 2 * drive.delay**2 / stiffness
     return machine.with_values(
-        {f"bodies.{name}.mass": 1e-3 * min(drive.kp, stiffness) ** 2 * drive.delay**2 / stiffness}
+        {f"bodies.{name}.mass": mass for name, one in zip(names, np.any(free, axis=1), strict=True) if one}
     )
 
 

@@ -22,10 +22,12 @@ def require_matrices(machine: Machine) -> MachinePoint:
     Raises
     ------
     NotAvailable
-        If its numbers overflow.
+        If its numbers overflow, or steady sliding was not found.
     """
     point = machine_point(machine)
     with np.errstate(all="ignore"):
+        if point.balance.problem:
+            raise NotAvailable(point.balance.problem)
         if point.balance.exists and not (np.all(np.isfinite(point.pencil.a)) and np.all(np.isfinite(point.pencil.e))):
             raise NotAvailable(
                 "the slopes of the equations leave the range of floating point (1e-308 to 1e308); check the sizes of "

@@ -10,20 +10,27 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from steadyslip.core.errors import NotAvailable
 from steadyslip.core.questions import question
 from steadyslip.linear import samples
 from steadyslip.linear.roots import Array
 from steadyslip.linear.search import Boundary, natural_size
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.change import LowRankChange, Turns, change_between, rank_one, real_crossings
-from steadyslip.model.numeric.machine_point import MachinePoint, absence, machine_point
-from steadyslip.model.numeric.pencil import StatePencil
+from steadyslip.model.numeric.machine_point import MachinePoint, MachinesAlong, absence, machine_point
+from steadyslip.model.numeric.pencil import ILL_POSED, UNDECIDED, StatePencil
 
 _SHARE = 4  # samples are fewer than those of a small machine by this factor: 10 per decade
-_HALVINGS = 26  # of a bracket by counting, from a tenth of a decade to 1e-9; then Newton's method
+_BRACKET = 1e-9  # relative width to which a bracket is narrowed by counting; then Newton's method
+_NEAR = 1e-3  # from which Newton's method mostly gets there too
+_BESIDE = 1e-3  # share of a bracket from the end of steady sliding at which stability there is asked
+_FAR = 1e12  # ratio of two values beyond which the lower is a zero that rounding hides
+_PARTS = 32  # of a bracket of a small machine, counted together
+_HALVINGS = 60  # of a bracket at most: to neighbouring numbers
+_SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of a response
+_TOGETHER = 2**20  # numbers of matrices that are treated together, 8 MiB
 _NEWTON = 12  # steps from there, quadratic
 _LIKELY = 3  # eigenvalues nearest to the axis, by either measure, that are tried as the one that crosses
 _REACH = 4.0  # widths of the bracket that Newton's method may go
@@ -40,7 +47,6 @@ class MatrixSearch:
         address = machine.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
         self.own = machine_point(machine)
-        self.known: dict[float, tuple[int, StatePencil | None]] = {}
 
     hides = False
     decided = -np.inf, np.inf
@@ -74,36 +80,47 @@ class MatrixSearch:
 
     # -- the machine along the parameter
 
-    def _at(self, value: float) -> tuple[bool, StatePencil | None]:
-        """True with steady sliding, and the pencil there; without one where conditions of laws are broken."""
-        point = self.own if value == self.value else self.own.varied(self.name, value)
-        try:
-            exists = point.balance.exists
-        except (NotAvailable, np.linalg.LinAlgError):
-            return False, None
-        return exists, point.pencil if exists else None
+    @cached_property
+    def _small(self) -> bool:
+        """True if eigenvalues are counted; turns of a response need steady sliding at the parameter's own value."""
+        return not self.own.balance.exists or len(self.own.pencil.a) <= _SMALL
 
-    def status(self, value: float) -> int:
-        """Status at a value: ABSENT, STABLE, UNSTABLE."""
-        return self._judged(value)[0]
+    def _pencil(self, value: float) -> StatePencil | None:
+        """Pencil at a value; None without steady sliding."""
+        return self.own.along(self.name, np.array([value])).pencil(0)
 
-    def _judged(self, value: float) -> tuple[int, StatePencil | None]:
-        if value not in self.known:
-            exists, pencil = self._at(value)
-            found = ABSENT if not exists or pencil is None else STABLE if self.growing(pencil) == 0 else UNSTABLE
-            self.known[value] = found, pencil
-        return self.known[value]
+    def statuses(self, values: Array, sure: bool = True) -> NDArray[np.int64]:
+        """Status at values (p,): ABSENT, STABLE, UNSTABLE; UNKNOWN where nothing holds a body.
 
-    def growing(self, pencil: StatePencil) -> int:
-        """Number of growing roots; −1 if ill-posed."""
-        if not pencil.posed or not np.all(np.isfinite(pencil.a)):
-            return -1
-        if self.turns is None:
-            return self.own.growing
-        more = self.turns.more_growing(pencil)
-        if more is None:
-            return int(np.sum(pencil.eigenvalues.real > 0))
-        return self.own.growing + more
+        If `sure`, UNKNOWN also where rounding hides whether a root grows.
+        """
+        found = np.full(len(values), UNKNOWN)
+        for part in self._parts(len(values)):
+            machines = self.own.along(self.name, values[part])
+            growing = self._growing(machines, sure)
+            slides = np.where(growing == 0, STABLE, np.where(growing == UNDECIDED, UNKNOWN, UNSTABLE))
+            balance = machines.balance
+            known = np.where(balance.held & balance.settled, ABSENT, UNKNOWN)
+            found[part] = np.where(balance.exists, slides, known)
+        return found
+
+    def _parts(self, count: int) -> list[slice]:
+        """Parts of so many machines that are treated together."""
+        size = len(self.own.pencil.a) if self.own.balance.exists else 2 * len(self.own.matrices.names)
+        together = max(_TOGETHER // size**2, 1)
+        return [slice(start, start + together) for start in range(0, count, together)]
+
+    def _growing(self, machines: MachinesAlong, sure: bool) -> NDArray[np.int64]:
+        """Number of growing roots, (p,), ILL_POSED or UNDECIDED. Of large machines by turns of a response."""
+        if self._small or self.turns is None:
+            return machines.growing(sure)
+        found = np.full(len(machines.posed), ILL_POSED)
+        for i in np.flatnonzero(machines.balance.exists & machines.posed):
+            pencil = machines.pencil(int(i))
+            if pencil is not None and np.all(np.isfinite(pencil.a)):
+                more = self.turns.more_growing(pencil)
+                found[i] = pencil.growing(sure) if more is None else self.own.growing + more
+        return found
 
     @cached_property
     def _probes(self) -> tuple[list[float], list[StatePencil]]:
@@ -113,8 +130,12 @@ class MatrixSearch:
         if np.isfinite(self.role.domain.high):  # angles and shares
             low, high = max(self.role.domain.low, -1.0), min(self.role.domain.high, 1.0)
             values = [self.value + share * (high - low) for share in (-0.1, 0.05, 0.13)]
-        kept = [(v - self.value, p) for v in values
-                if self.role.domain.contains(np.array([v]))[0] and (p := self._at(v)[1]) is not None]  # fmt: skip
+        inside = np.array([one for one in values if self.role.domain.contains(np.array([one]))[0]])
+        if not inside.size:
+            return [], []
+        machines = self.own.along(self.name, inside)
+        pencils = map(machines.pencil, range(len(inside)))
+        kept = [(float(v) - self.value, p) for v, p in zip(inside, pencils, strict=True) if p is not None]
         return [step for step, _ in kept], [pencil for _, pencil in kept]
 
     @cached_property
@@ -144,50 +165,117 @@ class MatrixSearch:
         """Edges of a parameter that enters by a term of rank one."""
         low, high = self.searched if between is None else between
         steps, omega = real_crossings(change, turns, unit)
-        values = self.value + steps
+        lost = self._lost(self._grid(between))
+        values, omega = np.concatenate([self.value + steps, lost]), np.concatenate([omega, np.zeros(len(lost))])
         inside = (values > low) & (values < high) & self.role.domain.contains(values)
         order = np.argsort(values[inside])
         values, omega = values[inside][order], omega[inside][order]
         values, omega = _distinct(values, omega)
         if not values.size:
             return ()
-        middle = np.concatenate([[_between(low, values[0])], [*map(_between, values, values[1:])],
-                                 [_between(values[-1], high)]])  # fmt: skip
-        status = [self.status(float(one)) for one in middle]
+        middle = np.array([_between(low, values[0]), *map(_between, values, values[1:]), _between(values[-1], high)])
+        status = self.statuses(middle).tolist()
         found = []
         for i, (value, beta) in enumerate(zip(values, omega, strict=True)):
-            if status[i] != status[i + 1]:
-                kind = "divergence" if beta == 0 else "oscillatory"
-                found.append(self._boundary(float(value), kind, float(beta), status[i], status[i + 1]))
+            if status[i] != status[i + 1] and UNKNOWN not in status[i : i + 2]:
+                found.append(self._described(float(value), float(beta), status[i], status[i + 1]))
         return tuple(found)
+
+    def _lost(self, grid: Array) -> Array:
+        """Values at which steady sliding ends, from samples."""
+        if not self.steady_changes:
+            return np.empty(0)
+        there = self._slides(grid)
+        return np.array([self._end(grid[i], grid[i + 1]) for i in np.flatnonzero(np.diff(there))])
+
+    @cached_property
+    def steady_changes(self) -> bool:
+        """True if the parameter changes the stresses of steady sliding or what it lacks to lock-up."""
+        steps, rounding = np.array(self._probes[0]), 1e-12
+        if len(steps) < len(_PROBES):  # some are out of the domain, or do not slide
+            return True
+        own, other = self.own.balance, self.own.balances_along(self.name, self.value + steps)
+        moved = np.abs(other.sigma - own.sigma) > rounding * own.sigma
+        return bool(np.any(moved) or np.any(np.abs(other.gain - own.gain) > rounding))
+
+    def _slides(self, values: Array) -> NDArray[np.bool_]:
+        parts = self._parts(len(values))
+        return np.concatenate([self.own.balances_along(self.name, values[part]).exists for part in parts])
+
+    def _end(self, low: float, high: float) -> float:
+        """Value in a bracket at which steady sliding begins or ends."""
+        first, last = self._narrowed(low, high, self._slides, 0.0)
+        found = 0.5 * (first + last)
+        return found if abs(found) * _FAR > max(abs(low), abs(high)) else 0.0  # where one end of the bracket is zero
 
     def _scanned(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         """Edges by counting roots at samples."""
         grid = self._grid(between)
-        status = [self.status(float(one)) for one in grid]
+        status = self.statuses(grid).tolist()
         found = []
         for i in np.flatnonzero(np.diff(status)):
-            found.append(self._edge(float(grid[i]), float(grid[i + 1]), status[i], status[i + 1]))
+            if UNKNOWN not in status[i : i + 2]:
+                found += self._edges(float(grid[i]), float(grid[i + 1]), status[i], status[i + 1])
         return tuple(found)
+
+    def _edges(self, low: float, high: float, below: int, above: int) -> list[Boundary]:
+        """Edges between two values with different status: one, or two where steady sliding ends beyond an edge."""
+        if ABSENT not in (below, above):
+            return [self._edge(low, high, below, above)]
+        end = self._end(low, high)
+        beside = end + _BESIDE * ((low if above == ABSENT else high) - end)
+        status = int(self.statuses(np.array([beside]))[0])
+        if above == ABSENT:
+            before = [] if status == below else [self._edge(low, beside, below, status)]
+            return [*before, self._described(end, 0.0, status, above)]
+        after = [] if status == above else [self._edge(beside, high, status, above)]
+        return [self._described(end, 0.0, below, status), *after]
+
+    def _described(self, value: float, beta: float, below: int, above: int) -> Boundary:
+        """Edge at a value; where steady sliding ends, with what ends it."""
+        if ABSENT not in (below, above):
+            return self._boundary(value, "oscillatory" if beta else "divergence", beta, below, above)
+        step = -_APART if below == ABSENT else _APART
+        lost = absence(self.own.varied(self.name, value + step * (abs(value) or self._sizes[0])))
+        return self._boundary(value, lost.condition, 0.0, below, above, lost.contact)
 
     def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
         """Edge between two values with different status."""
-        if ABSENT in (below, above):
-            low, high = _halved(lambda value: self.status(value) == below, low, high, 60)
-            missing = low if below == ABSENT else high
-            lost = absence(self.own.varied(self.name, missing))
-            return self._boundary(0.5 * (low + high), lost.condition, 0.0, below, above, lost.contact)
-        low, high = _halved(lambda value: self.status(value) == below, low, high, _HALVINGS)
-        pencils = [self._judged(value)[1] for value in (low, high)]
-        if any(one is None or not one.posed for one in pencils):
-            return self._boundary(0.5 * (low + high), "ill-posed", 0.0, below, above)
-        value, beta = self._polished(low, high)
-        return self._boundary(value, "oscillatory" if beta else "divergence", beta, below, above)
+
+        def is_other(values: Array) -> NDArray[np.bool_]:
+            return np.asarray(self.statuses(values, sure=False) != below)
+
+        for width in (_NEAR, _BRACKET):
+            low, high = self._narrowed(low, high, is_other, width)
+            pencils = [self._pencil(value) for value in (low, high)]
+            if any(one is None or not one.posed for one in pencils):
+                continue
+            value, beta = self._polished(low, high)
+            around = self.statuses(np.array([value * (1 - _BRACKET), value * (1 + _BRACKET)]), sure=False)
+            if width == _BRACKET or set(around.tolist()) == {below, above}:
+                return self._described(value, beta, below, above)
+        return self._boundary(0.5 * (low + high), "ill-posed", 0.0, below, above)
+
+    def _narrowed(
+        self, low: float, high: float, where: Callable[[Array], NDArray[np.bool_]], width: float
+    ) -> tuple[float, float]:
+        """Bracket, of relative `width` or of neighbouring numbers, in which a property first changes."""
+        parts, first = _PARTS if self._small else 2, bool(where(np.array([low]))[0])
+        for _ in range(int(_HALVINGS / np.log2(parts))):
+            inner = low + (high - low) * np.arange(1, parts) / parts
+            inner = inner[(inner > low) & (inner < high)]
+            if not inner.size or high - low <= width * max(abs(low), abs(high)):
+                break
+            other = np.flatnonzero(where(inner) != first)
+            ends = np.concatenate([[low], inner, [high]])
+            at = int(other[0]) if other.size else len(inner)
+            low, high = float(ends[at]), float(ends[at + 1])
+        return low, high
 
     def _polished(self, low: float, high: float) -> tuple[float, float]:
         """Value and frequency of an edge in a narrow bracket, by Newton's method on the characteristic function."""
         middle = 0.5 * (low + high)
-        pencil = self._at(middle)[1]
+        pencil = self._pencil(middle)
         if pencil is None:
             return middle, 0.0
         roots = pencil.eigenvalues[pencil.eigenvalues.imag >= 0]
@@ -210,7 +298,8 @@ class MatrixSearch:
     def _crossing_step(self, value: float, beta: float) -> tuple[float, float] | None:
         """Newton step of value and frequency towards a root on the imaginary axis, by the eigenvalue's own slopes."""
         step = _APART * (abs(value) or self._sizes[0])
-        here, there = self._at(value)[1], self._at(value + step)[1]
+        machines = self.own.along(self.name, np.array([value, value + step]))
+        here, there = machines.pencil(0), machines.pencil(1)
         if here is None or there is None:
             return None
         root, slope = _followed(here, there, 1j * beta, step)
@@ -242,24 +331,15 @@ def _followed(here: StatePencil, there: StatePencil, near: complex, step: float)
 
 
 def _between(low: float, high: float) -> float:
-    """A value between two others, the geometric mean where both have one sign."""
-    return float(np.sign(low) * np.sqrt(low * high)) if low * high > 0 else 0.5 * (low + high)
+    """A value between two others, the geometric mean where both have one sign and are not too far apart."""
+    ratio = high / low if low else 0.0
+    return float(np.sign(low) * np.sqrt(low * high)) if 1 / _FAR < ratio < _FAR else 0.5 * (low + high)
 
 
 def _distinct(values: Array, omega: Array) -> tuple[Array, Array]:
     """Rising values without those that repeat the one before to rounding."""
     keep = np.diff(values, prepend=-np.inf) > 1e-12 * np.abs(values)
     return values[keep], omega[keep]
-
-
-def _halved(is_below: Callable[[float], bool], low: float, high: float, times: int) -> tuple[float, float]:
-    """Bracket halved so often that a property of its lower end changes inside."""
-    for _ in range(times):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if is_below(middle) else (low, middle)
-    return low, high
 
 
 @question

@@ -19,7 +19,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
-from steadyslip.model.numeric import by_matrices
+from steadyslip.model.numeric import has_structure
 
 HELD = (
     "the drive holds a place (velocity = 0), so there is no steady sliding to be stable or not: linear stability does "
@@ -77,7 +77,7 @@ def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model
     """Build the Model without checks; `drive` is `MOVED`, `PULLED` or `EITHER`."""
     if rig.holds:
         raise NotAvailable(HELD)
-    if by_matrices(rig):
+    if has_structure(rig):
         raise NotAvailable(
             "this is not offered for a machine with a structure, whose equations are matrices; offered are analyze, "
             "eigenvalues, growth_rate, stability, boundary, margins, modes and steady_state"

@@ -21,7 +21,7 @@ from steadyslip.linear.modes import Mode, matrix_mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND
-from steadyslip.model.numeric import by_matrices
+from steadyslip.model.numeric import by_matrices, has_structure
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.sliding import steady_machine
@@ -166,7 +166,7 @@ def _analyze_by_matrices(machine: Machine, kicks: Sequence[str]) -> MachineAnaly
     """Verdict on a machine whose equations are matrices: as of others, without the kind of onset."""
     from steadyslip import __version__
 
-    if kicks:
+    if kicks and has_structure(machine):
         raise NotAvailable("kicks are not offered for a machine with a structure, whose equations are matrices")
     with np.errstate(all="ignore"):
         point = require_matrices(machine)
@@ -186,7 +186,7 @@ def _analyze_by_matrices(machine: Machine, kicks: Sequence[str]) -> MachineAnaly
         found = MachineAnalysis(
             rig=machine, reason="", steady=steady, on_edge=edged, margins=distances, version=__version__,
             mode=None if leading is None else matrix_mode(point, complex(leading.real, abs(leading.imag))),
-            warnings=_warnings(machine, steady), checks=(*checks, *of_edges), **numbers,
+            kicks=_kicks(machine, kicks), warnings=_warnings(machine, steady), checks=(*checks, *of_edges), **numbers,
         )  # fmt: skip
     return replace(found, reason=_reason(found))
 

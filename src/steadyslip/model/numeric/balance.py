@@ -3,70 +3,83 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import NotAvailable
 from steadyslip.model.numeric.contact_laws import SteadyNumbers
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site
 
 _STEPS = 60  # of Newton's method; laws that are linear in the stresses take two
 _CONVERGED = 1e-13  # change of the stresses relative to them, some hundred units in the last place
+_STALLED = 1e-6  # change that no longer falls: rounding, of stresses far smaller than the forces that balance
 _SHRINK = 0.1  # smallest share of a stress that one step leaves
 _FREE = 1e-13  # pivot of the balances, relative to the largest, below which they leave a body free
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Steady sliding in numbers.
+    """Steady sliding in numbers, of one machine or of several along a leading axis (...).
 
     Attributes
     ----------
-    sigma, tau : ndarray (contacts,)
+    sigma, tau : ndarray (..., contacts)
         Stresses (Pa); NaN without steady sliding.
-    displacement : ndarray (n,)
-    integral : float
-    gain : float
+    displacement : ndarray (..., n)
+    integral : ndarray (...)
+    gain : ndarray (...)
         Largest factor by which friction raises itself through the normal stresses; >= 1 is lock-up.
-    wanted : ndarray (contacts,)
+    wanted : ndarray (..., contacts)
         Normal stresses that would balance the forces, negative ones too.
+    held, settled : ndarray of bool (...)
+        False where the balances leave a body free, and where Newton's method came to no end.
     """
 
     sigma: Array
     tau: Array
     displacement: Array
-    integral: float
-    gain: float
+    integral: Array
+    gain: Array
     wanted: Array
+    held: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
 
     @property
-    def exists(self) -> bool:
-        """True with steady sliding."""
-        return bool(self.gain < 1 and np.all(np.isfinite(self.sigma)) and np.all(self.sigma > 0))
+    def problem(self) -> str:
+        """Why it was not found of one machine; empty where it was, or where there is none."""
+        if not self.held:
+            return "nothing holds some body of this machine in its place; give every body a link"
+        return (
+            ""
+            if self.settled
+            else ("steady sliding of this machine was not found: its laws depend too steeply on the load")
+        )
+
+    @property
+    def exists(self) -> NDArray[np.bool_]:
+        """True with steady sliding, (...)."""
+        there = self.held & self.settled & (self.gain < 1)
+        return np.asarray(there & np.all(np.isfinite(self.sigma) & (self.sigma > 0), axis=-1))
 
 
-def state_of(site: Site, found: Balance, i: int, speeds: Array) -> tuple[float, ...]:
+def state_of(site: Site, found: Balance, i: int, speeds: Array) -> tuple[Any, ...]:
     """Arguments of the law functions at steady sliding: v, σ, T, τ, distance, stiffness."""
     return (
-        site.velocity, float(found.sigma[i]), spring_of(site, found.displacement, found.integral, speeds),
-        float(found.tau[i]), float(site.apart @ found.displacement), site.stiffness,
+        site.velocity, found.sigma[..., i], spring_of(site, found.displacement, found.integral, speeds),
+        found.tau[..., i], np.sum(site.apart * found.displacement, axis=-1), site.stiffness,
     )  # fmt: skip
 
 
-def spring_of(site: Site, displacement: Array, integral: float, speeds: Array) -> float:
-    """T (Pa) of a contact in steady sliding."""
-    return float(site.pull @ displacement + site.pull_rate @ speeds) + site.pull_integral * integral + site.pull_moving
+def spring_of(site: Site, displacement: Array, integral: Array, speeds: Array) -> Array:
+    """T (Pa) of a contact in steady sliding, (...)."""
+    pulled = np.sum(site.pull * displacement + site.pull_rate * speeds, axis=-1)
+    return np.asarray(pulled + site.pull_integral * integral + site.pull_moving)
 
 
-def balance(machine: MachineMatrices) -> Balance:
-    """Steady sliding of a machine.
-
-    Raises
-    ------
-    NotAvailable
-        If the balances leave a body free, or Newton's method does not come to an end.
-    """
+def balances(machine: MachineMatrices) -> Balance:
+    """Steady sliding of one machine or of several; `held` and `settled` tell where it was not found."""
     return _Newton(machine).solve()
 
 
@@ -76,112 +89,154 @@ class _Newton:
     def __init__(self, machine: MachineMatrices) -> None:
         self.machine, self.sites = machine, machine.sites
         self.size, self.more = len(machine.names), int(machine.integrates)
-        self.fixed = machine.force - machine.damping @ machine.speeds
-        self.held = self._statics()
+        self.fixed = machine.force - np.einsum("...ij,...j->...i", machine.damping, machine.speeds)
+        self.statics = self._statics()
 
     def _statics(self) -> Array:
         """Matrix of the balances and of the controller's integral, without contacts."""
         n, own = self.size, self.machine
-        found = np.zeros((n + self.more, n + self.more))
-        found[:n, :n] = own.stiffness
+        found = np.zeros((*own.several, n + self.more, n + self.more))
+        found[..., :n, :n] = own.stiffness
         if self.more:
-            found[:n, n], found[n, :n] = own.integral_acts, own.integral_senses
+            found[..., :n, n], found[..., n, :n] = own.integral_acts, own.integral_senses
         return found
 
     def solve(self) -> Balance:
-        count, start = len(self.sites), self.size + self.more
-        unknown = np.concatenate([np.zeros(start), np.ones(count)])
-        gain, wanted = -np.inf, np.full(count, np.nan)
+        count, start, several = len(self.sites), self.size + self.more, self.machine.several
+        unknown = np.concatenate([np.zeros((*several, start)), np.ones((*several, count))], axis=-1)
+        held, settled, lifted = np.ones(several, bool), np.zeros(several, bool), np.zeros(several, bool)
+        final, last = unknown, np.full(several, np.inf)
         for step in range(_STEPS):
-            matrix, right, loads, frictions = self._linear(unknown)
-            new = _solved(matrix, right)
-            if step == 0:
-                gain = _friction_gain(matrix, loads, frictions, start)
-            wanted = new[start:]
-            change = np.max(np.abs(wanted - unknown[start:]) / np.maximum(np.abs(wanted), 1e-300), initial=0.0)
-            if np.all(wanted > 0) and change <= _CONVERGED:
-                return self._found(new, gain, wanted)
-            if step and np.any(wanted <= 0) and np.all(unknown[start:][wanted <= 0] <= _SHRINK):
-                break  # pressed against zero twice: the contact lifts
-            unknown = np.concatenate([new[:start], np.maximum(wanted, _SHRINK * unknown[start:])])
-        else:
-            if not np.all(wanted > 0):
-                return self._absent(gain, wanted)
-            raise NotAvailable("steady sliding of this machine was not found: its laws depend too steeply on the load")
-        return self._absent(gain, wanted)
+            matrix, right = self._linear(unknown)
+            new, solvable = _solved(matrix, right)
+            held &= solvable | settled | lifted
+            wanted, before = new[..., start:], unknown[..., start:]
+            change = np.max(np.abs(wanted - before) / np.maximum(np.abs(wanted), 1e-300), axis=-1, initial=0.0)
+            open_ = ~(settled | lifted)
+            final = np.where(open_[..., None], new, final)
+            still = (change <= _CONVERGED) | (change <= _STALLED) & (change >= 0.5 * last)
+            settled |= open_ & np.all(wanted > 0, axis=-1) & still
+            last = change
+            if step:  # pressed against zero twice: the contact lifts
+                pressed = np.all((wanted > 0) | (before <= _SHRINK), axis=-1)
+                lifted |= open_ & ~settled & np.any(wanted <= 0, axis=-1) & pressed
+            if np.all(settled | lifted | ~held):
+                break
+            unknown = np.concatenate([new[..., :start], np.maximum(wanted, _SHRINK * before)], axis=-1)
+        lifted |= ~settled & ~np.all(final[..., start:] > 0, axis=-1)
+        return self._found(final, self._gain(final), held, settled & held, settled | lifted)
 
-    def _absent(self, gain: float, wanted: Array) -> Balance:
-        nothing = np.full(len(self.sites), np.nan)
-        return Balance(nothing, nothing, np.full(self.size, np.nan), np.nan, gain, wanted)
-
-    def _found(self, unknown: Array, gain: float, wanted: Array) -> Balance:
-        places, more = unknown[: self.size], unknown[self.size : self.size + self.more]
-        integral = float(more[0]) if self.more else 0.0
-        tau = np.array([self._numbers(i, unknown).friction for i in range(len(self.sites))])
-        sigma = wanted if gain < 1 else np.full(len(self.sites), np.nan)
-        return Balance(sigma, tau, places, integral, gain, wanted)
+    def _found(
+        self, unknown: Array, gain: Array, held: NDArray[np.bool_], there: NDArray[np.bool_], ended: NDArray[np.bool_]
+    ) -> Balance:
+        start = self.size + self.more
+        unknown = np.where(held[..., None], unknown, np.nan)
+        wanted, places = unknown[..., start:], unknown[..., : self.size]
+        integral = unknown[..., self.size] if self.more else np.zeros(self.machine.several)
+        tau = np.zeros(wanted.shape)
+        for i in range(len(self.sites)):
+            tau[..., i] = self._numbers(i, unknown).friction
+        slides = there[..., None]
+        sigma = np.where(slides & (gain < 1)[..., None], wanted, np.nan)
+        return Balance(
+            sigma, np.where(slides, tau, np.nan), np.where(slides, places, np.nan), np.where(there, integral, np.nan),
+            gain, wanted, held, ended,
+        )  # fmt: skip
 
     def _numbers(self, i: int, unknown: Array) -> SteadyNumbers:
-        site, places = self.sites[i], unknown[: self.size]
-        integral = float(unknown[self.size]) if self.more else 0.0
-        sigma = float(unknown[self.size + self.more + i])
+        site, places = self.sites[i], unknown[..., : self.size]
+        integral = unknown[..., self.size] if self.more else np.zeros(())
+        sigma = unknown[..., self.size + self.more + i]
         pulled = spring_of(site, places, integral, self.machine.speeds)
-        distance = float(site.apart @ places)
+        distance = np.sum(site.apart * places, axis=-1)
         first = site.laws.steady(site.own, site.velocity, sigma, pulled, 0.0, distance, site.stiffness)
         return site.laws.steady(site.own, site.velocity, sigma, pulled, first.friction, distance, site.stiffness)
 
-    def _linear(self, unknown: Array) -> tuple[Array, Array, Array, Array]:
-        """Matrix and right side of a Newton step; the columns of friction forces, and slopes of friction with σ."""
-        n, start, count = self.size, self.size + self.more, len(self.sites)
-        matrix = np.zeros((start + count, start + count))
-        matrix[:start, :start] = self.held
-        right = np.zeros(start + count)
-        right[:n] = self.fixed
-        loads, frictions = np.zeros((start + count, count)), np.zeros(count)
+    def _linear(self, unknown: Array) -> tuple[Array, Array]:
+        """Matrix and right side of a Newton step."""
+        n, start, more = self.size, self.size + self.more, self.more
+        matrix = np.zeros((*unknown.shape, unknown.shape[-1]))
+        matrix[..., :start, :start] = self.statics
+        right = np.zeros(unknown.shape)
+        right[..., :n] = self.fixed
         for i, site in enumerate(self.sites):
             now, row = self._numbers(i, unknown), start + i
-            sigma = unknown[row]
-            rest = now.friction - now.friction_by_stress * sigma  # τ = rest + slope σ near here
-            loads[:n, i], frictions[i] = site.area * site.slip, now.friction_by_stress
-            loads[row, i] = -now.by_friction
-            matrix[:n, row] -= site.area * site.apart
-            matrix[row, row] += 1
-            matrix[row, :n] -= now.by_spring * site.pull + now.by_distance * site.apart
+            by_place, by_integral = self._pressing(site, now.by_spring, now.by_distance)
+            load = np.zeros(unknown.shape)
+            load[..., :n] = _times(site.area, site.slip)
+            load[..., row] = -now.by_friction
+            matrix[..., :n, row] -= _times(site.area, site.apart)
+            matrix[..., row, row] += 1
+            matrix[..., row, :n] -= by_place
+            seen = now.by_friction * now.friction + np.sum(by_place * unknown[..., :n], axis=-1)
+            if more:
+                matrix[..., row, n] -= by_integral
+                seen = seen + by_integral * unknown[..., n]
+            right[..., row] = now.pressed - seen
+            rest = now.friction - now.friction_by_stress * unknown[..., row]  # τ = rest + slope σ near here
+            right -= _times(rest, load)
+            matrix[..., row] += _times(now.friction_by_stress, load)
+        return matrix, right
+
+    def _pressing(self, site: Site, by_spring: Any, by_distance: Any) -> tuple[Array, Any]:
+        """Slopes of the normal stress with displacements (..., n) and with the integral of a controller (...)."""
+        by_place = _times(by_spring, site.pull) + _times(by_distance, site.apart)
+        return by_place, by_spring * site.pull_integral
+
+    def _gain(self, unknown: Array) -> Array:
+        """Largest real factor by which friction raises itself through normal stresses, (...); −inf if none is real.
+
+        The stress of a contact that is given does not follow the friction of others, only its own (theory 4).
+        """
+        n, start = self.size, self.size + self.more
+        without = np.zeros((*unknown.shape, unknown.shape[-1]))
+        without[..., :start, :start] = self.statics
+        loads = np.zeros((*unknown.shape, len(self.sites)))
+        for i, site in enumerate(self.sites):
+            now, row = self._numbers(i, unknown), start + i
+            by_place, by_integral = self._pressing(site, now.coupled_by_spring, now.by_distance)
+            without[..., :n, row] -= _times(site.area, site.apart)
+            without[..., row, row] += 1
+            without[..., row, :n] -= by_place
             if self.more:
-                matrix[row, n] -= now.by_spring * site.pull_integral
-            seen = now.by_friction * now.friction + now.by_distance * (site.apart @ unknown[:n])
-            seen += now.by_spring * float(site.pull @ unknown[:n])
-            if self.more:
-                seen += now.by_spring * site.pull_integral * unknown[n]
-            right[row] = now.pressed - seen
-            right -= loads[:, i] * rest
-            matrix[:, row] += loads[:, i] * now.friction_by_stress
-        return matrix, right, loads, frictions
+                without[..., row, n] -= by_integral
+            loads[..., :n, i] = _times(
+                now.friction_by_stress * np.ones(self.machine.several), _times(site.area, site.slip)
+            )
+            loads[..., row, i] = -now.coupled_by_friction * now.friction_by_stress
+        one = np.eye(unknown.shape[-1])
+        good = np.all(np.isfinite(without), axis=(-2, -1)) & np.all(np.isfinite(loads), axis=(-2, -1))
+        good &= np.linalg.slogdet(np.where(good[..., None, None], without, one))[0] != 0
+        without = np.where(good[..., None, None], without, one)
+        raised = -np.linalg.solve(without, np.where(good[..., None, None], loads, 0.0))[..., start:, :]
+        for i, site in enumerate(self.sites):
+            if site.laws.given:
+                raised[..., i, :] = raised[..., i, i, None] * np.eye(len(self.sites))[i]
+        gains = np.linalg.eigvals(raised)
+        real = np.abs(gains.imag) <= 1e-9 * np.abs(gains)  # rounding, as in `steadyslip.model.steady`
+        largest = np.max(np.where(real, gains.real, -np.inf), axis=-1, initial=-np.inf)
+        return np.where(good, largest, np.inf)
 
 
-def _solved(matrix: Array, right: Array) -> Array:
-    """Solution of linear equations; rows and columns of very different size are balanced first.
+def _times(factor: Any, row: Array) -> Array:
+    """Rows (..., n) times factors (...)."""
+    return np.asarray(np.asarray(factor)[..., None] * row)
 
-    Raises
-    ------
-    NotAvailable
-        If the matrix is singular.
+
+def _solved(matrix: Array, right: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Solutions of linear equations, and where there are any.
+
+    Rows and columns of very different size are balanced first.
     """
-    rows = np.max(np.abs(matrix), axis=1)
-    even = matrix / np.where(rows > 0, rows, 1.0)[:, None]
-    columns = np.max(np.abs(even), axis=0)
+    rows = np.max(np.abs(matrix), axis=-1)
+    even = matrix / np.where(rows > 0, rows, 1.0)[..., None]
+    columns = np.max(np.abs(even), axis=-2)
     columns = np.where(columns > 0, columns, 1.0)
-    even = even / columns
-    if np.min(rows, initial=np.inf) == 0 or np.linalg.cond(even) > 1 / _FREE:
-        raise NotAvailable("nothing holds some body of this machine in its place; give every body a link")
-    found: Array = np.linalg.solve(even, right / rows) / columns
-    return found
-
-
-def _friction_gain(matrix: Array, loads: Array, frictions: Array, start: int) -> float:
-    """Largest real factor by which friction raises itself; −inf if none is real."""
-    without = matrix.copy()
-    without[:, start:] -= loads * frictions
-    gains = np.linalg.eigvals(-np.linalg.solve(without, loads * frictions)[start:])
-    real = np.abs(gains.imag) <= 1e-9 * np.abs(gains)  # rounding, as in `steadyslip.model.steady`
-    return float(np.max(np.where(real, gains.real, -np.inf), initial=-np.inf))
+    even = even / columns[..., None, :]
+    finite = np.all(np.isfinite(even), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1)
+    one = np.eye(matrix.shape[-1])
+    even = np.where(finite[..., None, None], even, one)
+    good = finite & np.all(rows > 0, axis=-1) & (np.linalg.cond(even) <= 1 / _FREE)
+    even = np.where(good[..., None, None], even, one)
+    found = np.linalg.solve(even, (right / np.where(rows > 0, rows, 1.0))[..., None])[..., 0] / columns
+    return np.where(good[..., None], found, np.nan), good

@@ -28,22 +28,26 @@ _SPRING_SS, _TAU_SS, _DISTANCE_SS, _STIFFNESS = inner_symbols("n_Tss n_tauss n_u
 
 @dataclass(frozen=True)
 class SteadyNumbers:
-    """Stresses (Pa) of a contact in steady sliding by its laws, and their slopes.
+    """Stresses (Pa) of a contact in steady sliding by its laws, and their slopes, float or (...) as their arguments.
 
     Attributes
     ----------
-    friction, friction_by_stress : float
+    friction, friction_by_stress
         τss, and its slope with the normal stress.
-    pressed, by_spring, by_friction, by_distance : float
+    pressed, by_spring, by_friction, by_distance
         Normal stress by the contact law, and its slopes with T, τ and the distance of the surfaces.
+    coupled_by_spring, coupled_by_friction
+        Slopes with T and τ of what motion adds; they differ where the steady normal stress is given.
     """
 
-    friction: float
-    friction_by_stress: float
-    pressed: float
-    by_spring: float
-    by_friction: float
-    by_distance: float
+    friction: Any
+    friction_by_stress: Any
+    pressed: Any
+    by_spring: Any
+    by_friction: Any
+    by_distance: Any
+    coupled_by_spring: Any
+    coupled_by_friction: Any
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,13 @@ class Slopes:
 
     Attributes
     ----------
-    strength : ndarray (3 + m,)
+    strength : ndarray (..., 3 + m)
         Of the friction stress with v, σ, τ and the m memory variables.
-    rates : ndarray (m, 3 + m)
+    rates : ndarray (..., m, 3 + m)
         Of the rates of the memory variables, with the same.
-    normal : ndarray (7 + p,)
+    normal : ndarray (..., 7 + p)
         Of the normal stress with x, v, v̇, T, τ, distance, rate of the distance and the p states of the contact law.
-    state_rates : ndarray (p, 7 + p)
+    state_rates : ndarray (..., p, 7 + p)
         Of the rates of these states, with the same.
     """
 
@@ -88,6 +92,9 @@ class ContactFunctions:
         pressed = of_law(contact, "normal_stress", motion.steady)
         steady = [tau_ss, derivative(tau_ss, _SIGMA), pressed]
         steady += [derivative(pressed, one) for one in (_SPRING_SS, _TAU_SS, _DISTANCE_SS)]
+        coupled = of_law(contact, "coupling", motion.steady)
+        steady += [derivative(coupled, one) for one in (_SPRING_SS, _TAU_SS)]
+        self.given = contact.load() is None
         self._steady = ArrayFunction([*symbols, _V0, _SIGMA, _SPRING_SS, _TAU_SS, _DISTANCE_SS, _STIFFNESS], steady)
         normal = of_law(contact, "normal_stress", motion)
         self.follows_pull = bool(normal.free_symbols & {SPRING, _STIFFNESS})
@@ -110,18 +117,22 @@ class ContactFunctions:
             [*symbols, _V0, _SIGMA, _TAU_SS], [*(sp.sympify(e) for e, _ in seen.values()), *kept]
         )
 
-    def steady(self, own: Array, *at: float) -> SteadyNumbers:
+    def steady(self, own: tuple[Any, ...], *at: Any) -> SteadyNumbers:
         """Stresses at v, σ, T, τ, distance and stiffness; `own` are the laws' parameters by `numbers_of`."""
-        return SteadyNumbers(*(float(one) for one in self._steady(*own, *at)))
+        return SteadyNumbers(*self._steady(*own, *at))
 
-    def slopes(self, own: Array, *at: float) -> Slopes:
+    def slopes(self, own: tuple[Any, ...], *at: Any) -> Slopes:
         """Slopes at v, σ, T, τ, distance and stiffness."""
-        found = np.array([float(one) for one in self._slopes(*own, *at)])
+        several = np.broadcast_shapes(*(np.shape(one) for one in (*own, *at)))
+        found = np.stack([np.broadcast_to(one, several) for one in self._slopes(*own, *at)], axis=-1).astype(float)
         count = self._shapes[0][0] * self._shapes[0][1]
-        slip, press = found[:count].reshape(self._shapes[0]), found[count:].reshape(self._shapes[1])
-        return Slopes(slip[0], slip[1:], press[0], press[1:])
+        slip, press = (
+            part.reshape(*several, *shape)
+            for part, shape in zip((found[..., :count], found[..., count:]), self._shapes, strict=True)
+        )
+        return Slopes(slip[..., 0, :], slip[..., 1:, :], press[..., 0, :], press[..., 1:, :])
 
-    def observed(self, own: Array, v: float, sigma: float, tau: float) -> dict[str, float]:
+    def observed(self, own: tuple[Any, ...], v: float, sigma: float, tau: float) -> dict[str, float]:
         """States of the laws in steady sliding, in the literature's form, by name."""
         values = self._seen(*own, v, sigma, tau)
         return {name: float(value) + 0.0 for name, value in zip(self.seen, values, strict=True)}
@@ -144,10 +155,10 @@ def _with_symbols(law: Any, kind: str) -> tuple[Any, list[sp.Symbol]]:
     return with_values(law, symbols), [one for one in symbols.values() if one.is_Symbol]
 
 
-def numbers_of(friction: FrictionLaw, contact: ContactLaw) -> Array:
-    """Values of the laws' parameters in the order of the compiled functions."""
+def numbers_of(friction: FrictionLaw, contact: ContactLaw) -> list[Any]:
+    """Values of the laws' parameters in the order of the compiled functions; numbers or expressions."""
     given = [one for law in (friction, contact) for one in parameters(law).values() if one.value is not None]
-    return np.array([float(one.value) for one in given if not (one.role.structural and one.value == 0)])  # type: ignore[arg-type]
+    return [one.value for one in given if not (one.role.structural and one.value == 0)]
 
 
 class _Pair:

@@ -1,21 +1,31 @@
 """Matrices of a machine: M q'' + C q' + K q = forces of contacts, with directions of slip and of distance.
 
 Displacements are absolute here, measured from the unstressed state of springs, with the load point at rest at zero:
-the equations are linear but for the contacts.
+the equations are linear but for the contacts. Machines that differ in one parameter are assembled together, as arrays
+with a leading axis: shapes (...) are () for one machine, (p,) for p values of a parameter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.records import with_values
+from steadyslip.core.symbols import inner_symbol
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
 from steadyslip.model.numeric.contact_laws import ContactFunctions, functions_of, numbers_of
+
+_VARIED = inner_symbol("n_varied", real=True)
+_DELAYED = "a controller with a delay is not offered beside a structure given by matrices"
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,31 +35,31 @@ class Site:
     Attributes
     ----------
     name : str
-    slip, apart : ndarray (n,)
+    slip, apart : ndarray (..., n)
         Rows of slip and of the distance of the surfaces.
-    area, velocity, stiffness : float
+    area, velocity, stiffness : float or ndarray (...)
         Area, slip rate in steady sliding, and k, the stiffness between body and load point.
-    pull, pull_rate : ndarray (n,)
+    pull, pull_rate : ndarray (..., n)
         Rows of T with displacements and velocities.
-    pull_integral, pull_moving : float
+    pull_integral, pull_moving : float or ndarray (...)
         T by the integral of a controller, and by the motion of the load point alone.
     laws : ContactFunctions
-    own : ndarray
+    own : tuple of float or ndarray (...)
         Values of the laws' parameters.
     """
 
     name: str
     slip: Array
     apart: Array
-    area: float
-    velocity: float
-    stiffness: float
+    area: Any
+    velocity: Any
+    stiffness: Any
     pull: Array
     pull_rate: Array
-    pull_integral: float
-    pull_moving: float
+    pull_integral: Any
+    pull_moving: Any
     laws: ContactFunctions
-    own: Array
+    own: tuple[Any, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +70,11 @@ class MachineMatrices:
     ----------
     names : tuple of str
         Coordinates.
-    mass, damping, stiffness : ndarray (n, n)
+    mass, damping, stiffness : ndarray (..., n, n)
         Bodies, links, controllers and structures. The damping has the gyroscopic matrices in it.
-    force, speeds : ndarray (n,)
+    force, speeds : ndarray (..., n)
         Constant forces, those of dashpots at the moving load point included, and speeds in steady sliding.
-    integral_acts, integral_senses : ndarray (n,)
+    integral_acts, integral_senses : ndarray (..., n)
         Integral action of a controller: force −acts · I with I' = senses · q; zero without one.
     sites : tuple of Site
     """
@@ -84,93 +94,171 @@ class MachineMatrices:
         """True with integral action."""
         return bool(np.any(self.integral_acts != 0))
 
+    @property
+    def several(self) -> tuple[int, ...]:
+        """The leading axis: () for one machine, (p,) for p machines."""
+        return self.force.shape[:-1]
 
-def assemble(mechanism: Mechanism) -> MachineMatrices:
-    """Matrices of a mechanism in numbers.
+
+_OF_MACHINES = ("mass", "damping", "stiffness", "force", "speeds", "integral_acts", "integral_senses")
+_OF_SITES = (
+    "slip", "apart", "area", "velocity", "stiffness", "pull", "pull_rate", "pull_integral", "pull_moving",
+)  # fmt: skip
+
+
+def assemble(machine: Machine) -> MachineMatrices:
+    """Matrices of a machine.
 
     Raises
     ------
     NotAvailable
         If a controller or friction law has a delay.
     """
-    return _Assembler(mechanism).matrices()
+    return _Assembler(machine.mechanism(), np.zeros(())).matrices()
+
+
+class VariedMachine:
+    """A machine as a function of one parameter."""
+
+    def __init__(self, machine: Machine, name: str) -> None:
+        kind, _, rest = name.partition(".")
+        self.machine, self.name = machine, name
+        self.of_structure = kind == "bodies" and machine.bodies[rest.partition(".")[0]].is_structure
+        if not self.of_structure:  # whose methods take numbers only
+            self.mechanism = with_values(machine, {name: _VARIED}).mechanism()
+
+    def matrices(self, values: Array) -> MachineMatrices:
+        """Matrices of the machines with values (p,), SI, which are not checked."""
+        if self.of_structure:
+            machines = (with_values(self.machine, {self.name: float(one)}) for one in values)
+            return _stacked([assemble(one) for one in machines])
+        return _Assembler(self.mechanism, values).matrices()
+
+
+def _stacked(several: list[MachineMatrices]) -> MachineMatrices:
+    """Machines that differ in numbers only as one, along a leading axis."""
+
+    def together(records: Sequence[Any], names: tuple[str, ...]) -> dict[str, Any]:
+        return {name: np.stack([getattr(one, name) for one in records]) for name in names}
+
+    first = several[0]
+    sites = []
+    for own in zip(*(one.sites for one in several), strict=True):
+        numbers = tuple(np.array(values) for values in zip(*(one.own for one in own), strict=True))
+        sites.append(replace(own[0], own=numbers, **together(own, _OF_SITES)))
+    return replace(first, sites=tuple(sites), **together(several, _OF_MACHINES))
+
+
+@lru_cache(maxsize=256)
+def _function_of(given: sp.Expr) -> ArrayFunction:
+    return ArrayFunction([_VARIED], [given])
 
 
 class _Assembler:
-    """Builder of one `MachineMatrices`."""
+    """Builder of one `MachineMatrices`; numbers of the mechanism may contain the varied parameter."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+    def __init__(self, mechanism: Mechanism, values: Array) -> None:
+        self.mechanism, self.values = mechanism, values
+        self.known: dict[sp.Expr, Array] = {}
         parts = mechanism.structures
         self.names = tuple(one.name for one in mechanism.coordinates) + tuple(n for p in parts for n in p.coordinates)
         self.place = {name: i for i, name in enumerate(self.names)}
-        self.velocity = float(mechanism.velocity)
-        speeds = [float(one.speed) for one in mechanism.coordinates]
-        self.speeds = np.concatenate([speeds, *(p.speeds for p in parts)]) if self.names else np.zeros(0)
+        self.velocity = self.number(mechanism.velocity)
+        self.speeds = self.zeros(len(self.names))
+        for i, one in enumerate(mechanism.coordinates):
+            self.speeds[..., i] = self.number(one.speed)
+        start = len(mechanism.coordinates)
+        for part in parts:
+            self.speeds[..., start : start + len(part.coordinates)] = part.speeds
+            start += len(part.coordinates)
+
+    def number(self, given: Any) -> Any:
+        """A number of the mechanism: a float, or one for each value (p,) of the varied parameter."""
+        if not isinstance(given, sp.Basic) or _VARIED not in given.free_symbols:
+            return float(given)
+        if given not in self.known:
+            found = _function_of(given)(self.values)[0]
+            self.known[given] = np.broadcast_to(np.asarray(found, dtype=float), self.values.shape)
+        return self.known[given]
+
+    def zeros(self, *shape: int) -> Array:
+        return np.zeros((*self.values.shape, *shape))
 
     def row(self, shares: Mapping[str, Any]) -> Array:
-        found = np.zeros(len(self.names))
+        found = self.zeros(len(self.names))
         for name, share in shares.items():
             if name != LOAD_POINT:
-                found[self.place[name]] += float(share)
+                found[..., self.place[name]] += self.number(share)
         return found
 
-    def moving(self, shares: Mapping[str, Any]) -> float:
+    def moving(self, shares: Mapping[str, Any]) -> Any:
         """Velocity that a row gets from the load point."""
-        return float(shares.get(LOAD_POINT, 0)) * self.velocity
+        return self.number(shares.get(LOAD_POINT, 0)) * self.velocity
 
     def matrices(self) -> MachineMatrices:
         own, size = self.mechanism, len(self.names)
-        mass, damping, stiffness = np.zeros((3, size, size))
-        bodies = range(len(own.coordinates))
-        mass[bodies, bodies] = [float(one.inertia) for one in own.coordinates]
-        force = np.zeros(size)
-        force[: len(own.coordinates)] = [float(one.force) for one in own.coordinates]
+        mass, damping, stiffness = self.zeros(size, size), self.zeros(size, size), self.zeros(size, size)
+        force = self.zeros(size)
+        for i, body in enumerate(own.coordinates):
+            mass[..., i, i], force[..., i] = self.number(body.inertia), self.number(body.force)
         start = len(own.coordinates)
         for part in own.structures:
             inside = slice(start, start + len(part.coordinates))
-            mass[inside, inside], damping[inside, inside] = part.mass, part.damping
-            stiffness[inside, inside], force[inside] = part.stiffness, part.force
+            mass[..., inside, inside], damping[..., inside, inside] = part.mass, part.damping
+            stiffness[..., inside, inside], force[..., inside] = part.stiffness, part.force
             start = inside.stop
         for one in own.elements:
             if one.delay != 0:
-                raise NotAvailable("a controller with a delay is not offered beside a structure given by matrices")
-            acts, senses = self.row(one.acts), self.row(one.senses)
-            at, to = np.flatnonzero(acts), np.flatnonzero(senses)
-            both = np.outer(acts[at], senses[to])
-            stiffness[np.ix_(at, to)] += float(one.stiffness) * both
-            damping[np.ix_(at, to)] += float(one.damping) * both
-            force -= acts * float(one.damping) * self.moving(one.senses)
-        acts, senses = np.zeros(size), np.zeros(size)
+                raise NotAvailable(_DELAYED)
+            self._add_element(one, stiffness, damping, force)
+        acts, senses = self.zeros(size), self.zeros(size)
         if own.integral is not None:
             if own.integral.delay != 0:
-                raise NotAvailable("a controller with a delay is not offered beside a structure given by matrices")
-            acts, senses = self.row(own.integral.acts) * float(own.integral.gain), self.row(own.integral.senses)
+                raise NotAvailable(_DELAYED)
+            acts = self.row(own.integral.acts) * np.asarray(self.number(own.integral.gain))[..., None]
+            senses = self.row(own.integral.senses)
         sites = tuple(map(self._site, own.contacts))
         return MachineMatrices(self.names, mass, damping, stiffness, force, self.speeds, acts, senses, sites)
 
+    def _add_element(self, one: Element, stiffness: Array, damping: Array, force: Array) -> None:
+        spring, dashpot = self.number(one.stiffness), self.number(one.damping)
+        behind = dashpot * self.moving(one.senses)
+        for name, act in one.acts.items():
+            if name == LOAD_POINT:
+                continue
+            i, share = self.place[name], self.number(act)
+            force[..., i] -= share * behind
+            for other, sense in one.senses.items():
+                if other != LOAD_POINT:
+                    both = share * self.number(sense)
+                    stiffness[..., i, self.place[other]] += spring * both
+                    damping[..., i, self.place[other]] += dashpot * both
+
     def _site(self, port: ContactPort) -> Site:
-        slip, area = self.row(port.slip), float(port.area)
+        slip, area = self.row(port.slip), self.number(port.area)
         laws = functions_of(port.friction, port.contact)
-        velocity = float(slip @ self.speeds) + self.moving(port.slip)
+        velocity = np.sum(slip * self.speeds, axis=-1) + self.moving(port.slip)
         size = len(self.names)
-        pull, rate, integral, moving, stiffness = np.zeros(size), np.zeros(size), 0.0, 0.0, 0.0
+        pull, rate, integral, moving, stiffness = self.zeros(size), self.zeros(size), 0.0, 0.0, 0.0
         if laws.follows_pull:
             body, pulling, behind, whole = self._pulling(port)
-            lever = float(port.slip[body]) * area
+            lever = self.number(port.slip[body]) * area
             for one in pulling:
-                share = float(one.acts.get(body, 0)) / lever
-                pull -= share * float(one.stiffness) * self.row(one.senses)
-                rate -= share * float(one.damping) * self.row(one.senses)
-                moving -= share * float(one.damping) * self.moving(one.senses)
+                share = self.number(one.acts.get(body, 0)) / lever
+                row = self.row(one.senses)
+                pull -= np.asarray(share * self.number(one.stiffness))[..., None] * row
+                rate -= np.asarray(share * self.number(one.damping))[..., None] * row
+                moving = moving - share * self.number(one.damping) * self.moving(one.senses)
             if whole and self.mechanism.integral is not None:
                 acting = self.mechanism.integral
-                integral = -float(acting.acts.get(body, 0)) * float(acting.gain) / lever
-            held = (float(e.acts.get(body, 0)) * float(e.stiffness) * float(e.senses.get(body, 0)) for e in behind)
-            stiffness = sum(held) / (lever * float(port.slip[body]))
+                integral = -self.number(acting.acts.get(body, 0)) * self.number(acting.gain) / lever
+            for one in behind:
+                both = self.number(one.acts.get(body, 0)) * self.number(one.senses.get(body, 0))
+                stiffness = stiffness + both * self.number(one.stiffness)
+            stiffness = stiffness / (lever * self.number(port.slip[body]))
         return Site(
             port.name, slip, self.row(port.separation), area, velocity, stiffness, pull, rate, integral, moving, laws,
-            numbers_of(port.friction, port.contact),
+            tuple(self.number(one) for one in numbers_of(port.friction, port.contact)),
         )  # fmt: skip
 
     def _pulling(self, port: ContactPort) -> tuple[str, list[Element], list[Element], bool]:

@@ -2,20 +2,53 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.format import format_quantity
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
-from steadyslip.model.numeric.balance import Balance, balance
-from steadyslip.model.numeric.machine_matrices import MachineMatrices, assemble
-from steadyslip.model.numeric.pencil import StatePencil, linearised
+from steadyslip.model.numeric.balance import Balance, balances
+from steadyslip.model.numeric.machine_matrices import MachineMatrices, VariedMachine, assemble
+from steadyslip.model.numeric.pencil import StatePencil, growing_roots, linearised, pencils
 from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine
+
+
+@dataclass(frozen=True, eq=False)
+class MachinesAlong:
+    """Machines along one parameter: steady sliding, and pencils E z' = A z.
+
+    Attributes
+    ----------
+    balance : Balance
+        Steady sliding.
+    size : int
+        Number of coordinates.
+    e, a : ndarray (p, N, N)
+    posed : ndarray of bool (p,)
+        As of `StatePencil`.
+    """
+
+    balance: Balance
+    size: int
+    e: Array
+    a: Array
+    posed: NDArray[np.bool_]
+
+    def pencil(self, i: int) -> StatePencil | None:
+        """Pencil of one of them; None without steady sliding."""
+        return StatePencil(self.e[i], self.a[i], self.size, bool(self.posed[i])) if self.balance.exists[i] else None
+
+    def growing(self, sure: bool) -> NDArray[np.int64]:
+        """How many eigenvalues grow, (p,); `ILL_POSED`, or if `sure` `UNDECIDED` where rounding hides it."""
+        return growing_roots(self.e, self.a, self.size, self.posed, sure)
 
 
 class MachinePoint(Keeper):
@@ -23,16 +56,17 @@ class MachinePoint(Keeper):
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
+        self._varied: dict[str, VariedMachine] = {}
 
     @cached_property
     def matrices(self) -> MachineMatrices:
         """Matrices, and contacts with the numbers of their laws."""
-        return assemble(self.machine.mechanism())
+        return assemble(self.machine)
 
     @cached_property
     def balance(self) -> Balance:
-        """Steady sliding in numbers."""
-        return balance(self.matrices)
+        """Steady sliding in numbers; see `Balance.problem`."""
+        return balances(self.matrices)
 
     @cached_property
     def pencil(self) -> StatePencil:
@@ -42,6 +76,21 @@ class MachinePoint(Keeper):
     def varied(self, name: str, value: float) -> MachinePoint:
         """The machine with another value (SI) of a parameter, which is not checked."""
         return MachinePoint(with_values(self.machine, {name: value}))
+
+    def along(self, name: str, values: Array) -> MachinesAlong:
+        """The machine with several values (p,), SI, of a parameter, which are not checked."""
+        matrices = self._matrices_along(name, values)
+        found = balances(matrices)
+        return MachinesAlong(found, len(matrices.names), *pencils(matrices, found))
+
+    def balances_along(self, name: str, values: Array) -> Balance:
+        """Steady sliding with several values (p,), SI, of a parameter."""
+        return balances(self._matrices_along(name, values))
+
+    def _matrices_along(self, name: str, values: Array) -> MachineMatrices:
+        if name not in self._varied:
+            self._varied[name] = VariedMachine(self.machine, name)
+        return self._varied[name].matrices(np.asarray(values, dtype=float))
 
     @property
     def growing(self) -> int:
@@ -81,8 +130,12 @@ def steady_of(point: MachinePoint) -> SteadyMachine:
     ------
     NoSteadySliding
         Naming the contact that locks up or lifts off.
+    NotAvailable
+        If steady sliding was not found.
     """
     machine, found, matrices = point.machine, point.balance, point.matrices
+    if found.problem:
+        raise NotAvailable(found.problem)
     if not found.exists:
         raise absence(point)
     contacts = {}

@@ -22,6 +22,10 @@ ComplexArray = NDArray[np.complex128]
 _MASSLESS = 1e-12  # eigenvalue of the scaled inertia matrix, relative to the largest, that counts as no inertia
 _INFINITE = 1e-9  # 1/eigenvalue of a pencil in units of its own frequencies below which it is infinite; QZ loses half
 _TRUSTED = 1e-8  # relative error of the resolvent by eigenvectors, above which equations are solved instead
+_SPOILT = 1e8  # condition of E from which dividing by it loses half of the digits
+_MARGIN = 10.0  # rounding errors between a real part and zero that leave no doubt of its sign
+_SURE = 1e-9  # real part, relative to the largest eigenvalue, above which rounding cannot change its sign
+ILL_POSED, UNDECIDED = -1, -2  # in place of a number of growing eigenvalues
 _BATCH = 2**22  # complex numbers of matrices that are solved at once, 64 MiB
 
 
@@ -88,6 +92,18 @@ class StatePencil:
                 return None
         return values, right, rows
 
+    def growing(self, sure: bool) -> int:
+        """How many eigenvalues have a positive real part; if `sure`, `UNDECIDED` where rounding hides a sign."""
+        if not self.posed:
+            return ILL_POSED
+        roots = self.eigenvalues
+        if not sure:
+            return int(np.sum(roots.real > 0))
+        near = roots[(roots.imag >= 0) & (np.abs(roots.real) <= _SURE * np.max(np.abs(roots), initial=0.0))]
+        if any(self.error(complex(s)) >= abs(s.real) for s in near):
+            return UNDECIDED
+        return int(np.sum(roots.real > 0))
+
     def mode(self, s: complex) -> ComplexArray:
         """Right null vector of s E − A, (N,), for an eigenvalue s (1/s)."""
         rows, columns = self.scale
@@ -122,15 +138,22 @@ class StatePencil:
 
 
 def _even(e: Array, a: Array, size: int) -> tuple[Array, Array]:
-    """Factors of rows and columns: one frequency for all displacements, then every row and column of size one."""
-    rows, columns = np.ones(len(e)), np.ones(len(e))
-    inertia, springs = np.abs(np.diag(e)[size : 2 * size]), np.abs(np.diag(a[size : 2 * size, :size]))
+    """Factors (..., N) of rows and columns of pencils (..., N, N).
+
+    One frequency for all displacements of a machine, then every row and column of size one.
+    """
+    inertia = np.abs(np.diagonal(e, axis1=-2, axis2=-1)[..., size : 2 * size])
+    springs = np.abs(np.diagonal(a[..., size : 2 * size, :size], axis1=-2, axis2=-1))
     some = (inertia > 0) & (springs > 0)
-    omega = float(np.sqrt(np.median(springs[some] / inertia[some]))) if np.any(some) else 1.0
+    squares = np.where(some, springs / np.where(some, inertia, 1.0), np.nan)
+    squares = np.where(np.any(some, axis=-1)[..., None], squares, 1.0)
+    omega = np.sqrt(np.nanmedian(squares, axis=-1))[..., None, None]
     both = np.abs(e) * omega + np.abs(a)
+    rows, columns = np.ones(e.shape[:-1]), np.ones(e.shape[:-1])
     for _ in range(4):  # sweeps; each halves what is left of the differences
-        rows /= np.sqrt(np.maximum(np.max(both * rows[:, None] * columns, axis=1), 1e-300))
-        columns /= np.sqrt(np.maximum(np.max(both * rows[:, None] * columns, axis=0), 1e-300))
+        for factors, axis in ((rows, -1), (columns, -2)):
+            sizes = np.max(both * rows[..., None] * columns[..., None, :], axis=axis)
+            factors /= np.sqrt(np.maximum(sizes, 1e-300))
     return rows, columns
 
 
@@ -177,65 +200,106 @@ def _finite_eigenvalues(pencil: StatePencil) -> ComplexArray:
 
 
 def linearised(machine: MachineMatrices, found: Balance) -> StatePencil:
-    """Pencil of a machine at steady sliding."""
-    n = len(machine.names)
+    """Pencil of one machine at steady sliding."""
+    e, a, posed = pencils(machine, found)
+    return StatePencil(e, a, len(machine.names), bool(posed))
+
+
+def pencils(machine: MachineMatrices, found: Balance) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """E and A (..., N, N) of machines at steady sliding, and where their contacts' equations are well-posed, (...)."""
+    n, several = len(machine.names), machine.several
     kept = [len(site.laws.memory) + len(site.laws.states) for site in machine.sites]
     size = 2 * n + sum(kept) + machine.integrates
-    e, a = np.eye(size), np.zeros((size, size))
+    e, a = np.zeros((*several, size, size)), np.zeros((*several, size, size))
     at, moving = slice(0, n), slice(n, 2 * n)
-    e[moving, moving] = machine.mass
-    a[at, moving] = np.eye(n)
-    a[moving, at], a[moving, moving] = -machine.stiffness, -machine.damping
+    e[...] = np.eye(size)
+    e[..., moving, moving] = machine.mass
+    a[..., at, moving] = np.eye(n)
+    a[..., moving, at], a[..., moving, moving] = -machine.stiffness, -machine.damping
     if machine.integrates:
-        a[moving, -1], a[-1, at] = -machine.integral_acts, machine.integral_senses
-    posed, start = True, 2 * n
+        a[..., moving, -1], a[..., -1, at] = -machine.integral_acts, machine.integral_senses
+    posed, start = np.ones(several, bool), 2 * n
     for i, (site, count) in enumerate(zip(machine.sites, kept, strict=True)):
         slopes = site.laws.slopes(site.own, *state_of(site, found, i, machine.speeds))
         posed &= _add_contact(e, a, site, slopes, n, slice(start, start + count), machine.integrates)
         start += count
-    sign, _ = np.linalg.slogdet(e[moving, moving])
-    return StatePencil(e, a, n, posed and bool(sign >= 0))
+    inertia = e[..., moving, moving]
+    finite = np.all(np.isfinite(inertia), axis=(-2, -1))
+    sign, _ = np.linalg.slogdet(np.where(finite[..., None, None], inertia, np.eye(n)))
+    return e, a, posed & finite & (sign >= 0)
 
 
-def _add_contact(e: Array, a: Array, site: Site, slopes: Slopes, n: int, own: slice, integrates: bool) -> bool:
-    """Add the forces and memories of one contact to a pencil; False if its own equations are ill-posed.
+def _add_contact(
+    e: Array, a: Array, site: Site, slopes: Slopes, n: int, own: slice, integrates: bool
+) -> NDArray[np.bool_]:
+    """Add the forces and memories of one contact to pencils; False (...) where its own equations are ill-posed.
 
     τ = s_v v + s_σ σ + s_τ τ + s_m m and σ = n_x x + ... + n_τ τ are solved for both stresses first.
     """
-    friction, normal = np.zeros(len(a)), np.zeros(len(a))
+    several, width = a.shape[:-2], a.shape[-1]
     many = len(site.laws.memory)
     memory, states = slice(own.start, own.start + many), slice(own.start + many, own.stop)
     at, moving = slice(0, n), slice(n, 2 * n)
 
     def of_motion(row: Array) -> Array:
         """Combination of states by slopes with x, v, v̇ (left out), T, τ (left out), distance and its rate."""
-        found = np.zeros(len(a))
-        found[at] = row[0] * site.slip + row[3] * site.pull + row[5] * site.apart
-        found[moving] = row[1] * site.slip + row[3] * site.pull_rate + row[6] * site.apart
-        found[states] = row[7:]
+        found = np.zeros((*several, width))
+        share = np.moveaxis(row, -1, 0)[..., None]
+        found[..., at] = share[0] * site.slip + share[3] * site.pull + share[5] * site.apart
+        found[..., moving] = share[1] * site.slip + share[3] * site.pull_rate + share[6] * site.apart
+        found[..., states] = row[..., 7:]
         if integrates:
-            found[-1] += row[3] * site.pull_integral
+            found[..., -1] += row[..., 3] * site.pull_integral
         return found
 
-    friction[moving], friction[memory] = slopes.strength[0] * site.slip, slopes.strength[3:]
-    normal = of_motion(slopes.normal)
-    loop = np.array([[1 - slopes.strength[2], -slopes.strength[1]], [-slopes.normal[4], 1.0]])
-    determinant = float(np.linalg.det(loop))
-    if not determinant:
-        return False
-    inverse = np.linalg.inv(loop)
-    tau, sigma = inverse @ np.array([friction, normal])  # rows over z
-    lagged = inverse @ np.array([0.0, slopes.normal[2]])  # with the acceleration of slip
-    force = site.area * (np.outer(site.apart, sigma) - np.outer(site.slip, tau))
-    a[moving] += force
-    if lagged.any():
-        e[moving, moving] -= site.area * np.outer(site.apart * lagged[1] - site.slip * lagged[0], site.slip)
-    for place, row in zip(range(memory.start, memory.stop), slopes.rates, strict=True):
-        a[place, moving] += row[0] * site.slip
-        a[place, memory] += row[3:]
-        a[place] += row[1] * sigma + row[2] * tau
-        e[place, moving] -= (row[1] * lagged[1] + row[2] * lagged[0]) * site.slip
-    for place, row in zip(range(states.start, states.stop), slopes.state_rates, strict=True):
-        a[place] += of_motion(row) + row[4] * tau
-        e[place, moving] -= (row[2] + row[4] * lagged[0]) * site.slip
-    return determinant > 0
+    by = np.moveaxis(slopes.strength, -1, 0)
+    friction, normal = np.zeros((*several, width)), of_motion(slopes.normal)
+    friction[..., moving], friction[..., memory] = by[0][..., None] * site.slip, slopes.strength[..., 3:]
+    of_friction, of_acceleration = slopes.normal[..., 4], slopes.normal[..., 2]
+    determinant = np.broadcast_to(1 - by[2] - by[1] * of_friction, several)
+    solved = 1 / determinant  # infinite where ill-posed
+    tau = solved[..., None] * (friction + by[1][..., None] * normal)  # rows over z
+    sigma = solved[..., None] * (of_friction[..., None] * friction + (1 - by[2])[..., None] * normal)
+    late_tau, late_sigma = solved * by[1] * of_acceleration, solved * (1 - by[2]) * of_acceleration
+    area = np.asarray(site.area)[..., None, None]
+    a[..., moving, :] += area * (
+        site.apart[..., :, None] * sigma[..., None, :] - site.slip[..., :, None] * tau[..., None, :]
+    )
+    pushed = late_sigma[..., None] * site.apart - late_tau[..., None] * site.slip
+    e[..., moving, moving] -= area * pushed[..., :, None] * site.slip[..., None, :]
+    for j, place in enumerate(range(memory.start, memory.stop)):
+        row = slopes.rates[..., j, :]
+        of_v, of_sigma, of_tau = (row[..., k, None] for k in range(3))
+        a[..., place, moving] += of_v * site.slip
+        a[..., place, memory] += row[..., 3:]
+        a[..., place, :] += of_sigma * sigma + of_tau * tau
+        e[..., place, moving] -= (of_sigma * late_sigma[..., None] + of_tau * late_tau[..., None]) * site.slip
+    for j, place in enumerate(range(states.start, states.stop)):
+        row = slopes.state_rates[..., j, :]
+        a[..., place, :] += of_motion(row) + row[..., 4, None] * tau
+        e[..., place, moving] -= (row[..., 2, None] + row[..., 4, None] * late_tau[..., None]) * site.slip
+    return np.asarray(determinant > 0)
+
+
+def growing_roots(e: Array, a: Array, size: int, posed: NDArray[np.bool_], sure: bool) -> NDArray[np.int64]:
+    """Number of growing eigenvalues of pencils (p, N, N), (p,); `ILL_POSED` or `UNDECIDED` as `StatePencil.growing`.
+
+    All at once by the matrices divided by E, where that loses no digits that the signs of real parts need; else one
+    by one.
+    """
+    good = posed & np.all(np.isfinite(a) & np.isfinite(e), axis=(-2, -1))
+    found = np.where(posed, UNDECIDED, ILL_POSED)
+    at = np.flatnonzero(good)
+    if not at.size:
+        return found
+    rows, columns = _even(e[at], a[at], size)
+    even, other = (rows[..., None] * one[at] * columns[:, None, :] for one in (e, a))
+    condition = np.linalg.cond(even)
+    regular = condition < _SPOILT
+    roots = np.linalg.eigvals(np.linalg.solve(np.where(regular[:, None, None], even, np.eye(len(even[0]))), other))
+    doubt = condition * np.finfo(float).eps * len(even[0]) * np.max(np.abs(roots), axis=-1)
+    clear = regular & np.all(np.abs(roots.real) > _MARGIN * doubt[:, None], axis=-1)
+    found[at] = np.sum(roots.real > 0, axis=-1)
+    for i in at[~clear]:
+        found[i] = StatePencil(e[i], a[i], size, True).growing(sure)
+    return found

@@ -1,0 +1,62 @@
+"""Machines too large to be written out in symbols: matrices, against symbols on small ones and typed equations."""
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from machines import stacked_pads
+from machines_both_ways import differences, machine_of, row_of_blocks
+from machines_in_the_plane import is_root
+from steadyslip.model.numeric import by_matrices
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("row", 3), ("plane", 3)])
+def test_both_routes_agree(kind, seed):
+    """Eigenvalues, and the edges of all parameters with lock-up and lift-off."""
+    assert not differences(machine_of(kind, seed))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("kind", "seed"), [*(("row", seed) for seed in (8, *range(20, 24))), ("plane", 0), ("plane", 1), ("plane", 6)]
+)
+def test_both_routes_agree_on_more(kind, seed):
+    assert not differences(machine_of(kind, seed))
+
+
+@pytest.mark.parametrize(("count", "everywhere"), [(20, False), (8, True)])
+def test_rows_of_blocks_have_the_roots_of_typed_equations(count, everywhere):
+    machine, matrix = row_of_blocks(count, everywhere)
+    assert by_matrices(machine)
+    found = ss.eigenvalues(machine)
+    assert len(found) == 2 * count + (count if everywhere else 1)
+    assert all(is_root(matrix, s) for s in found)
+    edge = (
+        ss.boundary(machine, "to-b3.stiffness")[0]
+        if everywhere
+        else ss.boundary(machine, f"at-b{count - 1}.friction.b")[0]
+    )
+    at = ss.eigenvalues(machine, {edge.parameter: edge.value})
+    assert abs(at[0].real) < 1e-9 * abs(at[0])
+
+
+@pytest.mark.campaign
+def test_four_pads_in_a_row_are_answered():
+    """Edges lie where the rightmost pair crosses the axis, found by eigenvalues on both sides."""
+    machine = stacked_pads(4)
+    assert by_matrices(machine)
+    assert not by_matrices(stacked_pads(3))
+    found = ss.analyze(machine)
+    assert found.stable
+    assert all(one.passed for one in found.checks)
+    edge = found.margins[0].edge
+    rates = ss.growth_rate(machine, {edge.parameter: [edge.value * (1 - 1e-6), edge.value * (1 + 1e-6)]})
+    assert (rates[0] < 0) != (rates[1] < 0)
+    assert "the nearest edge is that of" in found.reason
+
+
+def test_kicks_and_motion_use_the_same_machine():
+    """A large machine is simulated by its Model: at steady sliding nothing moves."""
+    machine, _ = row_of_blocks(10)
+    run = ss.simulate(machine, until=5.0)
+    np.testing.assert_allclose(run["b9.v"], run["b9.v"][0], rtol=1e-9)

@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import reversed_column, run_at_start
-from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, split, spread
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, ranges_of_means, split
 
 RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
 LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
@@ -31,8 +31,6 @@ STRAIGHT = 20  # samples on one line from which a part that is over soon is no s
 PLAIN = 100.0  # the same displacement that makes a piece a run of its own, however short; chosen by trial
 RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record; chosen by trial
 COARSE = 20_000  # samples above which means are segmented, to bound the time; chosen by trial
-BRIEFLY = 33  # means of which a fast part is the lesser half, so that its samples are kept instead, and
-FAST = 10.0  # multiple of what the load point moves from mean to mean around it, and of the scatter of that
 
 
 @dataclass
@@ -116,10 +114,11 @@ def straight_runs(time: Array, displacement: Array, lasting: float = 0.0) -> lis
     """
     step = -(-len(time) // COARSE)
     if step > 1:
-        starts, brief = _ranges(displacement, step)
-        means = (np.add.reduceat(values, starts) / np.diff(starts, append=len(time)) for values in (time, displacement))
+        starts, brief = ranges_of_means(displacement, step, COARSE)
+        counts = np.diff(starts, append=len(time))
         own = displacement_noise(time, displacement) if brief else 0.0
-        runs = _runs_of(*means, max(lasting / np.sqrt(step), own))
+        rough, means = (np.add.reduceat(values, starts) / counts for values in (time, displacement))
+        runs = _runs_of(rough, means, max(lasting / np.sqrt(step), own))
         ends = np.append(starts, len(time)).tolist()
         for run in runs:
             run.members = [(ends[i], ends[j]) for i, j in run.members]
@@ -209,25 +208,6 @@ def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: floa
         return False
     known = BACK * float(np.hypot(errors[0][1], errors[1][1]))
     return bool(np.min(np.abs(lines[0] - lines[1][0])) <= known)
-
-
-def _ranges(displacement: Array, step: int) -> tuple[Array, bool]:
-    """First samples of ranges whose means are segmented, and whether there are brief parts whose samples are kept.
-
-    A range is `step` samples long, and a single one where a load point moves briefly and so fast that a few means would
-    not show it.
-    """
-    from scipy.ndimage import median_filter, uniform_filter1d
-
-    starts = np.arange(0, len(displacement), step)
-    moved = np.abs(np.diff(np.add.reduceat(displacement, starts) / np.diff(starts, append=len(displacement))))
-    usual = median_filter(moved, BRIEFLY)
-    fast = moved > FAST * usual + FAST * spread(moved - usual)
-    kept = uniform_filter1d(np.append(fast, False).astype(float), 2 * FEWEST) > 1e-9
-    if not np.any(kept) or np.sum(kept) * step > COARSE:
-        return starts, False
-    single = np.repeat(kept, step)[: len(displacement)]
-    return np.flatnonzero(single | (np.arange(len(displacement)) % step == 0)), True
 
 
 def _segmented(pieces: _Pieces) -> list[list[int]]:

@@ -12,6 +12,9 @@ FEWEST = 4  # least number of samples in a range
 RESOLUTION = 1e-7  # least noise assumed, as a share of the range of a column
 MAX_RANGES = 500  # largest number of ranges
 MAX_SWEEPS = 4  # largest number of passes that adjust the ends of the ranges
+BRIEFLY = 33  # means of which a fast part is the lesser half, so that its samples are kept instead, and
+FAST = 10.0  # multiple of what the load point moves from mean to mean around it, and of the scatter of that
+BESIDE = 4  # means on each side of a fast part whose samples are kept too
 STAIRCASE_SHARE = (
     0.2  # a column that starts or stops changing at a larger share of samples is a staircase of its resolution
 )
@@ -51,6 +54,25 @@ def _stair_height(values: Array) -> float:
     if np.mean(moved[1:] != moved[:-1]) < STAIRCASE_SHARE:
         return 0.0
     return float(np.quantile(np.abs(np.diff(values))[moved], 0.1))
+
+
+def ranges_of_means(displacement: Array, step: int, most: int) -> tuple[Array, bool]:
+    """First samples of ranges whose means are segmented, and whether there are brief parts whose samples are kept.
+
+    A range is `step` samples long, and a single one where a load point moves briefly and so fast that a few means would
+    not show it, unless that makes more than `most` of these.
+    """
+    from scipy.ndimage import median_filter, uniform_filter1d
+
+    starts = np.arange(0, len(displacement), step)
+    moved = np.abs(np.diff(np.add.reduceat(displacement, starts) / np.diff(starts, append=len(displacement))))
+    usual = median_filter(moved, BRIEFLY)
+    fast = moved > FAST * usual + FAST * spread(moved - usual)
+    kept = uniform_filter1d(np.append(fast, False).astype(float), 2 * BESIDE) > 1e-9
+    if not np.any(kept) or np.sum(kept) * step > most:
+        return starts, False
+    single = np.repeat(kept, step)[: len(displacement)]
+    return np.flatnonzero(single | (np.arange(len(displacement)) % step == 0)), True
 
 
 def split(time: Array, values: Array, noise: float, linear: bool) -> list[tuple[int, int]]:

@@ -1,0 +1,23 @@
+"""A fixed sample of fits of records drawn at random: intervals hold the truth, servos are named."""
+
+import numpy as np
+import pytest
+
+import fits_at_random as campaign
+
+DRAWN = 4
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("kind", campaign.DESIGNS)
+def test_fits_of_records_at_random_hold_the_truth(kind):
+    """Of 16 deviations or more at most a quarter is beyond 1.96 errors, and none beyond 4.5."""
+    found = [campaign.outcome(one) for one in campaign.drawn(kind, DRAWN, 3)]
+    z = np.abs([z for own in found for z in own.z.values()])
+    assert len(z) >= 4 * DRAWN
+    assert np.mean(z > 1.96) <= 0.25
+    assert np.max(z) < 4.5
+    if kind.endswith("ideal"):
+        assert not any(own.servo for own in found)
+    elif "," in kind and "brief" not in kind:
+        assert any(own.servo for own in found)

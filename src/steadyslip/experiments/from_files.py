@@ -107,7 +107,7 @@ def population_files(
     >>> head, *rows = Path("examples/data/made_velocity_step.csv").read_text().splitlines()
     >>> paths = [Path(f"part{k}.csv") for k in range(3)]
     >>> for k, path in enumerate(paths):  # in place of three experiments
-    ...     _ = path.write_text("\n".join([head, *rows[k::3]]))
+    ...     _ = path.write_text("\\n".join([head, *rows[k::3]]))
     >>> changes = ["fit.trend=0", "population.parameters=['friction.a', 'friction.b']", "population.draws=100"]
     >>> pooled = ss.experiments.population_files(paths, "examples/fits/basalt.toml", changes)
     >>> pooled.names

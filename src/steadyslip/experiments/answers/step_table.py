@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from os import PathLike
 from typing import Any
 
@@ -177,8 +177,9 @@ class StepTable(Displayed):
         kind = f"{law.name} friction"
         if evolution is not None:
             kind += f", {evolution.name} law, {states} state{'s' * (states > 1)}"
-        memory = getattr(law, "normal_memory", None)
-        kind += f", {memory.name} memory of normal stress" if memory is not None and not law.forgets_stress() else ""
+        parts = (getattr(law, item.name) for item in fields(law))
+        memories = [one.name for one in parts if one is not evolution and hasattr(one, "name")]
+        kind += "" if law.forgets_stress() else "".join(f", {name} memory of normal stress" for name in memories)
         free = [name for name, one in line.estimates().items() if one not in self.joint.derived]
         further = [
             f"A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else "",

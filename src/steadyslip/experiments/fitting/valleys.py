@@ -30,6 +30,7 @@ DEPENDENT = 1e-3  # least eigenvalue of JᵀJ, scaled to a diagonal of 1, of a u
 LEAST_DEVIATION = 0.05  # e-folds or natural sizes: models are linear over less
 REACH = 1.96  # standard deviations: 95 %
 DISTANCES = (2.0, 4.0, 8.0)  # standard deviations at which the others are fitted again, on both sides
+LEAST_STRETCH = 1.1  # of an error: shorter ones are within what these fits are good for
 MOST_ITERATIONS, TOLERANCE = 30, 1e-4  # of these fits; a rise of the sum of squares is needed to two digits
 
 
@@ -67,6 +68,7 @@ def along_valleys(
     known = np.isfinite(np.diag(covariance)) & (valley.share >= 0)
     part = np.where(known, reached**2 / np.maximum(np.diag(covariance), 1e-300), 0.0)  # of its variance
     stretch = np.where(known, np.sqrt(np.maximum(1 - valley.share + part, 1.0)), 1.0)
+    stretch[stretch < LEAST_STRETCH] = 1.0
     deviation = float(np.linalg.norm(reached[known]))
     wider = np.where(np.isfinite(covariance), covariance * np.outer(stretch, stretch), covariance)
     if deviation <= UNDETERMINED:

@@ -74,6 +74,7 @@ UNDETERMINED = 0.5  # standard deviation, in e-folds or natural sizes, above whi
 MIN_WEIGHT = 0.15  # least weight of a parameter named in a combination; smaller ones only lengthen the message
 MIN_CHANGE = 0.1  # a parameter is also named if one standard deviation along the direction changes it by this much
 LEAST_CHANGE = 0.01  # e-folds or natural sizes by which an open direction changes what it leaves undetermined
+MOST_REACH = 2.0  # e-folds or natural sizes along an open direction that count: nobody believes further
 OPEN_SHARE = 0.1  # least share of a parameter's variance by which it belongs to an open direction: .3 of its error
 EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled information below this share of the largest are rounding errors
 DERIVATIVE_ROUNDING = 1e-10  # derivatives below this share of the largest are rounding errors of the integration
@@ -139,8 +140,9 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
             if variance > UNDETERMINED**2:
                 full = np.zeros(len(space))
                 full[usable] = axis
-                lost = variance * full**2 > OPEN_SHARE * np.maximum(np.diag(covariance), 1e-300)
-                lost &= np.abs(full) * np.sqrt(variance) > LEAST_CHANGE
+                part = min(variance, MOST_REACH**2) * full**2
+                rest = np.maximum(np.diag(covariance) - variance * full**2, 0.0)
+                lost = (part > OPEN_SHARE * (part + rest)) & (part > LEAST_CHANGE**2)
                 lost &= ~np.array([is_time(one) for one in space.unknowns])
                 undetermined |= lost
                 found.append(combination(full, float(np.sqrt(variance)), space, lost))

@@ -52,6 +52,12 @@ def test_a_fit_says_that_it_cannot_show_a_servo():
     assert "cannot show" not in told[False]
 
 
+def test_rounding_of_a_displacement_is_no_spring():
+    """The displacement of this record is exact: what moves with friction is its last digit."""
+    fit, _ = ss.fit_files(["examples/data/made_velocity_step.csv"])
+    assert "cannot show" not in str(fit)
+
+
 def test_a_column_of_slip_is_noted(tmp_path):
     record = lab.record(lab.rig(), lab.STEP)
     record.to_csv(tmp_path / "r.csv")

@@ -10,9 +10,11 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.numerics.splitting import displacement_noise
+from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
+_RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a thousandth of its stretch: of no account
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
 CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
 SMALL_CHANGE, LISTED = 1.5, 4  # ratio of rates up to which a change may be waviness of a sensor; changes listed
@@ -71,6 +73,8 @@ def _across_fault(fit: FitNumbers) -> list[str]:
         if lost is None:
             continue
         stress = steady_state(fit.rig(0)).normal_stress if record.normal is None else float(np.mean(record.normal))
+        if stress / lost > _RIGID * _stiffness(fit.rig(0)):
+            continue
         spring = format_quantity(stress / lost, "Pa/m")
         found.append(
             f"{record.source}: the displacement falls where friction rises, as across the fault, or behind a spring of "
@@ -97,14 +101,18 @@ def _small_changes(fit: FitNumbers) -> list[str]:
     return found
 
 
+def _stiffness(rig: Slider) -> float:
+    """Stiffness (Pa/m) that loads the fault: of the machine, and of a controller."""
+    return float(operating_point(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
+
+
 def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
     """Warning if the noise of the displacement moves the model by 0.3 of the residuals' rms or more; else None."""
     record = part.record
     if record.integrated or record.displacement is None:
         return None
     noise = displacement_noise(record.time, record.displacement)
-    rig = fit.rig(0)
-    stiffness = float(operating_point(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
+    stiffness = _stiffness(fit.rig(0))
     if record.normal is None:
         return None
     moved = noise * stiffness / float(record.normal[0])

@@ -135,7 +135,7 @@ def test_robust_losses_bear_outliers(loss):
     rig = lab.rig()
     record = lab.record(rig, lab.STEP)
     rng = np.random.default_rng(4)
-    hit = rng.random(len(record)) < 0.03
+    hit = np.repeat(rng.random(len(record) // 3 + 1) < 0.03, 3)[: len(record)]  # single ones would be left out
     spoiled = replace(record, friction=record.friction + np.where(hit, rng.uniform(0.005, 0.02, len(record)), 0.0))
     fit = ss.fit(ss.lab_rig(), spoiled, loss=loss)
     assert np.max(np.abs(deviations_of(fit, rig))) < 5
@@ -245,7 +245,7 @@ def test_basalt():
     said = " ".join(str(fit).split())
     assert "driven by commanded loading found in the record, 1 change of rate" in said
     assert "the measured displacement would make a -24%, b -22%, k -54%" in said
-    assert re.search(r"k/σ 0\.00662[67] ± 0\.00065 /um", said)  # it is 0.0066267 ± 0.000645
+    assert re.search(r"k/σ 0\.00662[67] ± 0\.00064 /um", said)  # it is 0.0066267
     assert "a ramp of up to" in said
 
 
@@ -285,7 +285,8 @@ def test_sepiolite_strengthens():
     fit = ss.fit(ss.lab_rig("aging"), ss.read_record(lab.SEPIOLITE), trend=2, starts=9)
     assert fit.search.converged
     assert fit["b"].high < 0
-    assert fit.ssq == pytest.approx(1.5903e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
+    assert fit.ssq == pytest.approx(1.6109e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
+    assert fit.plan.loading[0].load.changes[0].after == pytest.approx(2e-6, rel=5e-4)  # m/s, as commanded
     assert 0.7 < fit.noise[0].lag1 < 0.9
     said = " ".join(str(fit).split())  # friction rises faster and later than the law can
     assert "step.1.at ended at the smallest value" in said

@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
-from steadyslip.core.results import ReadOnly
+from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.answers.inference import SampleDraws, inference_data
 from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.effort import Effort
@@ -82,7 +82,8 @@ class Draws(ReadOnly):
     def derived(self) -> dict[str, Array]:
         """Draws (m,) of what follows from the parameters, as of ``a - b``, ``k_c``; NaN in draws without it."""
         with np.errstate(all="ignore"):
-            return self.fit.derived_at(self._coordinates)
+            found: dict[str, Array] = read_only(self.fit.derived_at(self._coordinates))
+        return found
 
     @property
     def _coordinates(self) -> Array:

@@ -10,6 +10,7 @@ from toleranced import AXIS
 MISTAKES = {
     "a mass for a force": ('"2.56..3.84 kN"', '"320 kg"', "a mass presses with its weight"),
     "a decimal comma": ('"0.11 ± 20 %"', "0,11", "0,11 has a decimal comma: write 0.11"),
+    "a decimal comma before a unit": ('"0.5 mm/min"', '"0,5 mm/min"', "has a decimal comma: write 0.5"),
     "a law by its curve": ('"lugre"', '"stribeck"', "did you mean 'coulomb-stribeck'"),
     "a key in another language": ("mass =", "masse =", "did you mean 'mass'"),
     "a share without its sign": ('"2.56..3.84 kN"', '"3.2 kN ± 20"', "write '± 20 %'"),

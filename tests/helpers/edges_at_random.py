@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import steadyslip as ss
+from counting import count_differences
 from rigs_of_theory import CONTACTS, LAWS
 from steadyslip.core.errors import SteadyslipError
 
@@ -143,11 +144,4 @@ def differences(seed):
 
 
 if __name__ == "__main__":
-    count, first = (int(one) for one in sys.argv[1:3])
-    total = 0
-    for seed in range(first, first + count):
-        compared, wrong = differences(seed)
-        total += compared
-        for words in wrong:
-            print(words, flush=True)
-    print(total, "compared")
+    count_differences(differences, *map(int, sys.argv[1:3]))

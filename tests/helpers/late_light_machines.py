@@ -9,6 +9,7 @@ import sys
 import numpy as np
 
 import steadyslip as ss
+from counting import count_differences
 from steadyslip.core.errors import SteadyslipError
 
 INFINITE = -1  # count where infinitely many roots grow
@@ -253,11 +254,4 @@ def differences(seed):
 
 
 if __name__ == "__main__":
-    count, first = (int(one) for one in sys.argv[1:3])
-    total = 0
-    for seed in range(first, first + count):
-        compared, wrong = differences(seed)
-        total += compared
-        for words in wrong:
-            print(words, flush=True)
-    print(total, "compared")
+    count_differences(differences, *map(int, sys.argv[1:3]))

@@ -1,15 +1,15 @@
 """Machines by their symbolic Model and by matrices: two routes that share the laws' expressions only.
 
-``python tests/helpers/machines_both_ways.py KIND FIRST LAST`` compares eigenvalues and all edges of random
+``python tests/helpers/machines_both_ways.py KIND COUNT SEED`` compares eigenvalues and all edges of random
 machines, KIND "row" or "plane". `row_of_blocks` is typed here a third time, for machines too large for symbols.
 """
 
 import sys
-import time
 
 import numpy as np
 
 import steadyslip as ss
+from counting import count_differences
 from machines import at_random, rate_state, surface
 from machines_in_the_plane import in_the_plane
 from steadyslip.linear.matrix_route import require_matrices
@@ -78,20 +78,10 @@ def machine_of(kind, seed):
     return None if one.delay else one.machine
 
 
-def main(kind, first, last):
-    wrong, count, took = 0, 0, [0.0, 0.0]
-    for seed in range(int(first), int(last)):
-        machine = machine_of(kind, seed)
-        if machine is None:
-            continue
-        start = time.process_time()
-        words = differences(machine)
-        took = [took[0] + time.process_time() - start, max(took[1], time.process_time() - start)]
-        count, wrong = count + 1, wrong + bool(words)
-        if words:
-            print(seed, *words, sep="\n  ", flush=True)
-    print(f"{count} machines ({kind}), {wrong} differ; CPU {took[0]:.0f} s, largest {took[1]:.1f} s")
-
-
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+
+    def compared(seed):
+        machine = machine_of(sys.argv[1], seed)
+        return (0, []) if machine is None else (1, [f"{seed}: {word}" for word in differences(machine)])
+
+    count_differences(compared, *map(int, sys.argv[2:4]))

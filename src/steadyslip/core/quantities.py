@@ -22,6 +22,7 @@ _MASS, _WEIGHT = Dimension(1), Dimension(1, 1, -2)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
 PER_LOAD = ("1", "1/m", "s/m")
 """Units of friction per load, which machine people know as forces: a coefficient, bristles, viscous friction."""
+_COMMA = re.compile(r",(\d+)", re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
@@ -50,6 +51,8 @@ def parse(text: str, expected: str) -> float:
     if match is None:
         raise QuantityError(f"{repr_short(text)} is not {described(expected)}; write for example {example(expected)}")
     digits, name = match.group(), cleaned[match.end() :].strip()
+    if comma := _COMMA.match(name):
+        raise QuantityError(f"{text!r} has a decimal comma: write {digits}.{comma[1]}")
     _, wanted = unit(expected)
     if not name:
         if wanted != Dimension():

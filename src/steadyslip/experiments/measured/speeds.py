@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.dimensions import Dimension, unit
+from steadyslip.core.dimensions import unit
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, QuantityError
 from steadyslip.core.roles import Parameter
@@ -45,7 +45,6 @@ _SPELLED = {
     "nm": "N m", "n·m": "N m", "n.m": "N m", "n*m": "N m", "mnm": "mN m", "nmm": "N mm", "ncm": "N cm", "knm": "kN m",
     "u/min": "rpm", "min-1": "rpm", "1/min": "rpm", "r/min": "rpm", "rev/min": "rpm", "rps": "rev/s",
 }  # fmt: skip
-_ANGLE = Dimension(angle=1)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import steadyslip as ss
 from machines import stacked_pads
 from machines_both_ways import differences, machine_of, row_of_blocks
 from machines_in_the_plane import is_root
+from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.model.numeric import by_matrices
 
 
@@ -14,6 +15,12 @@ from steadyslip.model.numeric import by_matrices
 def test_both_routes_agree(kind, seed):
     """Eigenvalues, and the edges of all parameters with lock-up and lift-off."""
     assert not differences(machine_of(kind, seed))
+
+
+@pytest.mark.parametrize("seed", [14, 25, 28])
+def test_eigenvalues_agree_where_friction_remembers_a_normal_stress_that_follows(seed):
+    machine = machine_of("row", seed)
+    np.testing.assert_allclose(require_matrices(machine).pencil.eigenvalues, ss.eigenvalues(machine), rtol=1e-9)
 
 
 @pytest.mark.campaign

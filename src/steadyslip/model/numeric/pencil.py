@@ -71,6 +71,9 @@ class StatePencil:
     def eigenvalues(self) -> ComplexArray:
         """Finite eigenvalues (1/s), by falling real part."""
         found = np.linalg.eigvals(self._standard[0]) + 0j if self.inertial else _finite_eigenvalues(self)
+        upper = found[found.imag > 0]
+        if 2 * len(upper) == np.count_nonzero(found.imag):  # QZ gives the two of a pair apart by rounding
+            found = np.concatenate([upper, upper.conj(), found[found.imag == 0]])
         return found[np.lexsort((-found.imag, -found.real))]
 
     @cached_property

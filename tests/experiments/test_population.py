@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +16,7 @@ import steadyslip as ss
 from command import run
 from steadyslip.experiments.numerics.pooling import ExperimentEstimate, log_evidence, pooled
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"
 MEAN, SPREAD = np.array([-4.5, 1.2]), np.array([0.12, 0.05])
 
 
@@ -202,7 +205,7 @@ def test_rocks_that_have_a_minus_b_alike_tell_of_the_next_one():
     critical = lab.STRESS * -rock.others()["a - b"] / rock.others()["friction.d_c"]
     np.testing.assert_allclose(stiff.critical_stiffness, np.where(critical > 0, critical, np.nan), rtol=1e-9)
     assert "another experiment of a population" in str(stiff)
-    with pytest.raises(ss.NotAvailable, match=r"friction\.d_c was fitted, but is not in the population"):
+    with pytest.raises(ss.NotAvailable, match=r"friction\.d_c: fitted, but not in the population"):
         ss.predict(lab.rig(), ss.population(fits, ["a", "b"], count=100))
 
 
@@ -283,6 +286,27 @@ def test_a_population_from_files(files):
     assert {
         label: one["value"] for label, one in again.to_dict()["parameters"]["friction.mu_ref"]["experiments"].items()
     } == {label: one["value"] for label, one in found["parameters"]["friction.mu_ref"]["experiments"].items()}
+    judged = run("analyze", EXAMPLE, "--fit", "rock.nc", folder=files)
+    assert "friction.b, friction.d_c: fitted, but not in the population" in judged.stderr
+
+
+def test_a_condition_in_a_file_by_the_names_of_records(files):
+    shutil.copy(files / "p3.csv", files / "p4.csv")
+    text = (files / "p4.csv").read_text().splitlines()
+    (files / "p4.csv").write_text("\n".join(text[:-5]))  # another experiment than p3
+    found = {}
+    spec = SPEC.format("").replace('parameters = ["a", "mu_ref"]', "")  # all of friction
+    for given in ("{p4 = 4, p2 = 2, p1 = 1, p3 = 3}", "[1, 2, 3, 4]"):
+        (files / "heat.toml").write_text(spec + f'condition = "heat"\nvalues = {given}\ndraws = 100\n')
+        found[given] = ss.experiments.population_files([files / f"p{j}.csv" for j in (1, 2, 3, 4)], files / "heat.toml")
+    by_name, in_order = found.values()
+    assert by_name.conditions["heat"].tolist() == [1, 2, 3, 4]
+    assert by_name.to_dict() == in_order.to_dict()
+    by_name.save(files / "heat.nc")
+    judged = run("analyze", EXAMPLE, "--fit", "heat.nc", "--json", folder=files)
+    assert judged.returncode == 0, judged.stderr
+    predicted = ss.predict(ss.read_rig(EXAMPLE), by_name).to_dict()
+    assert json.loads(judged.stdout)["prediction"] == json.loads(json.dumps(predicted))
 
 
 @pytest.mark.parametrize(
@@ -292,6 +316,11 @@ def test_a_population_from_files(files):
         ("values = [1, 2, 3]", "population.condition: missing"),
         ('condition = "normal stress"\nvalues = [1, 2, 3]', "population.values: the normal stress is that"),
         ('condition = "T"\nvalues = [1, 2]', "population: got 3 records; allowed: 4 or more"),
+        (
+            'condition = "T"\nvalues = {p1 = 1, p2 = 2, q = 3}',
+            "population.values: got those of p1, p2, q; allowed: one of each of p1, p2, p3",
+        ),
+        ('condition = "T"\nvalues = {p1 = "hot"}', "population.values: "),
         ("draws = 5", "population.draws: got 5; allowed: a whole number from 100"),
     ],
 )

@@ -140,14 +140,15 @@ def _predicted(
     branch: int,
 ) -> None:
     """Analyze a rig with the friction of a fit: verdict of the best values, and probability of stability."""
-    from steadyslip.experiments import load_fit, predict
+    from steadyslip.experiments import predict
+    from steadyslip.experiments.from_files import load_friction
     from steadyslip.files.specifications import read_slider
     from steadyslip.verdict import analyze as run
 
     refuse_branch(fitted, branch)
     slider = read_slider(rig, changes)
     along = along if along is None else slider.resolve(along)
-    found = predict(slider, load_fit(fitted), kick=kick)
+    found = predict(slider, load_friction(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
         data = best.to_dict() | {"prediction": found.to_dict()} | (formula_data(best, along) if formula else {})
@@ -373,9 +374,9 @@ def report(
     options: dict[str, Any] = {"branch": branch, "tolerances": given, "charts": list(map(pair_of, chart or ()))}
     options |= {"project": project, "author": author, "revision": revision, "approval": approval}
     if fitted is not None:
-        from steadyslip.experiments import load_fit
+        from steadyslip.experiments.from_files import load_friction
 
-        options["fit"] = load_fit(fitted)
+        options["fit"] = load_friction(fitted)
     found = run(read, title=rig.stem, source=rig, **options)
     if output is None:
         print_text(f"opened {found.open()}")

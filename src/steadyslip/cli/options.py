@@ -40,7 +40,9 @@ Pieces = Annotated[
 Branch = Annotated[int, typer.Option(help="which steady sliding, where there are several")]
 Fitted = Annotated[
     Path | None,
-    typer.Option("--fit", metavar="FIT", help="a fit (.nc): judge with its friction, and say how sure that is"),
+    typer.Option(
+        "--fit", metavar="FIT", help="a fit or a population (.nc): judge with its friction, and say how sure that is"
+    ),
 ]
 
 

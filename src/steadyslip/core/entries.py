@@ -101,6 +101,29 @@ class Names(Entry):
 
 
 @dataclass(frozen=True)
+class LabelledNumbers(Entry):
+    """Field type: finite numbers of several things, a tuple in their order or a dict by their labels."""
+
+    doc: str
+
+    def checked(self, value: Any) -> tuple[float, ...] | dict[str, float]:
+        try:
+            if isinstance(value, dict):
+                return dict(zip(value, numbers(list(value.values()), "1"), strict=True))
+            return numbers(value, "1")
+        except QuantityError as error:
+            raise fault(str(error)) from error
+
+    def allowed(self) -> str:
+        return "a list of numbers, or a table of labels and numbers"
+
+    def schema(self) -> Schema:
+        number = {"type": "number"}
+        listed = {"type": "array", "items": number}
+        return {"anyOf": [listed, {"type": "object", "additionalProperties": number}], "description": self.doc}
+
+
+@dataclass(frozen=True)
 class Whole(Entry):
     """Field type: an integer between two bounds, both included."""
 

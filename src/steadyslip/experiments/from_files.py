@@ -11,12 +11,13 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_text
 from steadyslip.experiments.answers.laws import LawComparison
-from steadyslip.experiments.answers.population import FEWEST, Population, population
-from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.answers.population import FEWEST, POPULATION, Population, load_population, population
+from steadyslip.experiments.fitting.result import Fit, load_fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.settings import PopulationSettings
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.spec import Spec, spec_from_text
+from steadyslip.files.sealed import holds
 from steadyslip.files.specifications.read import text_of
 
 Paths = Sequence[str | PathLike[str]]
@@ -115,24 +116,41 @@ def population_files(
     """
     plan = spec_of(spec, changes)
     members = plan.population or PopulationSettings()
+    labels: list[str] = []
+    for path in paths:
+        stem = Path(path).stem
+        labels.append(stem if stem not in labels else f"{stem} ({len(labels) + 1})")
+    given = members.values
+    if isinstance(given, dict) and set(given) != set(labels):
+        message = f"got those of {', '.join(given)}; allowed: one of each of {', '.join(labels)}"
+        raise ParameterError([Problem("population.values", message)])
     records = _read(plan, paths, skip_bad_lines)
     needed = FEWEST + (members.condition is not None)
     if len(records) < needed:
         message = f"got {len(records)} record{'s' * (len(records) != 1)}; allowed: {needed} or more"
         raise ParameterError([Problem("population", message)])
-    if members.values is not None and len(members.values) != len(records):
-        message = f"got {len(members.values)}; allowed: {len(records)}, one for each record"
+    if given is not None and len(given) != len(records):
+        message = f"got {len(given)}; allowed: {len(records)}, one for each record"
         raise ParameterError([Problem("population.values", message)])
     plan = plan.referred_to(records[0])  # all levels of friction at one rate
     fits: dict[str, Fit] = {}
     with progress_text("searching") as said:
-        for path, record in zip(paths, records, strict=True):
-            stem = Path(path).stem
-            label = stem if stem not in fits else f"{stem} ({len(fits) + 1})"
+        for label, record in zip(labels, records, strict=True):
             fits[label] = plan.fit([record], progress=_progress_reporter(said, f"{label}, "))
     return population(
         fits, members.parameters, conditions=members.depends_on(), scale=members.scale, count=members.draws
     )
+
+
+def load_friction(path: str | PathLike[str]) -> Fit | Population:
+    """Read a saved fit, or a saved population, whichever the file holds.
+
+    Raises
+    ------
+    NotAvailable
+        As `load_fit` and `load_population`.
+    """
+    return load_population(path) if holds(path, POPULATION) else load_fit(path)
 
 
 def _read(plan: Spec, paths: Paths, skip_bad_lines: bool) -> list[Record]:

@@ -116,6 +116,18 @@ def read_sealed(path: str | PathLike[str], kind: FileKind, of: str = "", *, priv
     return unseal(read_bytes(path, kind.most, private=private), path, kind, of)
 
 
+def holds(path: str | PathLike[str], kind: FileKind) -> bool:
+    """Whether the last line of a file says that it is of this kind; its content is not checked.
+
+    Raises
+    ------
+    NotAvailable
+        If it cannot be read.
+    """
+    found = _LINE.search(read_bytes(path, kind.most)[-_LONGEST:])
+    return found is not None and found[1] == kind.name.encode()
+
+
 def fingerprint(data: Any) -> str:
     """SHA-256 (hex) of plain data as JSON, independent of the order of keys."""
     return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

@@ -50,10 +50,9 @@ def report(
         Entries of the title block, which stands at the top if one of them is given.
     **options
         For a rig: ``charts``, pairs of parameters over which stability is drawn, instead of those with the
-        nearest edges; ``branch``, index of the steady state where there are several; ``fit``, a Fit whose
-        friction is used,
-        and ``tolerances``, as for `steadyslip.tolerate`, for the uncertainty of the verdict. For a fit: ``comparison``,
-        a LawComparison, and ``draws``, its Draws.
+        nearest edges; ``branch``, index of the steady state where there are several; ``fit``, a Fit or Population whose
+        friction is used, and ``tolerances``, as for `steadyslip.tolerate`, for the uncertainty of the verdict. For a
+        fit: ``comparison``, a LawComparison, and ``draws``, its Draws.
 
     Returns
     -------

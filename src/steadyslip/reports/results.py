@@ -15,7 +15,7 @@ from steadyslip.core.format import format_percent, format_quantity, format_range
 from steadyslip.core.pages import Displayed
 from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
-from steadyslip.experiments import Fit, predict
+from steadyslip.experiments import Fit, Population, predict
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.maps import MAX_FACETS
@@ -153,7 +153,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
 
 @parts_of.register
 def _rig(
-    result: Slider, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None,
+    result: Slider, branch: int = 0, fit: Fit | Population | None = None, tolerances: Mapping[str, Any] | None = None,
     charts: Sequence[tuple[str, str]] = (), source: str = "",
 ) -> Parts:  # fmt: skip
     found = None
@@ -167,7 +167,7 @@ def _rig(
 
 @parts_of.register
 def _machine(
-    result: Machine, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None,
+    result: Machine, branch: int = 0, fit: Fit | Population | None = None, tolerances: Mapping[str, Any] | None = None,
     charts: Sequence[tuple[str, str]] = (), source: str = "",
 ) -> Parts:  # fmt: skip
     if branch or fit is not None or charts:

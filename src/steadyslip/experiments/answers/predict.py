@@ -264,7 +264,7 @@ def transferred(
         lost -= _without_effect(target, {name: belonging[name] for name in lost})
     if isinstance(fit, Population):
         if lost:
-            message = f"{', '.join(sorted(lost))} was fitted, but is not in the population; name it in its parameters"
+            message = f"{', '.join(sorted(lost))}: fitted, but not in the population; name them in its parameters"
             raise NotAvailable(message)
         return target, draws, {belonging[name]: own for name, own in values.items()}
     held = [one for one in source.names if one not in lost]

@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from steadyslip.core.domains import Domain, positive
-from steadyslip.core.entries import Names, Text, Whole
+from steadyslip.core.entries import LabelledNumbers, Names, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Settings, option, parameter, setting
-from steadyslip.core.roles import Series
 
 STARTS = 48
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")
@@ -90,15 +89,19 @@ class PopulationSettings(Settings):
         Text(f"what their means may depend on: `{STRESS}`, which is that of the records, or a name for `values`"),
         default=None,
     )
-    values: tuple[float, ...] | None = setting(
-        Series("1", "of the condition, one for each record in the order in which records are given"), default=None
+    values: tuple[float, ...] | dict[str, float] | None = setting(
+        LabelledNumbers(
+            "of the condition, one for each record: in the order in which records are given, or by the names of their "
+            "files without endings"
+        ),
+        default=None,
     )
     scale: float = parameter(
         "1", _scale, "of the half-normal prior of the spreads, e-folds or natural sizes", default=1.0
     )
     draws: int = setting(Whole("draws from the posterior", *DRAWS), default=4000)
 
-    def depends_on(self) -> str | dict[str, tuple[float, ...]] | None:
+    def depends_on(self) -> str | dict[str, tuple[float, ...] | dict[str, float]] | None:
         """Conditions in the form of the argument of `steadyslip.population`."""
         if self.condition is None or self.values is None:
             return self.condition

@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from file_schema import file_schema
-from steadyslip.core.entries import Label, Names, Option, Quantity, Span, Text, Whole
+from steadyslip.core.entries import Label, LabelledNumbers, Names, Option, Quantity, Span, Text, Whole
 from steadyslip.core.records import Named, Part, Settings, is_required, role_of
 from steadyslip.core.roles import Parameter, Series
 from steadyslip.experiments.fitting.settings import FitSettings
@@ -32,6 +32,7 @@ def value_of(role):
         Text: WORD, Names: st.lists(WORD, max_size=3).map(tuple), Label: WORD | st.integers(1, 9),
         Span: st.tuples(NUMBER, NUMBER), Quantity: NUMBER | st.just("1 GPa/m"),
         Series: st.lists(NUMBER, min_size=1, max_size=9).map(tuple),
+        LabelledNumbers: st.lists(NUMBER, max_size=3).map(tuple) | st.dictionaries(WORD, NUMBER, max_size=3),
     }  # fmt: skip
     if isinstance(role, Whole):
         return st.integers(role.low, 2**40 if role.high is None else role.high)

@@ -114,6 +114,12 @@ class LabelledNumbers(Entry):
         except QuantityError as error:
             raise fault(str(error)) from error
 
+    def written(self, value: Any, area: float | None = None) -> str:
+        if not isinstance(value, dict):
+            return super().written(value)
+        pairs = (f"{json.dumps(label, ensure_ascii=False)} = {number!r}" for label, number in value.items())
+        return f"{{ {', '.join(pairs)} }}"
+
     def allowed(self) -> str:
         return "a list of numbers, or a table of labels and numbers"
 

@@ -117,7 +117,7 @@ def test_work_is_bounded_and_what_it_found_is_kept(monkeypatch):
     part = ss.cycles(unit_rig("slip", 0.5, 0.6), most_points=60)
     assert 0 < len(part) < len(whole)
     taken, _, words = part.end.partition(" ")
-    assert 0.02 <= float(taken) < 0.2  # the step that passes the limit is finished
+    assert 0.01 < float(taken) < 0.2  # the first cycle's steps count before; the step that passes the limit is finished
     assert words.startswith("million steps of integration taken")
     assert [cycle.period for cycle in part] == list(part["period"])
     with pytest.raises(KeyError, match="did you mean 'period'"):

@@ -83,8 +83,8 @@ def test_beside_and_on_an_edge_a_page_says_what_python_says(name, stiffness):
     ("heavy", {}, "below which sliding is stable."),
     ("heavy", {"b3": -1e7}, "the nearest edge of the stable set."),
     ("undamped", {}, "Neither verdict should be relied on: the least change of a number decides."),
-    ("inclined", {"angle": -1.2}, "Lock-up. The pull raises friction by more than itself"),
-    ("axial", {"angle": 1.2}, "Lock-up."),
+    ("inclined", {"angle": -1.2}, "; the spring angle must be above -arccot μss = -55.01 deg (eq. 27)."),
+    ("axial", {"angle": 1.2}, "; the saw-cut angle must be below"),
     ("area", {"drive.velocity": 1e-4}, "Lift-off. The motion takes away more normal force than the contact has"),
 ])  # fmt: skip
 def test_away_from_edges_too(name, changes, words):

@@ -101,11 +101,9 @@ def judged(rig):
 
 
 def in_python(found, is_machine):
-    """First line and reason of an analysis as a page writes them: without causes and hints, which it does not have."""
+    """First line and reason of an analysis as a page writes them: without causes, which it does not have."""
     why = found.reason
-    if found.stable is None:  # the hint of a contact in its own terms
-        why = why.partition(";")[0]
-    elif not is_machine:
+    if found.stable is not None and not is_machine:
         why = why.removesuffix(why_always_stable(found) or ":").removesuffix(why_never_stable(found) or ":")
         why = ILL_POSED if found.growth_rate == math.inf else why
     return [written(text) for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")]

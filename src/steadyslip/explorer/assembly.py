@@ -180,6 +180,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     names = list(_variable_parameters(rig, facts))
     places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
     point = operating_point(rig, None, present_zeros(rig), branch)
+    hints = [one.contact.lock_up for one in rig.laws_by_contact().values()]
     axial, file = "slider.axial_stiffness", own_file(rig, names, text)
     return {
         "title": title,
@@ -195,7 +196,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "toml": file.pieces,
         **(_machine_data(rig, names, facts) if isinstance(rig, Machine) else _slider_data(rig, names)),
         "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
-        "absent": ABSENT,
+        "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints]},
         "remote": REMOTE,
         "beyond": BEYOND | EDGE_WORDS,
         "judders": JUDDERS,

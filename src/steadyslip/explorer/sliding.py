@@ -9,10 +9,11 @@ import sympy as sp
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.nodes import Node, Program, Value
 from steadyslip.model.equations import Model
+from steadyslip.model.sliding import REFERENCE, friction_coefficient
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 
 Rows = list[list[Value | None]]  # matrix of nodes; None is zero
-VALUES_PER_CONTACT = 4  # values of `steady` for each contact
+VALUES_PER_CONTACT = 5  # values of `steady` for each contact
 
 
 def needs_search(model: Model) -> list[bool]:
@@ -25,9 +26,9 @@ def needs_search(model: Model) -> list[bool]:
 def steady_programs(model: Model) -> list[Program]:
     """Program ``steady``, and ``residual0``, ``residual1``, ... of the contacts whose σss must be searched.
 
-    ``steady`` stores `VALUES_PER_CONTACT` values: σss (NaN if there is none), slope of the normal stress, load left and
-    steady load. For contacts that press on each other it stores all σss, then the coefficients of the characteristic
-    polynomial of their coupling matrix A, lowest power first.
+    ``steady`` stores `VALUES_PER_CONTACT` values: σss (NaN if there is none), slope of the normal stress, load left,
+    steady load and friction coefficient. For contacts that press on each other it stores all σss, then the coefficients
+    of the characteristic polynomial of their coupling matrix A, lowest power first.
     """
     joint = joint_equation(model)
     if joint is not None:
@@ -52,7 +53,8 @@ def _formula(model: Model, place: int) -> list[sp.Expr]:
     exists = sp.And(slope < 1, sp.StrictGreaterThan(sigma, 0, evaluate=False))
     left = sigma if equation.given else sigma * (1 - slope)
     own = model.contacts[place].steady_load
-    return [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, left, left if own is None else own]
+    friction = friction_coefficient(model, place).subs({contact.sigma_ss: REFERENCE for contact in model.contacts})
+    return [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, left, left if own is None else own, friction]
 
 
 def _joint_program(model: Model, joint: JointEquation) -> Program:

@@ -25,6 +25,8 @@ from steadyslip.model.range import require_range
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine, SteadySliding
 
+REFERENCE = 1e6  # normal stress, Pa, at which messages tell a friction coefficient that may depend on it
+
 
 @overload
 def steady_state(rig: Slider) -> SteadySliding: ...
@@ -195,8 +197,10 @@ def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | No
     mu = _friction_coefficient(point, place)
     if not slope < 1:
         margin = 1 - slope
-        hint = law.lock_up(mu)
-        words = ABSENT["lock-up"].format(at=at, margin=f"{margin:.4g}") + (f"; {hint}" if hint else "")
+        words = ABSENT["lock-up"].format(at=at, margin=f"{margin:.4g}")
+        if law.lock_up:
+            inverse, angle = (f"{one:.4g}" for one in (1 / mu, math.degrees(math.atan2(1.0, mu))))
+            words += "; " + law.lock_up.format(inverse=inverse, angle=angle)
         return _absence("lock-up", name, words, margin)
     left = load + offset
     had, taken, remains = (format_quantity(one, "Pa", area=area) for one in (load, -offset, left))
@@ -226,14 +230,19 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
     return _absence("lift-off", name, words, float(force))
 
 
+def friction_coefficient(model: Model, place: int) -> sp.Expr:
+    """Friction coefficient in steady sliding at the normal stresses `Contact.sigma_ss`."""
+    contact = model.contacts[place]
+    return sp.sympify(model.steady[contact.friction] / contact.sigma_ss)
+
+
 @question
 def _friction_function(model: Model, place: int) -> ArrayFunction:
-    contact = model.contacts[place]
-    return model.function([model.steady[contact.friction] / contact.sigma_ss])
+    return model.function([friction_coefficient(model, place)])
 
 
 def _friction_coefficient(point: OperatingPoint, place: int) -> float:
-    """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact if τ is proportional to σ)."""
-    stresses = (1e6 for _ in point.model.contacts)
+    """Friction coefficient in steady sliding at the normal stress `REFERENCE` (exact if τ is proportional to σ)."""
+    stresses = (REFERENCE for _ in point.model.contacts)
     value = float(_friction_function(point.model, place)(*point.arguments, *stresses)[0])
     return value if math.isfinite(value) else float("nan")

@@ -12,7 +12,7 @@ import { roots } from "./polynomials.js";
 const NEARLY_REAL = 1e-6; // imaginary part over |s| of a root below which it is also tried as real
 export const SAME = 1e-9; // relative distance below which two edges count as one
 const HUGE = 1e150, SIGNED = 1e4; // HUGE: sizes whose products do not overflow; SIGNED: above the logarithm of any product of coefficients
-const FORMULA = 4, REAL = 1e-9; // FORMULA: values of `steady` for each contact; REAL: relative imaginary part of a gain that is rounding
+const FORMULA = 5, REAL = 1e-9; // FORMULA: values of `steady` for each contact; REAL: relative imaginary part of a gain that is rounding
 const APART = [1e-6, 1, 1e6]; // factors on a parameter for the test that it enters linearly
 const SIZED_APART = 1e12; // ratio of an edge to the size of a parameter above which the edge is rounding of 0 or infinity
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
@@ -193,8 +193,8 @@ export class Linear {
     }
     const i = contacts.findIndex((_, n) => !(R[count + n] > 0));
     if (searched[i]) return { contact: i, searched: true };
-    const [, slope, left, load] = this.ask("steady", FORMULA * contacts.length).slice(FORMULA * i);
-    return { contact: i, slope, load: left, had: load };
+    const [, slope, left, load, friction] = this.ask("steady", FORMULA * contacts.length).slice(FORMULA * i);
+    return { contact: i, slope, load: left, had: load, friction };
   }
 
   /**

@@ -47,7 +47,7 @@ function absence(answer, { absent, phrases, facts, areas, area }) {
   const force = whole === null ? "stress" : "force", size = (stress) => quantity(stress, "Pa", whole);
   if (answer.searched) return fill(absent["no solution"], { force, at });
   if (answer.pressing !== undefined) return answer.pressing < 1 ? fill(absent.lifted, { at, left: size(answer.load) }) : fill(absent.together, { at, margin: digits(1 - answer.pressing) });
-  if (!(answer.slope < 1)) return fill(absent["lock-up"], { at, margin: digits(1 - answer.slope) });
+  if (!(answer.slope < 1)) return fill(absent["lock-up"] + absent.hints[answer.contact], { at, margin: digits(1 - answer.slope), inverse: digits(1 / answer.friction), angle: digits(Math.atan2(1, answer.friction) * 180 / Math.PI) });
   return fill(absent["lift-off"], { at, force, load: size(answer.had), taken: size(answer.had - answer.load), left: size(answer.load) });
 }
 

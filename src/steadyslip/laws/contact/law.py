@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import sympy as sp
 
@@ -115,6 +115,9 @@ class ContactLaw(FrozenRecord, family="contact law"):
     contact. Methods are pure, read the record's own fields and return SymPy expressions.
     """
 
+    lock_up: ClassVar[str] = ""
+    """What must hold lest it locks up, for messages; {inverse} becomes 1/μss and {angle} arccot μss in degrees."""
+
     def load(self) -> Expression | None:
         """Normal stress without the coupling, σ0 (Pa); None if `steady_stress` is given instead."""
         raise NotImplementedError
@@ -185,10 +188,6 @@ class ContactLaw(FrozenRecord, family="contact law"):
     def has_axis(self) -> bool:
         """True if `sliding_stiffness` is defined."""
         return type(self).sliding_stiffness is not ContactLaw.sliding_stiffness
-
-    def lock_up(self, friction_coefficient: float) -> str:
-        """Lock-up condition in terms of the law's parameters, for messages; empty if there is none."""
-        return ""
 
     def shape(self) -> Shape:
         """Shape of the law's sketch; a block pulled along a plane unless overridden."""

@@ -6,7 +6,6 @@ the tests derive from `coupling`. Sketches: docs/explanation/contacts.md.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import sympy as sp
@@ -15,7 +14,6 @@ from steadyslip.core.domains import Condition, acute, angle, line, nonnegative, 
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import option, parameter
 from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, PreloadedContact, Shape
-from steadyslip.units import deg
 
 
 class InclinedSpring(PreloadedContact, name="inclined-spring"):
@@ -26,6 +24,8 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
     B0...B3 = 0, c tan ψ, tan ψ, 0 with c a dashpot beside the spring. Lock-up: ψ <= −arccot μss (eq. 27).
     """
 
+    lock_up = "the spring angle must be above −arccot μss = -{angle} deg (eq. 27)"
+
     angle: float = parameter("rad", line, "spring angle ψ, positive when it pulls out of the surface", letter="psi")
 
     def coupling(self, motion: ContactInputs) -> Expression:
@@ -33,10 +33,6 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
 
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
         return axial_stiffness * sp.cos(self.angle) ** 2
-
-    def lock_up(self, friction_coefficient: float) -> str:
-        limit = -math.atan2(1.0, friction_coefficient) / deg
-        return f"the spring angle must be above −arccot μss = {limit:.4g} deg (eq. 27)"
 
     def shape(self) -> Shape:
         return Shape(rise=self.angle)
@@ -50,6 +46,8 @@ class Transmitted(ContactLaw, name="transmitted"):
     `transmitted_back`, the same unless given. Steady sliding with T > 0 is an inclined spring with tan ψ = −g:
     B0...B3 = 0, −c g, −g, 0, and it locks up where g μss >= 1 (where T is the pull of the drive itself).
     """
+
+    lock_up = "the transmitted share must be below 1/μss = {inverse}"
 
     preload: float = parameter(
         "Pa", nonnegative, "normal stress σ0 without load", default=0.0, kind="normal stress", letter="sigma_0"
@@ -67,9 +65,6 @@ class Transmitted(ContactLaw, name="transmitted"):
         pull = motion.spring
         return (self.transmitted + back) / 2 * sp.Abs(pull) + (self.transmitted - back) / 2 * pull
 
-    def lock_up(self, friction_coefficient: float) -> str:
-        return f"the transmitted share must be below 1/μss = {1 / friction_coefficient:.4g}"
-
     def shape(self) -> Shape:
         return Shape(rise=-0.3)
 
@@ -82,6 +77,8 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
     (crank_radius/rod_length) sin(crank_angle). A rod that pulls a slider towards the crank lifts it
     (ψ > 0), a rod that pushes it away presses it in (ψ < 0). B0...B3 = 0, c tan ψ, tan ψ, 0.
     """
+
+    lock_up = "tan of the pushing rod's inclination must be below 1/μss = {inverse}"
 
     crank_angle: float = parameter("rad", turn, "crank angle from the slide line")
     crank_radius: float = parameter("m", positive, "crank radius")
@@ -105,9 +102,6 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
         return axial_stiffness / (1 + self._tangent() ** 2)
 
-    def lock_up(self, friction_coefficient: float) -> str:
-        return f"tan of the pushing rod's inclination must be below 1/μss = {1 / friction_coefficient:.4g}"
-
     def shape(self) -> Shape:
         return Shape(rise=0.3 if self.stroke == "pull" else -0.3, part="crank")
 
@@ -119,6 +113,8 @@ class Triaxial(ContactLaw, name="triaxial"):
     The press has an axial stiffness K (differential stress per axial shortening, Pa/m) and
     k = K sin θ cos²θ along the cut. B0...B3 = 0, −c tan θ, −tan θ, 0. Lock-up: tan θ >= 1/μss.
     """
+
+    lock_up = "the saw-cut angle must be below arccot μss = {angle} deg"
 
     angle: float = parameter("rad", acute, "angle θ between saw cut and loading axis", letter="psi")
     confining_pressure: float | None = parameter("Pa", positive, "confining pressure P_c", default=None)
@@ -142,10 +138,6 @@ class Triaxial(ContactLaw, name="triaxial"):
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
         return axial_stiffness * sp.sin(self.angle) * sp.cos(self.angle) ** 2
 
-    def lock_up(self, friction_coefficient: float) -> str:
-        limit = math.atan2(1.0, friction_coefficient) / deg
-        return f"the saw-cut angle must be below arccot μss = {limit:.4g} deg"
-
     def shape(self) -> Shape:
         return Shape(rise=-self.angle, load="P")
 
@@ -158,6 +150,8 @@ class SelfEnergising(PreloadedContact, name="self-energising"):
     and load). γ < 0 releases the contact. B0...B3 = −γm, −γ(c + η), −γ, 0 (and B4 = γq). Needs γ f1 < 1
     and γ μss < 1; the latter is lock-up.
     """
+
+    lock_up = "the gain must be below 1/μss = {inverse}"
 
     gain: float | None = parameter("1", real, "gain γ of friction on normal stress", default=None)
     wedge_angle: float | None = parameter("rad", acute, "wedge angle, γ = cot(wedge_angle)", default=None)
@@ -176,9 +170,6 @@ class SelfEnergising(PreloadedContact, name="self-energising"):
     def coupling(self, motion: ContactInputs) -> Expression:
         return self._gain() * motion.friction
 
-    def lock_up(self, friction_coefficient: float) -> str:
-        return f"the gain must be below 1/μss = {1 / friction_coefficient:.4g}"
-
     def shape(self) -> Shape:
         return Shape(part="wedge", load="")
 
@@ -190,6 +181,8 @@ class LeadScrew(ContactLaw, name="lead-screw"):
     slip is measured along the thread. With γ = ± tan β: B0...B3 = −γm, −γ(c + η), −γ, 0.
     """
 
+    lock_up = "raising needs a lead angle below arccot μss = {angle} deg"
+
     lead_angle: float = parameter("rad", acute, "lead angle β of the thread")
     axial_load: float = parameter("Pa", positive, "axial load W per unit thread area")
     direction: str = option("raising", "lowering", doc="whether the screw raises or lowers the load", default="raising")
@@ -200,10 +193,6 @@ class LeadScrew(ContactLaw, name="lead-screw"):
     def coupling(self, motion: ContactInputs) -> Expression:
         gain = sp.tan(self.lead_angle) * (1 if self.direction == "raising" else -1)
         return gain * motion.friction
-
-    def lock_up(self, friction_coefficient: float) -> str:
-        limit = math.atan2(1.0, friction_coefficient) / deg
-        return f"raising needs a lead angle below arccot μss = {limit:.4g} deg"
 
     def shape(self) -> Shape:
         return Shape(tilt=self.lead_angle, load="W")

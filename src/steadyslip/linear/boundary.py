@@ -19,15 +19,17 @@ from steadyslip.linear.allowance import at_most
 from steadyslip.linear.coupling import search_for
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
+from steadyslip.linear.measured_search import MeasuredSearch
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.model.numeric import by_matrices
+from steadyslip.model.numeric import by_matrices, has_response
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_digits, require_range
 
 _TOO_MANY = "roots under the delays are too many there to be counted; shorten the delays"
+_ERRORS = "the response is too short, too coarse or too uncertain there; analyze says which"
 _TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
 _TIED = 6  # digits to which distances are compared, no closer than 1e-6: pages know edges to twelve
 
@@ -105,19 +107,29 @@ def boundary(
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, [rig.read(full, one) for one in between])
     if by_matrices(rig):
-        require_matrices(rig)
-        return MatrixSearch(rig, full).boundaries(limits)
-    _require_answers(rig, branch)
-    if limits is not None:
-        operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
-    search = search_for(rig, full, _kept(rig, full), branch)
+        search: Search | MatrixSearch | MeasuredSearch = _matrix_search(rig, full)
+    else:
+        _require_answers(rig, branch)
+        if limits is not None:
+            operating_point(
+                rig, {full: np.asarray(limits)}, _kept(rig, full), branch
+            )  # refuses what breaks a condition
+        search = search_for(rig, full, _kept(rig, full), branch)
     found = search.boundaries(limits)
     if unknown := _unknown(rig, search, *(limits or search.searched)):
-        warnings.warn(f"edges of {unknown} are not decided: {_TOO_MANY}", UndecidedWarning, stacklevel=3)
+        why = _ERRORS if isinstance(search, MeasuredSearch) else _TOO_MANY
+        warnings.warn(f"edges of {unknown} are not decided: {why}", UndecidedWarning, stacklevel=3)
     return found
 
 
-def _unknown(rig: Rig, search: Search | MatrixSearch, low: float, high: float) -> str:
+def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:
+    if has_response(rig):
+        return MeasuredSearch(rig, name)
+    require_matrices(rig)
+    return MatrixSearch(rig, name)
+
+
+def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: float, high: float) -> str:
     """Name of a parameter and where between `low` and `high` its edges are not known; empty if they are."""
     if search.hides:
         return f"{search.name} near some values"
@@ -170,9 +182,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
     Of a parameter whose edges are known in a part of the range only, the margin tells that part as `searched`; it is
     among those missing, with the part in words, if its nearest edge may lie beyond.
     """
-    if by_matrices(rig):
-        require_matrices(rig)
-    else:
+    if not by_matrices(rig):
         _require_answers(rig, branch)
     present = present_zeros(rig)
     asked = [
@@ -187,7 +197,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
         missing, share = [], left // len(asked)
         for name, address in asked:
             with at_most(share) as allowance:
-                search = MatrixSearch(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
+                search = _matrix_search(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
                 edges = search.boundaries(None)
             left -= share - allowance.left
             if allowance.spent or search.hides:
@@ -198,8 +208,9 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
             cuts = [abs(end - search.value) for end in (first, last) if low < end < high]
             if min(cuts, default=np.inf) < (np.inf if own.edge is None else abs(own.absolute)):
                 cut.append(_unknown(rig, search, low, high))
-            else:
-                found.append(own)
+                if not isinstance(search, MeasuredSearch):  # whose edges are told beside what errors leave open
+                    continue
+            found.append(own)
         asked = missing
     return tuple(sorted(found, key=_urgency)), (*(name for name, _ in asked), *cut)
 

@@ -24,6 +24,9 @@ from .links import (
 from .machine import (
     Machine as Machine,
 )
+from .responses import (
+    ResponseData as ResponseData,
+)
 from .servo import (
     Cascade as Cascade,
     MachineDrive as MachineDrive,

@@ -1,4 +1,4 @@
-"""Structures: bodies given by matrices or by modes, with named points where links and contacts act."""
+"""Structures: bodies given by matrices, modes or a measured response, with named points for links and contacts."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.records import FrozenRecord, members, parameter, setting
 from steadyslip.core.roles import Entry, Schema, fault
 from steadyslip.machine.bodies import Body
+from steadyslip.machine.responses import ResponseData
 
 MOST_FREEDOM = 3000
 """Most degrees of freedom of one structure: its matrices take 72 MB each, its eigenvalues minutes."""
 _FREE = 1e-10  # stiffness of a mode relative to the largest that counts as none; files of 11 digits
 _GOOD_TO = 0.5  # of the frequency of the last mode of a reduction, up to which it is meant to be good: usual practice
+_ONE = "give exactly one of matrices, modes and response"
 _SYMMETRIC = 1e-8  # relative asymmetry of an inertia matrix that is taken for rounding of a file
 
 
@@ -140,14 +142,15 @@ class OfStructure(Entry):
     """Field type: data of a structure; in files the name of a file, which is read before the field is checked."""
 
     doc: str
+    of: type = StructureData
 
-    def checked(self, value: Any) -> StructureData:
-        if isinstance(value, StructureData):
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, self.of):
             return value
         raise fault(value.reason) if isinstance(value, Unread) else self.refused(value)
 
     def allowed(self) -> str:
-        return "the name of a file beside this one; in Python StructureData"
+        return f"the name of a file beside this one; in Python {self.of.__name__}"
 
     def schema(self) -> Schema:
         return {"type": "string", "minLength": 1, "description": self.doc}
@@ -174,7 +177,7 @@ class StructurePoint(FrozenRecord):
 
 
 class StructureBody(Body, name="structure"):
-    """A structure: matrices M, C, G, K or modes from a file, with named points (theory 13).
+    """A structure: matrices M, C, G, K, modes or a measured response from a file, with named points (theory 13).
 
     Links and contacts name its points: ``caliper.pad``. The direction of the slide makes an `angle` with the
     structure's own x; away from the surface is a quarter turn further.
@@ -186,6 +189,10 @@ class StructureBody(Body, name="structure"):
     modes: StructureData | None = setting(
         OfStructure("file of modes: frequencies, damping ratios, shapes at named points"), default=None
     )
+    response: ResponseData | None = setting(
+        OfStructure("file of measured frequency responses: .uff, .csv or .mat", ResponseData), default=None
+    )
+    averages: int = setting(Whole("averages behind the coherence of each measured response", 1), default=1)
     spin: float | None = parameter(
         "rad/s", real, "speed of rotation, by which the gyroscopic matrix is multiplied; 1 unless given", default=None
     )
@@ -193,8 +200,8 @@ class StructureBody(Body, name="structure"):
     is_structure: ClassVar[bool] = True
 
     def inconsistencies(self) -> Iterator[Problem]:
-        if (self.matrices is None) == (self.modes is None):
-            yield Problem("matrices", "give exactly one of matrices and modes")
+        if sum(one is not None for one in (self.matrices, self.modes, self.response)) != 1:
+            yield Problem("matrices", _ONE)
             return
         for name, point in self.points.items():
             known, taken = name in self.data.points, (point.x, point.y) != (None, None)
@@ -214,10 +221,13 @@ class StructureBody(Body, name="structure"):
 
     @property
     def data(self) -> StructureData:
-        """The matrices, or those of the modes."""
+        """The matrices, or those of the modes; of a response a stand-in that only tells where points are."""
+        if self.response is not None:
+            one = np.eye(len(self.response.names))
+            return StructureData(one, 0 * one, one, 0 * one, self.response.points(), self.response.source)
         found = self.matrices if self.modes is None else self.modes
         if found is None:
-            raise ParameterError([Problem("matrices", "give exactly one of matrices and modes")])
+            raise ParameterError([Problem("matrices", _ONE)])
         return found
 
     def point_names(self) -> tuple[str, ...]:

@@ -18,8 +18,9 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
-from steadyslip.model.numeric import by_matrices
+from steadyslip.model.numeric import by_matrices, has_response
 from steadyslip.model.numeric.machine_point import machine_point, steady_of
+from steadyslip.model.numeric.measured import measured_machine
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
@@ -70,7 +71,7 @@ def steady_machine(rig: Machine) -> SteadyMachine:
         Naming the contact that locks up or lifts off.
     """
     if by_matrices(rig):
-        return steady_of(machine_point(rig))
+        return steady_of(measured_machine(rig) if has_response(rig) else machine_point(rig))
     point = operating_point(rig)
     if not point.exists:
         raise explain_absence(rig, point)

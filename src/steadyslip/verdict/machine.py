@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from steadyslip.core.checks import UNDECIDED
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
@@ -21,7 +22,8 @@ from steadyslip.linear.modes import Mode, matrix_mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND
-from steadyslip.model.numeric import by_matrices, has_structure
+from steadyslip.model.numeric import by_matrices, has_response, has_structure
+from steadyslip.model.numeric.measured import measured_machine
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.sliding import steady_machine
@@ -32,6 +34,7 @@ from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, finite, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.matrix_checks import is_on_edge, matrix_checks, matrix_edge_checks, matrix_numbers
+from steadyslip.verdict.measured import response_facts, response_numbers
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
 from steadyslip.verdict.words import (
@@ -89,6 +92,7 @@ def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
         pulls = [row for name in found.rig.contacts for row in _pull(found.rig, name)]
         rows = [("steady sliding", _sliding(found.steady)), *pulls, ("a disturbance", disturbance(found))]
     rows += [("the mode", found.mode.words())] if found.mode else []
+    rows += response_facts(found.rig, found.margins) if has_response(found.rig) else []
     rows += stable_speeds(found)
     rows += [("onset", onset_words(found.onset))] if found.onset else []
     return rows + [("a kick", threshold_words(kick)) for kick in found.kicks]
@@ -113,7 +117,7 @@ def machine_meaning(found: MachineAnalysis) -> list[str]:
     if found.stable is None or found.on_edge:
         return []
     if not found.stable:
-        return [] if found.growth_rate == math.inf else [JUDDERS]
+        return [] if found.growth_rate == math.inf or has_structure(found.rig) else [JUDDERS]
     return ["Stable means: small disturbances die out. A large enough kick may still start an oscillation."]
 
 
@@ -121,6 +125,8 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
     """Verdict on a machine; see `steadyslip.analyze`."""
     from steadyslip import __version__
 
+    if has_response(machine):
+        return _analyze_response(machine, kicks)
     if by_matrices(machine):
         return _analyze_by_matrices(machine, kicks)
     with np.errstate(all="ignore"):
@@ -189,6 +195,26 @@ def _analyze_by_matrices(machine: Machine, kicks: Sequence[str]) -> MachineAnaly
             kicks=_kicks(machine, kicks), warnings=_warnings(machine, steady), checks=(*checks, *of_edges), **numbers,
         )  # fmt: skip
     return replace(found, reason=_reason(found))
+
+
+def _analyze_response(machine: Machine, kicks: Sequence[str]) -> MachineAnalysis:
+    """Verdict on a machine with a structure given by its measured response: the growing roots are counted."""
+    from steadyslip import __version__
+
+    if kicks:
+        raise NotAvailable("kicks are not offered for a structure given by its measured response")
+    found = measured_machine(machine)
+    if found.count.growing is None:
+        doubt = UNDECIDED + found.count.doubt
+        return MachineAnalysis(rig=machine, stable=None, reason=doubt, margins=(), version=__version__)
+    distances, missing = margins_and_missing(machine)
+    steady = steady_machine(machine)
+    lost = (f"{UNDECIDED}edges of {', '.join(missing)}",) if missing else ()
+    answer = MachineAnalysis(
+        rig=machine, reason="", steady=steady, margins=distances, warnings=(*_warnings(machine, steady), *lost),
+        version=__version__, **response_numbers(found),
+    )  # fmt: skip
+    return replace(answer, reason=_reason(answer))
 
 
 def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,10 @@ from steadyslip.core.errors import ParameterError
 from steadyslip.files.inputs import UnreadableFile
 from steadyslip.files.structures.matrices import read_matrices
 from steadyslip.files.structures.modal_table import read_modes
+from steadyslip.files.structures.responses import read_response
 from steadyslip.machine.structures import StructureBody, Unread
 
-_READERS = {"matrices": read_matrices, "modes": read_modes}
+_READERS: dict[str, Callable[..., Any]] = {"matrices": read_matrices, "modes": read_modes, "response": read_response}
 
 
 def with_structures(tables: Mapping[str, Any], source: str) -> dict[str, Any]:
@@ -32,9 +33,10 @@ def _loaded(body: Any, folder: Path) -> Any:
         return body
     found = {key: value for key, value in body.items() if key != "kind"} | {"motion": StructureBody.name}
     for key, read in _READERS.items():
+        more = (found.get("averages", 1),) if key == "response" else ()
         if isinstance(path := found.get(key), str):
             try:
-                found[key] = read(path, folder)
+                found[key] = read(path, folder, *more)
             except UnreadableFile as error:
                 found[key] = Unread(str(error))
             except ParameterError as error:

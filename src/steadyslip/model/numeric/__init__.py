@@ -19,6 +19,11 @@ def has_structure(rig: object) -> bool:
     return isinstance(rig, Machine) and any(body.is_structure for body in rig.bodies.values())
 
 
+def has_response(rig: object) -> bool:
+    """True for a machine with a structure given by its measured response, which has no eigenvalues to be computed."""
+    return isinstance(rig, Machine) and any(getattr(body, "response", None) is not None for body in rig.bodies.values())
+
+
 def by_matrices(rig: object) -> TypeGuard[Machine]:
     """True for a machine whose equations are matrices: it has a structure, or is too large to be written out."""
     if has_structure(rig):

@@ -15,8 +15,10 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
+from steadyslip.model.numeric import has_response
 from steadyslip.model.numeric.balance import Balance, balances
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, VariedMachine, assemble
+from steadyslip.model.numeric.measured import MeasuredMachine
 from steadyslip.model.numeric.pencil import StatePencil, growing_roots, linearised, pencils
 from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine
 
@@ -104,12 +106,23 @@ def _point(machine: Machine) -> MachinePoint:
 
 
 def machine_point(machine: Machine) -> MachinePoint:
-    """The machine in numbers (cached with it)."""
+    """The machine in numbers (cached with it).
+
+    Raises
+    ------
+    NotAvailable
+        If it has a structure given by its measured response.
+    """
+    if has_response(machine):
+        raise NotAvailable(
+            "a structure given by its measured response has no equations; analyze, boundary and margins are offered. "
+            "Describe it by matrices or modes for more"
+        )
     found: MachinePoint = _point(machine)
     return found
 
 
-def absence(point: MachinePoint) -> NoSteadySliding:
+def absence(point: MachinePoint | MeasuredMachine) -> NoSteadySliding:
     """Error for a machine without steady sliding: which contact locks up or lifts off, and by how much."""
     found = point.balance
     if not found.gain < 1:
@@ -123,7 +136,7 @@ def absence(point: MachinePoint) -> NoSteadySliding:
     return NoSteadySliding(f"no steady sliding: {words}", "lift-off", force, site.name)
 
 
-def steady_of(point: MachinePoint) -> SteadyMachine:
+def steady_of(point: MachinePoint | MeasuredMachine) -> SteadyMachine:
     """Steady sliding as a result.
 
     Raises

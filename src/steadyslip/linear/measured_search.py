@@ -1,0 +1,129 @@
+"""Edges of stability in one parameter of a machine whose structure is a measured response.
+
+Growing roots are counted along the parameter; an edge lies between two values of which one is surely stable and the
+other surely is not. What errors of the response leave open is the edge's bracket.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
+from steadyslip.linear.search import Boundary
+from steadyslip.linear.status import STABLE, UNKNOWN, UNSTABLE
+from steadyslip.machine.machine import Machine
+from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
+
+_DECADES, _PER_DECADE, _EVEN = 2, 10, 61  # values at which roots are counted; of a bounded domain evenly spaced ones
+_HALVINGS = 14  # of what lies between two values: to 1e-5 of them
+_NEWTON = 30
+_STEP = 1e-7  # relative, of differences: the root of rounding
+_LAST = 1e-12  # relative step at which Newton's method has ended
+
+
+class MeasuredSearch:
+    """Search of one parameter for edges; `boundaries` is the result."""
+
+    hides = False
+
+    def __init__(self, machine: Machine, name: str) -> None:
+        self.machine, self.name = machine, name
+        address = machine.parameters()[name]
+        self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
+        self.own = measured_machine(machine)
+        self.decided = -np.inf, np.inf
+        """Values around the own one between which all is decided; known after `boundaries`."""
+
+    @property
+    def searched(self) -> tuple[float, float]:
+        """Default range."""
+        grid = self._grid(None)
+        return float(grid[0]), float(grid[-1])
+
+    def _grid(self, between: tuple[float, float] | None) -> Array:
+        domain, far = self.role.domain, 10.0**_DECADES
+        if np.isfinite(domain.high - domain.low):
+            found = np.linspace(domain.low, domain.high, _EVEN)
+        else:
+            found = self.value * np.geomspace(1 / far, far, 2 * _DECADES * _PER_DECADE + 1)
+        found = np.unique(np.concatenate([found[domain.contains(found)], [self.value], list(between or ())]))
+        return found if between is None else found[(found >= between[0]) & (found <= between[1])]
+
+    def _at(self, value: float) -> MeasuredMachine:
+        return self.own.varied(self.name, value)
+
+    def _status(self, value: float) -> int:
+        try:
+            growing = self._at(value).count.growing
+        except NotAvailable:  # a law without steady stress there
+            return UNKNOWN
+        return UNKNOWN if growing is None else UNSTABLE if growing else STABLE
+
+    def boundaries(self, between: tuple[float, float] | None = None) -> tuple[Boundary, ...]:
+        """Edges in a range, by default in `searched`, rising."""
+        grid = self._grid(between)
+        status = np.array([self._status(float(one)) for one in grid])
+        sure = np.flatnonzero(status != UNKNOWN)
+        found, unknown = [], []
+        for i, j in pairwise(sure):
+            if status[i] != status[j]:
+                found.append(self._edge(float(grid[i]), float(grid[j]), int(status[i]), int(status[j])))
+            elif j > i + 1:  # two edges, or none
+                unknown += [float(grid[i]), float(grid[j])]
+        ends = [*unknown, *((float(grid[sure[0]]), float(grid[sure[-1]])) if sure.size else ())]
+        self.decided = (
+            max((one for one in ends if one <= self.value), default=-np.inf),
+            min((one for one in ends if one >= self.value), default=np.inf),
+        )
+        return tuple(found)
+
+    def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
+        """Edge between two values of different status, in the narrowest bracket that errors of the response leave."""
+        outer = low, high
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            status = self._status(middle)
+            if status == UNKNOWN:
+                low, high = self._last(low, middle, below), self._last(high, middle, above)
+                break
+            low, high = (middle, high) if status == below else (low, middle)
+        value, beta = self._polished(low, high, outer)
+        bracket = min(low, value), max(high, value)
+        stable = "above" if above == STABLE else "below"
+        kind = "oscillatory" if beta else "divergence"
+        area = self.machine.printed_area(self.name)
+        return Boundary(self.name, value, bracket, kind, beta, stable, self.role.unit, area)
+
+    def _last(self, sure: float, open_: float, status: int) -> float:
+        """Value nearest to one whose status is open that surely has a status."""
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (sure + open_)
+            sure, open_ = (middle, open_) if self._status(middle) == status else (sure, middle)
+        return sure
+
+    def _polished(self, low: float, high: float, outer: tuple[float, float]) -> tuple[float, float]:
+        """Value and frequency at which the determinant is zero, by Newton's method from where it is nearest."""
+        middle = 0.5 * (low + high)
+        value, beta = middle, self._at(middle).count.omega
+        if beta <= self.own.response.omega[0]:  # a root that crosses at zero, where nothing is to be followed
+            return middle, 0.0
+        for _ in range(_NEWTON):
+            step, turn = _STEP * abs(value), _STEP * beta
+            here = self._at(value)
+            now = here.determinant(1j * beta)
+            by_value = (self._at(value + step).determinant(1j * beta) - now) / step
+            by_beta = (here.determinant(1j * (beta + turn)) - now) / turn
+            slopes = np.array([[by_value.real, by_beta.real], [by_value.imag, by_beta.imag]])
+            try:
+                moved = np.linalg.solve(slopes, [-now.real, -now.imag])
+            except np.linalg.LinAlgError:
+                break
+            value, beta = value + float(moved[0]), beta + float(moved[1])
+            if not outer[0] < value < outer[1] or not 0 < beta < self.own.samples.omega[-1]:
+                break
+            if abs(moved[0]) <= _LAST * abs(value):
+                return value, beta
+        return middle, self._at(middle).count.omega

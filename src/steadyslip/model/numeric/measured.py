@@ -1,0 +1,380 @@
+"""Growing roots of a machine whose structure is a measured response: turns of det(I + R G) round 0 (theory 13).
+
+R(iω) is the receptance at the contacts, in their slips and distances, and G(s) the stiffness with which the contacts
+answer. Beyond the band the structure is passive: with the part of G that only stores and takes energy the determinant
+cannot turn further than its angles at the end of the band tell. What is left of G, the push of friction by a changing
+normal force, must be small in the highest octave.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.format import format_quantity
+from steadyslip.core.questions import question
+from steadyslip.core.records import with_values
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.responses import ResponseData
+from steadyslip.model.numeric.balance import Balance
+from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site, assemble
+from steadyslip.model.numeric.pencil import pencils
+
+ComplexArray = NDArray[np.complex128]
+
+_SURE = 4.0  # deviations of complex errors: one in e^16 is larger
+_TURN = 1.2  # rad; largest change of the argument between two samples that counts as followed
+_BENT = 0.5  # second difference of the determinant relative to it, of which straight lines are off by an eighth
+_ROUNDS = 12  # of halving between samples
+_ROUNDING = 1e-9
+_PUSHED = 0.5  # share of the determinant that friction's push by the normal force may have in the highest octave
+_PASSIVE = 2.6  # rad, of π; largest angle at the end of the band that is surely no other
+_WHOLE = 0.25  # of half turns that are counted
+_NEAR = 6  # samples through which a polynomial is laid
+_NEWTON, _STEP = 30, 1e-7  # steps of Newton's method, and of its differences relative to the root: the root of rounding
+_BELOW = np.concatenate([[0.0], np.geomspace(1e-6, 0.99, 120)])  # places below the band, relative to its begin
+_FIRST = 4.0  # times its first frequency, up to which at least a response is compared with that of a spring
+_POWERS = (-2.0, 0.0, 2.0, 4.0)  # of frequency there
+_MASS, _VAGUE = 3e-3, 0.1  # share in −1/ω² that is none, and its error from which it is not known
+_LOWER = "where it is not surely that of a spring: measure from lower on"
+_BEYOND = np.geomspace(1, 1e4, 60)  # places beyond it, relative to its end
+
+
+@dataclass(frozen=True)
+class Count:
+    """Growing roots of one machine.
+
+    Attributes
+    ----------
+    growing : int or None
+        None if that is not decided.
+    doubt : str
+        Why it is not.
+    omega : float
+        Frequency (rad/s) at which the determinant comes nearest to 0.
+    """
+
+    growing: int | None
+    doubt: str
+    omega: float
+
+
+class ContactStiffness:
+    """G(s) of the contacts of one machine in steady sliding, in their slips and distances, in this order.
+
+    Raises
+    ------
+    NotAvailable
+        If the normal force in steady sliding is not given.
+    """
+
+    def __init__(self, sites: tuple[Site, ...]) -> None:
+        size = 2 * len(sites)
+        unit, none, zero = np.eye(size), np.zeros(size), np.zeros((size, size))
+        sites = tuple(
+            replace(one, slip=unit[2 * i], apart=unit[2 * i + 1], pull=none, pull_rate=none, pull_moving=0.0)
+            for i, one in enumerate(sites)
+        )
+        sigma, tau = np.array([_steady_stresses(one) for one in sites]).T
+        yes, alone = np.array(True), np.zeros(())
+        self.balance = Balance(sigma, tau, none, alone, alone, sigma, yes, yes)
+        names = tuple(one.name for one in sites for _ in range(2))
+        contacts = MachineMatrices(names, zero, zero, zero, none, none, none, none, sites)
+        e, a, posed = pencils(contacts, self.balance)
+        self.size, self.e, self.a, self.posed = size, e, a, bool(posed)
+
+    def __call__(self, s: ComplexArray) -> ComplexArray:
+        """G at places s (p,), (p, 2 contacts, 2 contacts)."""
+        first, second, rest = slice(0, self.size), slice(self.size, 2 * self.size), slice(2 * self.size, None)
+        p = s[:, None, None] * self.e - self.a
+        found = p[:, second, first] + s[:, None, None] * p[:, second, second]
+        if len(self.e) > 2 * self.size:
+            kept = p[:, rest, first] + s[:, None, None] * p[:, rest, second]
+            found = found - _product(p[:, second, rest], np.linalg.solve(p[:, rest, rest], kept))
+        return np.asarray(found)
+
+    def storing(self, s: ComplexArray, whole: ComplexArray) -> ComplexArray:
+        """Part of G = `whole` at places on the imaginary axis that stores and takes energy, and gives none."""
+        own = np.diagonal(whole, axis1=1, axis2=2) / s[:, None]
+        return np.asarray((np.maximum(own.real, 0) + 1j * own.imag)[..., None] * s[:, None, None] * np.eye(self.size))
+
+
+def _steady_stresses(site: Site) -> tuple[float, float]:
+    found = site.laws.steady(site.own, site.velocity, 1.0, 0.0, 0.0, 0.0, site.stiffness)
+    if found.by_spring or found.by_friction or found.by_distance:
+        raise NotAvailable(
+            f"contacts.{site.name}: a measured response does not tell the normal force of steady sliding; give it, "
+            "steady_normal_stress of the law 'compliant', or a constant one"
+        )
+    sigma = float(found.pressed)
+    steady = site.laws.steady(site.own, site.velocity, sigma, 0.0, 0.0, 0.0, site.stiffness)
+    return sigma, float(steady.friction)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Receptance (p, d, d) over frequency (p,), deviations of its errors, and how far it is off between samples."""
+
+    omega: Array
+    receptance: ComplexArray
+    error: Array
+    between: Array
+
+    def at(self, places: Array | ComplexArray) -> _Samples:
+        """The same at other frequencies, by polynomials through the nearest samples."""
+        start = np.searchsorted(self.omega, places.real) - _NEAR // 2
+        start = np.clip(start, 0, len(self.omega) - _NEAR)
+        around = start[:, None] + np.arange(_NEAR)
+        inside = around[:, _NEAR // 2 - 1 : _NEAR // 2 + 1]
+        shares = _shares(places, self.omega[around].T).T[..., None, None]
+        return _Samples(
+            places,
+            np.sum(shares * self.receptance[around], axis=1),
+            np.sqrt(np.sum(np.abs(shares * self.error[around]) ** 2, axis=1)),
+            np.max(self.between[inside], axis=1),
+        )
+
+
+def _product(a: Any, b: Any) -> ComplexArray:
+    """Products of many small matrices; several times faster than ``@``."""
+    return np.asarray(np.einsum("pij,pjk->pik", a, b))
+
+
+def _shares(places: Any, known: Array) -> Any:
+    """Weights (k, p) of values at known places (k, p) in their polynomials at places (p,)."""
+    found = np.ones(known.shape, dtype=np.result_type(places, known))
+    for i, one in enumerate(known):
+        for j, other in enumerate(known):
+            if i != j:
+                found[i] *= (places - other) / (one - other)
+    return found
+
+
+class MeasuredMachine:
+    """A machine whose one body is a structure given by its measured response."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        body = next(iter(machine.bodies.values()))
+        if len(machine.bodies) > 1 or machine.links:
+            raise NotAvailable(
+                "a structure given by its response stands alone, with contacts to the drive or the ground: leave links "
+                "and other bodies out (measure with them in place), or describe it by matrices or modes"
+            )
+        self.response: ResponseData = body.response
+        self.matrices = assemble(machine)
+        self.contacts = ContactStiffness(self.matrices.sites)
+        self.balance = self.contacts.balance
+        rows = np.array([row for one in self.matrices.sites for row in (one.slip, one.apart)])
+        used = np.any(rows != 0, axis=0)
+        self._both = np.kron(rows[:, used], rows[:, used])  # from products of directions to those of contacts
+        self.samples = self._samples(used)
+
+    def _samples(self, used: NDArray[np.bool_]) -> _Samples:
+        """Samples from zero on: below the band the structure is a spring, off by what its first octave changes."""
+        omega, first = self.response.omega, self.response.omega[0]
+        r, error = (one[:, used][:, :, used] for one in self.response.full)
+        if np.any(lost := np.isnan(r)):
+            i, j = np.argwhere(lost)[0][1:]
+            names = [n for n, one in zip(self.response.names, used, strict=True) if one]
+            raise NotAvailable(
+                f"the response of {names[i]} to a force along {names[j]} was not measured over the whole band, nor the "
+                "reverse; the contacts need it"
+            )
+        between = np.zeros_like(error)
+        near, values, errors = (
+            np.array([one[i : len(one) - 4 + i] for i in (0, 1, 3, 4)]) for one in (omega, r, error)
+        )
+        shares = _shares(omega[2:-2], near)[..., None, None]
+        apart = np.abs(r[2:-2] - np.sum(shares * values, axis=0))
+        noise = np.sqrt(error[2:-2] ** 2 + np.sum((shares * errors) ** 2, axis=0))
+        between[2:-2] = np.maximum(apart - _SURE * noise, 0)
+        if first > 0:
+            second = min(int(np.searchsorted(omega, 2 * first)), len(r) - 1)
+            below = r[0].real + 1j * _BELOW[:, None, None] * r[0].imag
+            same = np.broadcast_to(error[0], below.shape)
+            spread = np.broadcast_to(np.abs(r[second] - r[0]), below.shape)
+            omega, r = np.concatenate([first * _BELOW, omega]), np.concatenate([below, r])
+            error, between = np.concatenate([same, error]), np.concatenate([spread, between])
+        return _Samples(omega, r, error, between)
+
+    def _seen(self, receptance: ComplexArray) -> ComplexArray:
+        """Receptance in slips and distances of the contacts, (p, 2 contacts, 2 contacts)."""
+        flat = receptance.reshape(len(receptance), -1) @ self._both.T
+        return flat.reshape(-1, self.contacts.size, self.contacts.size)
+
+    def varied(self, name: str, value: float) -> MeasuredMachine:
+        """The machine with another value (SI) of a parameter, which is not checked."""
+        return MeasuredMachine(with_values(self.machine, {name: value}))
+
+    @cached_property
+    def count(self) -> Count:
+        """Growing roots, or why they are not decided."""
+        with np.errstate(all="ignore"):
+            omega, ratio, noise, between = self._followed()
+            at = float(omega[np.argmin(np.abs(ratio))])
+            if not self.contacts.posed:
+                return Count(1, "", 0.0)
+            doubt = self._doubt_below or self._doubt(omega, ratio, noise, between) or self._doubt_beyond()
+            turns = (float(np.sum(np.angle(ratio[1:] / ratio[:-1]))) + self._turn_beyond(ratio[-1])) / np.pi
+        if doubt:
+            return Count(None, doubt, at)
+        if abs(turns - round(turns)) > _WHOLE or turns > _WHOLE:
+            doubt = (
+                f"the determinant makes {turns:+.2f} half turns round 0, which it does of no structure that is stable "
+                "with open contacts; check signs, directions and units of the response"
+            )
+            return Count(None, doubt, at)
+        return Count(-round(turns), "", at)
+
+    def _followed(self) -> tuple[Array, ComplexArray, Array, Array]:
+        """Frequencies, determinant, and how far noise and what lies between samples may move it, dense at its turns."""
+        own = self.samples
+        omega, ratio, noise, between = own.omega, *self._determinants(own)
+        for _ in range(_ROUNDS):
+            size = np.abs(ratio)
+            steep = ~(np.abs(np.angle(ratio[1:] / ratio[:-1])) <= _TURN)
+            bent = ~(np.abs(ratio[:-2] - 2 * ratio[1:-1] + ratio[2:]) <= _BENT * size[1:-1])
+            steep[1:] |= bent
+            steep[:-1] |= bent
+            at = np.flatnonzero(steep)
+            if not at.size:
+                break
+            middle = 0.5 * (omega[at] + omega[at + 1])
+            fresh = self._determinants(own.at(middle))
+            omega = np.insert(omega, at + 1, middle)
+            ratio, noise, between = (
+                np.insert(old, at + 1, new) for old, new in zip((ratio, noise, between), fresh, strict=True)
+            )
+        return omega, ratio, noise, between
+
+    def _determinants(self, at: _Samples) -> tuple[ComplexArray, Array, Array]:
+        """det(I + R G), its surely largest error by noise, and that by what lies between samples, each (p,)."""
+        g = self.contacts(1j * at.omega)
+        inner = np.eye(self.contacts.size) + _product(self._seen(at.receptance), g)
+        ratio = np.linalg.det(inner)
+        by = np.swapaxes(_product(g, np.linalg.inv(inner)), 1, 2).reshape(len(g), -1) @ self._both
+        slope = np.abs(by).reshape(at.error.shape) * np.abs(ratio)[:, None, None]
+        noise = _SURE * np.sqrt(np.sum((slope * at.error) ** 2, axis=(1, 2)))
+        return ratio, noise, np.sum(slope * at.between, axis=(1, 2))
+
+    def _doubt(self, omega: Array, ratio: ComplexArray, noise: Array, between: Array) -> str:
+        """Why turns inside the band are not known; empty if they are."""
+        far = ~(noise + between < np.abs(ratio))
+        far[1:] |= ~(np.abs(np.angle(ratio[1:] / ratio[:-1])) <= _TURN)
+        if not np.any(far):
+            return ""
+        i = int(np.argmax(far))
+        if omega[i] < self.response.omega[0]:
+            return self._begins + _LOWER
+        if noise[i] > between[i]:
+            return f"errors of the response near {_hertz(omega[i])} reach to an edge of stability"
+        return (
+            f"samples near {_hertz(omega[i])} are too far apart to follow the response between them: measure with a "
+            "finer resolution there"
+        )
+
+    @property
+    def _begins(self) -> str:
+        return f"the response begins at {_hertz(self.response.omega[0])}, "
+
+    @cached_property
+    def _doubt_below(self) -> str:
+        """Why the structure may have modes below the band; empty if it begins as that of a spring.
+
+        Of a mode below, a part in −1/ω² would be seen beside a power series in ω², that of all modes above.
+        """
+        first, own = self.response.omega[0], self.samples
+        if not first:
+            return ""
+        begin = int(np.searchsorted(own.omega, first))
+        part = slice(begin, max(int(np.searchsorted(own.omega, _FIRST * first)), begin + 4 * len(_POWERS)))
+        columns = (own.omega[part, None] / first) ** np.array(_POWERS)
+        inverse = np.linalg.pinv(columns)
+        for i in range(own.receptance.shape[1]):
+            found = inverse @ own.receptance[part, i, i].real
+            unsure = _SURE * np.sqrt(inverse[0] ** 2 @ own.error[part, i, i] ** 2)
+            if abs(found[0]) - unsure > _MASS * abs(found[1]) or not unsure < _VAGUE * found[1]:
+                return self._begins + _LOWER
+        return ""
+
+    def _doubt_beyond(self) -> str:
+        """Why turns beyond the band are not known; empty if they are."""
+        own, last = self.samples, self.samples.omega[-1]
+        top = own.omega >= last / 2
+        s, r = 1j * own.omega[top], self._seen(own.receptance[top])
+        g, one = self.contacts(s), np.eye(self.contacts.size)
+        without = np.linalg.det(one + _product(r, self.contacts.storing(s, g)))
+        pushed = float(np.max(np.abs(np.linalg.det(one + _product(r, g)) / without - 1)))
+        ends = f"the response ends at {_hertz(last)}"
+        if not pushed < _PUSHED:
+            return (
+                f"{ends}, and in its last octave friction's push by the changing normal force is still {pushed:.2g} of "
+                f"what resists it (allowed: {_PUSHED:g}), so that modes beyond may grow: measure to higher frequencies"
+            )
+        beyond = 1j * last * _BEYOND
+        rates = np.diagonal(self.contacts(beyond), axis1=1, axis2=2) / beyond[:, None]
+        if np.any(rates.real < -_ROUNDING * np.abs(rates)):
+            return f"{ends}, above which friction still feeds vibrations: measure to higher frequencies"
+        if np.any(np.abs(self._angles()) > _PASSIVE):
+            return f"{ends} amid a mode: measure to higher frequencies"
+        return ""
+
+    def _angles(self) -> Array:
+        """Angles of the eigenvalues of I + R G at the end of the band, with the storing part of G there."""
+        last = 1j * self.samples.omega[-1:]
+        stored = self.contacts.storing(last, self.contacts(last))
+        return np.asarray(np.angle(1 + np.linalg.eigvals(self._seen(self.samples.receptance[-1:]) @ stored)))
+
+    def _turn_beyond(self, last: complex) -> float:
+        """Turn (rad) of the determinant from the end of the band to infinite frequency, where it is 1."""
+        angles = float(np.sum(self._angles()))
+        return -angles - float(np.angle(last * np.exp(-1j * angles)))
+
+    def root(self) -> tuple[complex | None, float]:
+        """Growing root (1/s) next to where the determinant is nearest to 0, and by how much errors may move it.
+
+        None where none is found near enough to the axis for the response to be continued to it.
+        """
+        s = 1j * self.count.omega
+        for _ in range(_NEWTON):
+            step = _STEP * abs(s)
+            now = self.determinant(s)
+            slope = (self.determinant(s + step) - now) / step
+            s -= now / slope
+            if abs(now / slope) <= 1e-12 * abs(s):
+                break
+        at = self.samples.at(np.array([s / 1j]))
+        i = int(np.clip(np.searchsorted(self.samples.omega, s.imag), 2, len(self.samples.omega) - 2))
+        spread = float(self.samples.omega[i + 1] - self.samples.omega[i - 2])
+        if not 0 < s.real <= spread:
+            return None, math.inf
+        _, noise, between = self._determinants(replace(at, omega=at.omega.real))
+        return s, float((noise + between)[0] / abs(slope))
+
+    def determinant(self, s: complex) -> complex:
+        """det(I + R G) near the imaginary axis, R from a polynomial through the nearest samples."""
+        r = self._seen(self.samples.at(np.array([s / 1j])).receptance)
+        return complex(np.linalg.det(np.eye(self.contacts.size) + r @ self.contacts(np.array([s])))[0])
+
+
+def _hertz(omega: float) -> str:
+    return format_quantity(omega / (2 * np.pi), "Hz")
+
+
+@question
+def _machine(machine: Machine) -> MeasuredMachine:
+    return MeasuredMachine(machine)
+
+
+def measured_machine(machine: Machine) -> MeasuredMachine:
+    """The machine with its response (cached with it)."""
+    found: MeasuredMachine = _machine(machine)
+    return found

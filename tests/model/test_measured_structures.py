@@ -71,6 +71,13 @@ def test_verdict_tells_what_the_response_leaves_open(rough):
     assert any(row["parameter"].endswith("normal_stiffness") for row in data["boundaries"])
 
 
+def test_several_growing_pairs_are_counted_without_a_rate():
+    found = ss.analyze(by_response(reed_response(reed_band()[::2]), 20.0))
+    assert (found.stable, found.unstable_roots, found.growth_rate) == (False, 4, None)
+    assert found.reason.startswith("an oscillation grows")
+    assert found.to_dict()["unstable_roots"] == 4
+
+
 def test_near_an_edge_noise_leaves_the_verdict_open(rough):
     found = ss.analyze(by_response(rough, 355.0))
     assert found.stable is None

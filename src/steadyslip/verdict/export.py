@@ -94,7 +94,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),
         **as_data(found.checks),
-        **(late if found.characteristic_terms else {}),
+        **(late if found.characteristic_terms or found.unstable_roots is not None else {}),
     }
 
 

@@ -139,7 +139,7 @@ class MachineFindings(Verdict):
     characteristic_terms : tuple of (float, tuple of float)
         With a delay: delays (s) and the polynomials that stand before exp(−s delay), that without delay first.
     unstable_roots : int or None
-        With a delay: how many of the infinitely many eigenvalues grow.
+        With a delay, or a structure given by its measured response: how many eigenvalues grow.
     growth_rate, period, damping_ratio, time_to_halve, time_to_double : float or None
         As for a slider.
     on_edge : bool

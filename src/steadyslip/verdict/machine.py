@@ -260,7 +260,9 @@ def _reason(found: MachineAnalysis) -> str:
     if found.on_edge:
         return UNDAMPED + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
-        return PHRASES["oscillatory" if any(s.imag for s in found.eigenvalues[:1]) else "divergence"] + hint
+        counted = not found.eigenvalues and found.unstable_roots  # pairs, as far as they are not odd
+        swings = counted % 2 == 0 if counted else any(s.imag for s in found.eigenvalues[:1])
+        return PHRASES["oscillatory" if swings else "divergence"] + hint
     return PHRASES["dies out"] + hint
 
 

@@ -24,9 +24,10 @@ def response_numbers(found: MeasuredMachine) -> dict[str, Any]:
     root = found.root()[0] if growing == 2 else None
     if not found.contacts.posed:
         return {"stable": False} | rates_of((), math.inf)
+    counted = {"stable": growing == 0, "unstable_roots": growing}
     if root is None:
-        return {"stable": growing == 0} | rates_of((), None)
-    return {"stable": False, "eigenvalues": (root, root.conjugate())} | rates_of((root,), root.real)
+        return counted | rates_of((), None)
+    return counted | {"eigenvalues": (root, root.conjugate())} | rates_of((root,), root.real)
 
 
 def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[str, str]]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.responses import ResponseData
 from steadyslip.model.numeric.balance import Balance
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site, assemble
-from steadyslip.model.numeric.pencil import pencils
-
-ComplexArray = NDArray[np.complex128]
+from steadyslip.model.numeric.pencil import ComplexArray, pencils
+from steadyslip.model.numeric.sampled_response import Samples, polynomial_shares, product
 
 _SURE = 4.0  # deviations of complex errors: one in e^16 is larger
 _TURN = 1.2  # rad; largest change of the argument between two samples that counts as followed
@@ -37,7 +35,6 @@ _ROUNDING = 1e-9
 _PUSHED = 0.5  # share of the determinant that friction's push by the normal force may have in the highest octave
 _PASSIVE = 2.6  # rad, of π; largest angle at the end of the band that is surely no other
 _WHOLE = 0.25  # of half turns that are counted
-_NEAR = 6  # samples through which a polynomial is laid
 _NEWTON, _STEP = 30, 1e-7  # steps of Newton's method, and of its differences relative to the root: the root of rounding
 _BELOW = np.concatenate([[0.0], np.geomspace(1e-6, 0.99, 120)])  # places below the band, relative to its begin
 _FIRST = 4.0  # times its first frequency, up to which at least a response is compared with that of a spring
@@ -97,7 +94,7 @@ class ContactStiffness:
         found = p[:, second, first] + s[:, None, None] * p[:, second, second]
         if len(self.e) > 2 * self.size:
             kept = p[:, rest, first] + s[:, None, None] * p[:, rest, second]
-            found = found - _product(p[:, second, rest], np.linalg.solve(p[:, rest, rest], kept))
+            found = found - product(p[:, second, rest], np.linalg.solve(p[:, rest, rest], kept))
         return np.asarray(found)
 
     def storing(self, s: ComplexArray, whole: ComplexArray) -> ComplexArray:
@@ -116,45 +113,6 @@ def _steady_stresses(site: Site) -> tuple[float, float]:
     sigma = float(found.pressed)
     steady = site.laws.steady(site.own, site.velocity, sigma, 0.0, 0.0, 0.0, site.stiffness)
     return sigma, float(steady.friction)
-
-
-@dataclass(frozen=True)
-class _Samples:
-    """Receptance (p, d, d) over frequency (p,), deviations of its errors, and how far it is off between samples."""
-
-    omega: Array
-    receptance: ComplexArray
-    error: Array
-    between: Array
-
-    def at(self, places: Array | ComplexArray) -> _Samples:
-        """The same at other frequencies, by polynomials through the nearest samples."""
-        start = np.searchsorted(self.omega, places.real) - _NEAR // 2
-        start = np.clip(start, 0, len(self.omega) - _NEAR)
-        around = start[:, None] + np.arange(_NEAR)
-        inside = around[:, _NEAR // 2 - 1 : _NEAR // 2 + 1]
-        shares = _shares(places, self.omega[around].T).T[..., None, None]
-        return _Samples(
-            places,
-            np.sum(shares * self.receptance[around], axis=1),
-            np.sqrt(np.sum(np.abs(shares * self.error[around]) ** 2, axis=1)),
-            np.max(self.between[inside], axis=1),
-        )
-
-
-def _product(a: Any, b: Any) -> ComplexArray:
-    """Products of many small matrices; several times faster than ``@``."""
-    return np.asarray(np.einsum("pij,pjk->pik", a, b))
-
-
-def _shares(places: Any, known: Array) -> Any:
-    """Weights (k, p) of values at known places (k, p) in their polynomials at places (p,)."""
-    found = np.ones(known.shape, dtype=np.result_type(places, known))
-    for i, one in enumerate(known):
-        for j, other in enumerate(known):
-            if i != j:
-                found[i] *= (places - other) / (one - other)
-    return found
 
 
 class MeasuredMachine:
@@ -177,7 +135,7 @@ class MeasuredMachine:
         self._both = np.kron(rows[:, used], rows[:, used])  # from products of directions to those of contacts
         self.samples = self._samples(used)
 
-    def _samples(self, used: NDArray[np.bool_]) -> _Samples:
+    def _samples(self, used: NDArray[np.bool_]) -> Samples:
         """Samples from zero on: below the band the structure is a spring, off by what its first octave changes."""
         omega, first = self.response.omega, self.response.omega[0]
         r, error = (one[:, used][:, :, used] for one in self.response.full)
@@ -192,7 +150,7 @@ class MeasuredMachine:
         near, values, errors = (
             np.array([one[i : len(one) - 4 + i] for i in (0, 1, 3, 4)]) for one in (omega, r, error)
         )
-        shares = _shares(omega[2:-2], near)[..., None, None]
+        shares = polynomial_shares(omega[2:-2], near)[..., None, None]
         apart = np.abs(r[2:-2] - np.sum(shares * values, axis=0))
         noise = np.sqrt(error[2:-2] ** 2 + np.sum((shares * errors) ** 2, axis=0))
         between[2:-2] = np.maximum(apart - _SURE * noise, 0)
@@ -203,7 +161,7 @@ class MeasuredMachine:
             spread = np.broadcast_to(np.abs(r[second] - r[0]), below.shape)
             omega, r = np.concatenate([first * _BELOW, omega]), np.concatenate([below, r])
             error, between = np.concatenate([same, error]), np.concatenate([spread, between])
-        return _Samples(omega, r, error, between)
+        return Samples(omega, r, error, between)
 
     def _seen(self, receptance: ComplexArray) -> ComplexArray:
         """Receptance in slips and distances of the contacts, (p, 2 contacts, 2 contacts)."""
@@ -255,12 +213,12 @@ class MeasuredMachine:
             )
         return omega, ratio, noise, between
 
-    def _determinants(self, at: _Samples) -> tuple[ComplexArray, Array, Array]:
+    def _determinants(self, at: Samples) -> tuple[ComplexArray, Array, Array]:
         """det(I + R G), its surely largest error by noise, and that by what lies between samples, each (p,)."""
         g = self.contacts(1j * at.omega)
-        inner = np.eye(self.contacts.size) + _product(self._seen(at.receptance), g)
+        inner = np.eye(self.contacts.size) + product(self._seen(at.receptance), g)
         ratio = np.linalg.det(inner)
-        by = np.swapaxes(_product(g, np.linalg.inv(inner)), 1, 2).reshape(len(g), -1) @ self._both
+        by = np.swapaxes(product(g, np.linalg.inv(inner)), 1, 2).reshape(len(g), -1) @ self._both
         slope = np.abs(by).reshape(at.error.shape) * np.abs(ratio)[:, None, None]
         noise = _SURE * np.sqrt(np.sum((slope * at.error) ** 2, axis=(1, 2)))
         return ratio, noise, np.sum(slope * at.between, axis=(1, 2))
@@ -311,8 +269,8 @@ class MeasuredMachine:
         top = own.omega >= last / 2
         s, r = 1j * own.omega[top], self._seen(own.receptance[top])
         g, one = self.contacts(s), np.eye(self.contacts.size)
-        without = np.linalg.det(one + _product(r, self.contacts.storing(s, g)))
-        pushed = float(np.max(np.abs(np.linalg.det(one + _product(r, g)) / without - 1)))
+        without = np.linalg.det(one + product(r, self.contacts.storing(s, g)))
+        pushed = float(np.max(np.abs(np.linalg.det(one + product(r, g)) / without - 1)))
         ends = f"the response ends at {_hertz(last)}"
         if not pushed < _PUSHED:
             return (

@@ -1,0 +1,52 @@
+"""Samples of a measured receptance over frequency, and polynomials through neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.model.numeric.pencil import ComplexArray
+
+_NEAR = 6  # samples through which a polynomial is laid
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Receptance (p, d, d) over frequency (p,), deviations of its errors, and how far it is off between samples."""
+
+    omega: Array
+    receptance: ComplexArray
+    error: Array
+    between: Array
+
+    def at(self, places: Array | ComplexArray) -> Samples:
+        """The same at other frequencies, by polynomials through the nearest samples."""
+        start = np.searchsorted(self.omega, places.real) - _NEAR // 2
+        start = np.clip(start, 0, len(self.omega) - _NEAR)
+        around = start[:, None] + np.arange(_NEAR)
+        inside = around[:, _NEAR // 2 - 1 : _NEAR // 2 + 1]
+        shares = polynomial_shares(places, self.omega[around].T).T[..., None, None]
+        return Samples(
+            places,
+            np.sum(shares * self.receptance[around], axis=1),
+            np.sqrt(np.sum(np.abs(shares * self.error[around]) ** 2, axis=1)),
+            np.max(self.between[inside], axis=1),
+        )
+
+
+def polynomial_shares(places: Any, known: Array) -> Any:
+    """Weights (k, p) of values at known places (k, p) in their polynomials at places (p,)."""
+    found = np.ones(known.shape, dtype=np.result_type(places, known))
+    for i, one in enumerate(known):
+        for j, other in enumerate(known):
+            if i != j:
+                found[i] *= (places - other) / (one - other)
+    return found
+
+
+def product(a: Any, b: Any) -> ComplexArray:
+    """Products of many small matrices; several times faster than ``@``."""
+    return np.asarray(np.einsum("pij,pjk->pik", a, b))

@@ -86,7 +86,7 @@ def test_near_an_edge_noise_leaves_the_verdict_open(rough):
 
 
 @pytest.mark.parametrize(("part", "said"), [
-    (lambda omega: omega < 2 * np.pi * 1200, "the response ends at 1196 Hz"),
+    (lambda omega: omega < 2 * np.pi * 1200, "the response ends at 1196 Hz, and in its last octave friction's push"),
     (lambda omega: omega > 2 * np.pi * 500, "the response begins at 504 Hz"),
     (lambda omega: np.arange(len(omega)) % 40 == 0, "finer resolution"),
 ])  # fmt: skip
@@ -119,6 +119,23 @@ def test_a_few_random_structures():
     tally = compared(4, 5)
     assert all("wrong" not in tally[kind] for kind in ("exact", "noise", "cut", "cut, noise")), tally
     assert tally["exact"] == {"right": 4}
+
+
+def test_a_band_may_end_where_the_contact_still_resists():
+    """A mass on a spring, to 2.5 of its frequency, where friction turns the determinant by 80 degrees: a damper's turn
+    beyond the band is known. With less direct effect friction feeds there, and nothing is decided."""
+    omega = np.linspace(0, 600, 2000)
+    response = 1 / (4e4 - 0.7 * omega**2 + 3j * omega)
+    data = ResponseData(omega, response[:, None, None], np.zeros((2000, 1, 1)), ("p.x",))
+    for direct, growing in ((0.01, 0), (0.001, None)):
+        rock = ss.laws.RateState(a=direct, b=0.004, d_c=20e-6, mu_ref=0.45, v_ref=0.05)
+        surface = Surface(body="drive", against="s.p", friction=rock, contact=ss.laws.ConstantNormalStress(preload=1e4))
+        machine = Machine(
+            bodies={"s": StructureBody(response=data)}, contacts={"c": surface}, drive=Pull(velocity=0.05)
+        )
+        found = measured_machine(machine)
+        assert found.count.growing == growing, found.count
+    assert "friction still feeds vibrations" in found.count.doubt
 
 
 # --- what is not offered ----------------------------------------------------------------------------

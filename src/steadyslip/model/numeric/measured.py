@@ -25,7 +25,7 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.model.numeric.balance import Balance
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site, assemble
 from steadyslip.model.numeric.pencil import ComplexArray, pencils
-from steadyslip.model.numeric.sampled_response import Samples, polynomial_shares, product
+from steadyslip.model.numeric.sampled_response import ReceptanceSamples, polynomial_shares, product
 
 _SURE = 4.0  # deviations of complex errors: one in e^16 is larger
 _TURN = 1.2  # rad; largest change of the argument between two samples that counts as followed
@@ -118,7 +118,7 @@ def _steady_stresses(site: Site) -> tuple[float, float]:
 class MeasuredMachine:
     """A machine whose one body is a structure given by its measured response."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine: Machine, like: MeasuredMachine | None = None) -> None:
         self.machine = machine
         body = next(iter(machine.bodies.values()))
         if len(machine.bodies) > 1 or machine.links:
@@ -133,9 +133,11 @@ class MeasuredMachine:
         rows = np.array([row for one in self.matrices.sites for row in (one.slip, one.apart)])
         used = np.any(rows != 0, axis=0)
         self._both = np.kron(rows[:, used], rows[:, used])  # from products of directions to those of contacts
-        self.samples = self._samples(used)
+        same = like is not None and np.array_equal(used, like._used)
+        self._used: NDArray[np.bool_] = used
+        self.samples: ReceptanceSamples = like.samples if like is not None and same else self._samples(used)
 
-    def _samples(self, used: NDArray[np.bool_]) -> Samples:
+    def _samples(self, used: NDArray[np.bool_]) -> ReceptanceSamples:
         """Samples from zero on: below the band the structure is a spring, off by what its first octave changes."""
         omega, first = self.response.omega, self.response.omega[0]
         r, error = (one[:, used][:, :, used] for one in self.response.full)
@@ -161,7 +163,7 @@ class MeasuredMachine:
             spread = np.broadcast_to(np.abs(r[second] - r[0]), below.shape)
             omega, r = np.concatenate([first * _BELOW, omega]), np.concatenate([below, r])
             error, between = np.concatenate([same, error]), np.concatenate([spread, between])
-        return Samples(omega, r, error, between)
+        return ReceptanceSamples(omega, r, error, between)
 
     def _seen(self, receptance: ComplexArray) -> ComplexArray:
         """Receptance in slips and distances of the contacts, (p, 2 contacts, 2 contacts)."""
@@ -170,7 +172,7 @@ class MeasuredMachine:
 
     def varied(self, name: str, value: float) -> MeasuredMachine:
         """The machine with another value (SI) of a parameter, which is not checked."""
-        return MeasuredMachine(with_values(self.machine, {name: value}))
+        return MeasuredMachine(with_values(self.machine, {name: value}), self)
 
     @cached_property
     def count(self) -> Count:
@@ -213,7 +215,7 @@ class MeasuredMachine:
             )
         return omega, ratio, noise, between
 
-    def _determinants(self, at: Samples) -> tuple[ComplexArray, Array, Array]:
+    def _determinants(self, at: ReceptanceSamples) -> tuple[ComplexArray, Array, Array]:
         """det(I + R G), its surely largest error by noise, and that by what lies between samples, each (p,)."""
         g = self.contacts(1j * at.omega)
         inner = np.eye(self.contacts.size) + product(self._seen(at.receptance), g)
@@ -272,15 +274,15 @@ class MeasuredMachine:
         without = np.linalg.det(one + product(r, self.contacts.storing(s, g)))
         pushed = float(np.max(np.abs(np.linalg.det(one + product(r, g)) / without - 1)))
         ends = f"the response ends at {_hertz(last)}"
+        beyond = 1j * last * _BEYOND
+        rates = np.diagonal(self.contacts(beyond), axis1=1, axis2=2) / beyond[:, None]
+        if np.any(rates.real < -_ROUNDING * np.abs(rates)):
+            return f"{ends}, above which friction still feeds vibrations: measure to higher frequencies"
         if not pushed < _PUSHED:
             return (
                 f"{ends}, and in its last octave friction's push by the changing normal force is still {pushed:.2g} of "
                 f"what resists it (allowed: {_PUSHED:g}), so that modes beyond may grow: measure to higher frequencies"
             )
-        beyond = 1j * last * _BEYOND
-        rates = np.diagonal(self.contacts(beyond), axis1=1, axis2=2) / beyond[:, None]
-        if np.any(rates.real < -_ROUNDING * np.abs(rates)):
-            return f"{ends}, above which friction still feeds vibrations: measure to higher frequencies"
         if np.any(np.abs(self._angles()) > _PASSIVE):
             return f"{ends} amid a mode: measure to higher frequencies"
         return ""

@@ -14,7 +14,7 @@ _NEAR = 6  # samples through which a polynomial is laid
 
 
 @dataclass(frozen=True)
-class Samples:
+class ReceptanceSamples:
     """Receptance (p, d, d) over frequency (p,), deviations of its errors, and how far it is off between samples."""
 
     omega: Array
@@ -22,14 +22,14 @@ class Samples:
     error: Array
     between: Array
 
-    def at(self, places: Array | ComplexArray) -> Samples:
+    def at(self, places: Array | ComplexArray) -> ReceptanceSamples:
         """The same at other frequencies, by polynomials through the nearest samples."""
         start = np.searchsorted(self.omega, places.real) - _NEAR // 2
         start = np.clip(start, 0, len(self.omega) - _NEAR)
         around = start[:, None] + np.arange(_NEAR)
         inside = around[:, _NEAR // 2 - 1 : _NEAR // 2 + 1]
         shares = polynomial_shares(places, self.omega[around].T).T[..., None, None]
-        return Samples(
+        return ReceptanceSamples(
             places,
             np.sum(shares * self.receptance[around], axis=1),
             np.sqrt(np.sum(np.abs(shares * self.error[around]) ** 2, axis=1)),

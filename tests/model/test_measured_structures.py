@@ -168,6 +168,11 @@ def test_a_direction_that_was_not_measured_is_named(exact):
         ss.analyze(by_response(twice, 1000.0))
 
 
+def test_names_are_points_with_directions(exact):
+    with pytest.raises(ValueError, match=r"names: has 'tip'; allowed: points with directions"):
+        ResponseData(exact.omega, exact.receptance, exact.deviation, ("tip", "tip.y"))
+
+
 # --- files ------------------------------------------------------------------------------------------
 
 FILE = """

@@ -57,6 +57,8 @@ class ResponseData(Displayed):
             yield Problem("omega", f"has {len(self.omega)} frequencies; allowed: {_FEWEST} to {MOST_LINES}")
         elif not (self.omega[0] >= 0 and np.all(np.diff(self.omega) > 0) and np.isfinite(self.omega[-1])):
             yield Problem("omega", "allowed: frequencies >= 0 that rise")
+        if wrong := [name for name in self.names if not name.endswith((".x", ".y"))]:
+            yield Problem("names", f"has {wrong[0]!r}; allowed: points with directions, such as 'tip.x' and 'tip.y'")
         for name in ("receptance", "deviation"):
             if (found := getattr(self, name).shape) != shape:
                 yield Problem(name, f"has shape {found}; allowed: {shape}, frequencies and twice the names")

@@ -53,6 +53,14 @@ transmitted_back = 0.12
 control = "rotary-steady"
 velocity = "2 rad/s"
 """
+SERVOS = {
+    # F_c, F_s; of the load: F_cτ, F_sτ; of the motor's torque: b, b_s; v_s, α, F_v, inertia
+    "xl320": (6.936756e-9, 0.01628865, 0.158058, 0.2462341, 3.027099e-8, 7.425588e-9, 2.302667, 1.703662, 0.007224488,
+              0.001162383),
+    "xl330": (0.002039181, 5.468353e-9, 0.2582576, 0.1170081, 0.2300757, 5.004478e-7, 0.2225873, 2.328838, 0.01868655,
+              0.002568503),
+}  # fmt: skip
+"""Parameter sets "m5" of Duclusaud et al. (2025), as published in Rhoban/bam, to 7 digits; N m, rad, s, kg m²."""
 MEMORY = {"normal_memory": ss.laws.LinkerDieterich(alpha=0.3)}
 
 
@@ -100,6 +108,51 @@ def test_servo_friction_with_load_terms(load, speed):
     share = 0.10 if load > 0 else 0.12  # an arm that falls, load > 0, drives the motor
     stribeck = share * abs(load) * (0.2 + 0.8 * math.exp(-((speed / 9) ** 1.3)))
     assert total == pytest.approx(0.03 * (1 + 0.04 * speed) + stribeck, rel=1e-11)
+
+
+def servo_contact(name, constant, falling, stribeck, alpha, viscous, pressed):
+    """A contact of the motor whose friction is constant + falling exp(−(v/v_s)^α) + viscous v, N m or of a torque."""
+    total = constant + falling
+    return f"""
+[contacts.{name}.friction]
+law = "coulomb-stribeck"
+mu_static = 1
+mu_coulomb = {constant / total}
+v_stribeck = "{stribeck} m/s"
+stribeck_exponent = {alpha}
+viscous = "{viscous / total} s/m"
+[contacts.{name}.contact]
+{pressed.format(total)}
+[contacts.{name}]
+body = "motor"
+radius = "1 m"
+"""
+
+
+@pytest.mark.parametrize("speed", [0.05, 1.0, 6.0])
+@pytest.mark.parametrize("servo", SERVOS)
+def test_published_servos_are_rigs(servo, speed):
+    """The motor works against a load τ: it takes τ and all friction F, which also grows by b (τ + F).
+
+    So F is what it is at b = 0, with b added to the shares of τ, all over 1 - b. Published b hardly depend on speed.
+    """
+    seals, more, load, load_more, b, b_more, stribeck, alpha, viscous, inertia = SERVOS[servo]
+    bodies = JOINT.split("[contacts.seals]")[0].replace("2 kg m^2", f"{inertia} kg m^2")
+    curve, over = (stribeck, alpha), 1 - b
+    contacts = servo_contact(
+        "seals", seals / over, more / over, *curve, viscous / over, 'law = "constant"\npreload = "{} N"'
+    )
+    mesh = servo_contact(
+        "mesh", (load + b) / over, load_more / over, *curve, 0, 'law = "transmitted"\ntransmitted = {}'
+    )
+    drive = f'[drive]\ncontrol = "rotary-steady"\nvelocity = "{speed} rad/s"\n'
+    rig = ss.rig_from_text(f'{bodies}{contacts}{mesh}loaded_by = "gear"\n{drive}')
+    total = sum(one.friction_force for one in ss.steady_state(rig).contacts.values())
+    fades, torque = math.exp(-((speed / stribeck) ** alpha)), 0.6
+    own, share = seals + more * fades + viscous * speed, b + b_more * fades
+    expected = (own + (load + load_more * fades + share) * torque) / (1 - share)
+    assert total == pytest.approx(expected, rel=2e-6)
+    assert ss.analyze(rig).stable is not None
 
 
 def test_a_page_of_it_is_written(tmp_path):

@@ -87,7 +87,8 @@ def lugre_starts(speeds, until):
 
 def strokes(found, count):
     """The same of a `Hunt`."""
-    return np.array([(one.start, one.end, one.ends) for one in found.strokes if np.isfinite(one.end)][:count]).reshape(-1, 3)
+    ended = [(one.start, one.end, one.ends) for one in found.strokes if np.isfinite(one.end)]
+    return np.reshape(ended[:count], (-1, 3))
 
 
 def compared(random, count=6):
@@ -95,7 +96,8 @@ def compared(random, count=6):
     numbers = random_axis(random)
     step = 2 * numbers["rest"] / numbers["kp"]
     theirs = strokes_by_scipy(step, count, 2000.0, **numbers)
-    found = ss.hunt(axis(**numbers), ss.protocol.DisplacementStep(at=0, by=step), until=float(max(theirs[:, 1], default=100.0)) + 1e-3)
+    until = float(max(theirs[:, 1], default=100.0)) + 1e-3
+    found = ss.hunt(axis(**numbers), ss.protocol.DisplacementStep(at=0, by=step), until=until)
     ours = strokes(found, count)
     assert ours.shape == theirs.shape, (numbers, ours, theirs)
     if not len(theirs):

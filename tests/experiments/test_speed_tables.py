@@ -95,6 +95,9 @@ TEXTS = {
     "rpm": ("n [1/min],M [Nm]\n3,5\n2,4\n30,3\n", 0.1 * np.pi, 5.0, None),
     "words": ("speed [m/min],F [N],direction\n6,7,backward\n2,6,forward\n1,7.5,forward\n", -0.1, 7.0, None),
     "signs": ("speed [m/min],F [N],direction\n6,-7,-\n2,6,+\n1,7.5,+\n", -0.1, 7.0, None),
+    "slashes": ("n / min^-1;M_R / Nm\n3;5,5\n2;4\n30;3\n", 0.1 * np.pi, 5.5, None),
+    "two rows of names": ("velocity;torque\ndeg/s;Nm\n180;5,5\n2;4\n30;3\n", np.pi, 5.5, None),
+    "scatter": ("v (mm/s),F (N),σ (N),std of F (N)\n1,60,.6,.6\n2,50,.5,.5\n10,40,.4,.4\n", 0.001, 60.0, None),
     "mass": ("speed [mm/s],mu,load [kg]\n1,.2,100\n2,.18,100\n3,.17,100\n", 0.001, 0.2, 980.665),
 }
 

@@ -38,12 +38,17 @@ _WORDS = {
     "displacement": r"displacement|disp|position|pos|x|s|weg|angle|winkel|deflection|presliding|q|phi|φ",
 }
 """Words of headers by role."""
+_SPREAD = re.compile(
+    r"(?i)(?<![a-zäöü])(σ|sigma|std|stdev|sd|error|err|uncertainty|streuung|standardabweichung)(?![a-zäöü])"
+)
+"""Words of headers whose column is the scatter of another."""
 _FORWARD = r"forward|forwards|fwd|fw|vor|vorwärts|hin|positive|pos|cw|\+"
 _BACKWARD = r"backward|backwards|bwd|back|bw|reverse|rück|rückwärts|zurück|negative|neg|ccw|[-−–]"
 _CELL = re.compile(rf"(?i)(?<![^\s,;|\t\"])(?:(?P<forward>{_FORWARD})|(?P<backward>{_BACKWARD}))(?![^\s,;|\t\"])")
 _SPELLED = {
     "nm": "N m", "n·m": "N m", "n.m": "N m", "n*m": "N m", "mnm": "mN m", "nmm": "N mm", "ncm": "N cm", "knm": "kN m",
     "u/min": "rpm", "min-1": "rpm", "1/min": "rpm", "r/min": "rpm", "rev/min": "rpm", "rps": "rev/s",
+    "min^-1": "rpm", "min⁻¹": "rpm",
 }  # fmt: skip
 
 
@@ -312,6 +317,8 @@ def _asked(
 
 def _guess(head: str, own: str | None) -> str | None:
     """Role of a column by its name and unit; None if none is."""
+    if _SPREAD.search(head):
+        return None
     words = {word for word in re.split(r"[^a-zµμφωäöüß]+", head.lower()) if word}
     joined = re.sub(r"[^a-zµμφωäöüß]", "", head.lower())
     fits = list(_UNITS)

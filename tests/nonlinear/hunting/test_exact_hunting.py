@@ -128,3 +128,30 @@ def test_a_sampled_controller_is_that_of_a_simulation_by_hand(more):
     ours = 1.0 - np.array([found.error[np.argmin(np.abs(found.time - t))] for t in times])
     assert np.ptp(theirs) > 0.9
     assert ours == pytest.approx(theirs[1:], abs=1e-9)
+
+
+LIMITED = {
+    "none": {},
+    "of the force": {"force_limit": 1.8},
+    "of the integral": {"force_limit": 1.8, "integral_limit": 1.6},
+    "a dead band": {"dead_band": 0.02},
+    "a dead band of the integral": {"dead_band": 0.02, "dead_band_of": "integral"},
+}
+
+
+@pytest.mark.parametrize("more", LIMITED.values(), ids=LIMITED)
+def test_a_controller_without_samples_is_the_limit_of_short_ones(more):
+    """Places at the ends of strokes, extrapolated from two sample times: their difference is of first order."""
+    numbers = {name: more[key] for key, name in BY_HAND.items() if key in more}
+    held = axis(**THEORY, derivative="measurement", **more)
+    found = [one for one in ss.hunt(held, DisplacementStep(at=0, by=1.0), until=30.0).strokes if one.end < 29.0]
+    short, shorter = (
+        np.array([places[round((one.end + 0.2) / sample)] for one in found])
+        for sample in (4e-3, 2e-3)
+        for places in [by_hand(1.0, 30.0, **THEORY, sample=sample, on_measurement=True,
+                               of_integral="dead_band_of" in more, **numbers)]
+    )  # fmt: skip
+    assert len(found) >= 3
+    ours = np.array([1 - one.ends for one in found])
+    assert np.abs(short - ours).max() < 3e-3
+    assert 2 * shorter - short == pytest.approx(ours, abs=3e-4)

@@ -249,7 +249,26 @@ def test_only_rigs_are_judged():
 
 
 @pytest.mark.parametrize("path", ["examples/slow-axis.toml", "examples/machines/geared-servo.toml"])
-def test_an_unstable_rig_names_the_command_that_shows_what_it_does(path):
-    found = ss.analyze(ss.read_rig(path))
+def test_an_unstable_rig_says_what_it_does_instead(path):
+    """As a run from another disturbance says, which ends in the same motion."""
+    rig = ss.read_rig(path)
+    found = ss.analyze(rig)
     assert found.stable is False
-    assert "steadyslip simulate shows what it does instead" in str(found)
+    speed = rig.value("drive.velocity")
+    push = [ss.protocol.VelocityStep(at=1.0, to=1.4 * speed), ss.protocol.VelocityStep(at=3.0, to=speed)]
+    run = ss.simulate(rig, push, until=300.0)
+    assert len(run.slip_events) > 9
+    assert "judders: every" in found.judders
+    assert found.judders == run.sentence
+    assert found.to_dict()["judders"] == run.sentence
+    assert f"{run.sentence} (simulated, after a small disturbance)" in " ".join(str(found).split())
+
+
+def test_what_does_not_repeat_itself_is_left_to_the_command_that_shows_it():
+    """Slip that grows until work is used up, motion without slip events, and a stable rig."""
+    near = ss.read_rig("examples/machines/brake-pad.toml")
+    assert ss.analyze(near).judders == ""
+    assert "steadyslip simulate shows what it does instead" in str(ss.analyze(near))
+    stable = ss.analyze(ss.read_rig("examples/strengthening-gouge.toml"))
+    assert stable.judders == ""
+    assert stable.to_dict()["judders"] is None

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from steadyslip import figures
-from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.errors import NotAvailable, ParameterError, SteadyslipError
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import figure_html
@@ -19,16 +19,13 @@ from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
-from steadyslip.motion import simulate
-from steadyslip.protocol import VelocityStep
 from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.findings import Verdict
+from steadyslip.verdict.judder import STEP, motion_after
 from steadyslip.verdict.words import REMOTE
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
-_PERIODS = 12  # length of the run in periods of the leading disturbance, so that its growth is seen
-_STEP, _BEFORE = 1.1, 0.05  # factor of the step of the drive velocity, and when it comes, share of the run
 _ROWS = 4  # changes that are recommended, nearest first
 
 
@@ -126,22 +123,21 @@ def notes_of(text: str) -> dict[str, str]:
 
 
 def motion(analysis: Verdict) -> Iterator[str]:
-    """HTML of the motion after a small step of the drive velocity: time history and phase plane with the cycle."""
+    """HTML of the motion after a small disturbance: time history and phase plane with the cycle."""
     yield heading("The motion")
     rig: Any = analysis.rig
-    leading = next((s for s in analysis.eigenvalues if s.imag > 0), next(iter(analysis.eigenvalues), None))
-    if analysis.stable is None or leading is None or not abs(leading) or not math.isfinite(abs(leading)):
-        yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
-        return
-    period = 2 * math.pi / leading.imag if leading.imag else 5 / abs(leading.real)
-    until, speed = _PERIODS * period, float(rig.value("drive.velocity") or 0.0)
     try:
-        run = simulate(rig, VelocityStep(at=_BEFORE * until, to=_STEP * speed), until=until)
-    except (NotAvailable, ParameterError) as refused:
+        branch, unstable = getattr(analysis, "branch", 0), analysis.stable is False
+        run = None if analysis.stable is None else motion_after(rig, analysis.eigenvalues, branch, repeated=unstable)
+    except SteadyslipError as refused:
         yield paragraph(f"It was not simulated: {refused}.")
         return
-    yield paragraph(f"After a step of the drive velocity by {100 * (_STEP - 1):.0f} %: {run.sentence or run.message}.")
-    words = "Motion after a small step of the drive velocity, over time."
+    if run is None:
+        yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
+        return
+    faster = f"After the drive was faster by {100 * (STEP - 1):.0f} % for a while"
+    yield paragraph(f"{faster}: {run.sentence or run.message}.")
+    words = "Motion after the drive was faster for a while, over time."
     yield figure(figure_html(lambda: figures.history(run), words, 6.4), words)
     words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
     yield figure(figure_html(lambda: figures.phase_plane(run), words, 5.0), words)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings, Verdict
 
-_LAST = ("boundaries", "warnings", "checked", "checks")
+_LAST = ("judders", "boundaries", "warnings", "checked", "checks")
 
 
 def as_dict(analysis: Findings) -> dict[str, Any]:
@@ -91,6 +91,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "damping_ratio": found.damping_ratio,
         "time_to_halve": found.time_to_halve,
         "time_to_double": found.time_to_double,
+        "judders": found.judders or None,
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),
         **as_data(found.checks),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.checks import Check
 from steadyslip.core.pages import Displayed
@@ -48,6 +50,19 @@ class Verdict(Displayed):
     def boundaries(self) -> tuple[Boundary, ...]:
         """All edges of stability that were found, parameter by parameter."""
         return tuple(edge for margin in self.margins for edge in margin.edges)
+
+    @cached_property
+    def judders(self) -> str:
+        """What an unstable rig does instead, such as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
+
+        From a simulation after a small disturbance, of bounded work. Empty for a stable rig, and where slip events were
+        not found to repeat themselves.
+        """
+        from steadyslip.verdict.judder import judder_sentence
+
+        rig: Any = self.rig
+        asked = self.stable is False and not self.on_edge and self.growth_rate != math.inf
+        return judder_sentence(rig, self.eigenvalues, getattr(self, "branch", 0)) if asked else ""
 
 
 @dataclass(frozen=True, repr=False)

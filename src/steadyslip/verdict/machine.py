@@ -39,11 +39,11 @@ from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
 from steadyslip.verdict.words import (
     BEYOND,
-    JUDDERS,
     QUIET,
     beyond,
     disturbance,
     headline,
+    instead,
     margin_table,
     onset_words,
     stable_speeds,
@@ -117,7 +117,7 @@ def machine_meaning(found: MachineAnalysis) -> list[str]:
     if found.stable is None or found.on_edge:
         return []
     if not found.stable:
-        return [] if found.growth_rate == math.inf or has_structure(found.rig) else [JUDDERS]
+        return [] if found.growth_rate == math.inf or has_structure(found.rig) else [instead(found)]
     return ["Stable means: small disturbances die out. A large enough kick may still start an oscillation."]
 
 

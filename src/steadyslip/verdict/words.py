@@ -77,14 +77,19 @@ def verdict_text(analysis: Verdict, known: list[tuple[str, str]], edges: list[st
         lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
     lines += edges
     lines += ["", *textwrap.wrap(in_words(analysis.checks), 100, subsequent_indent="  ")] if analysis.checks else []
-    lines += ["", *meant] if meant else []
+    lines += ["", *(line for one in meant for line in textwrap.wrap(one, 120))] if meant else []
     for text in analysis.warnings:
         lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
 
 
 JUDDERS = "steadyslip simulate shows what it does instead: how often it slips, how far, and with what force."
-"""Line on an unstable rig whose motion mass or damping limits."""
+"""Line on an unstable rig whose motion mass or damping limits, where no slip events were found to repeat."""
+
+
+def instead(analysis: Verdict) -> str:
+    """Line on what an unstable rig does instead of sliding steadily."""
+    return f"{analysis.judders} (simulated, after a small disturbance)" if analysis.judders else JUDDERS
 
 
 def meaning(analysis: Findings) -> list[str]:
@@ -102,7 +107,7 @@ def meaning(analysis: Findings) -> list[str]:
             "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
             "steadyslip simulate shows which.",
         ]
-    return [] if analysis.growth_rate == math.inf else [JUDDERS]
+    return [] if analysis.growth_rate == math.inf else [instead(analysis)]
 
 
 def _limited(rig: Slider) -> bool:

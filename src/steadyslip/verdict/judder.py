@@ -1,0 +1,72 @@
+"""What a rig does that does not slide steadily: its motion after a small disturbance, until slip events repeat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from steadyslip.core.errors import SteadyslipError
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.motion import History, simulate
+from steadyslip.motion.events import AnySlip, ContactSlip
+from steadyslip.protocol import VelocityStep
+
+STEP = 1.1  # factor by which the drive is faster for a while: small, yet above what rounding makes of steady sliding
+PERIODS = 12  # length of the first run in periods of the leading disturbance, so that its growth is seen
+BEGIN, END = 0.05, 0.1  # shares of the first run between which the drive is faster
+LONGER = 4.0  # length of a run over that of the run before
+MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
+ALIKE = 0.01  # largest relative difference of slip, and of recurrence, of events that repeat
+
+
+def motion_after(
+    rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0, repeated: bool = False
+) -> History | None:
+    """Motion of a rig after its drive was faster by a tenth for a while; None without a rate of disturbances.
+
+    With `repeated` the run is made longer until its slip events repeat, or its steps are used up.
+
+    Raises
+    ------
+    SteadyslipError
+        If the rig cannot be simulated.
+    """
+    leading = next((s for s in eigenvalues if s.imag > 0), next(iter(eigenvalues), None))
+    if leading is None or not 0 < abs(leading) < math.inf:
+        return None
+    first = PERIODS * (2 * math.pi / leading.imag if leading.imag else 1 / abs(leading.real))
+    speed = float(rig.value("drive.velocity") or 0.0)
+    pieces = [VelocityStep(at=BEGIN * first, to=STEP * speed), VelocityStep(at=END * first, to=speed)]
+    until = first
+    run = simulate(rig, pieces, until=until, branch=branch, most_steps=MOST_STEPS)
+    while repeated and run.status == "done" and not repeats(run) and LONGER * run.steps < MOST_STEPS:
+        until *= LONGER
+        run = simulate(rig, pieces, until=until, branch=branch, most_steps=MOST_STEPS)
+    return run
+
+
+def repeats(run: History) -> bool:
+    """True if of each contact that slips the last two forward events are alike, in slip and in recurrence."""
+    names = {_contact(one) for one in run.slip_events if one.slip > 0}
+    return bool(names) and all(_alike([one for one in run.slip_events if _contact(one) == name]) for name in names)
+
+
+def _alike(events: list[AnySlip]) -> bool:
+    last = [one for one in events if one.slip > 0][-2:]
+    return len(last) == 2 and all(
+        math.isclose(getattr(last[0], what), getattr(last[1], what), rel_tol=ALIKE) for what in ("slip", "recurrence")
+    )
+
+
+def _contact(one: AnySlip) -> str:
+    return one.contact if isinstance(one, ContactSlip) else ""
+
+
+def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0) -> str:
+    """Sentence on the slip events of an unstable rig; empty where they were not found to repeat."""
+    try:
+        run = motion_after(rig, eigenvalues, branch, repeated=True)
+    except SteadyslipError:
+        return ""
+    return run.sentence if run is not None and run.status == "done" and repeats(run) else ""

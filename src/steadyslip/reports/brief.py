@@ -47,7 +47,7 @@ _BY_UNIT = {
     "Pa/m": "critical_stiffness stable_stiffness critical_axial_stiffness k B1",
     "Pa s/m": "f S",
     "kg/m^2": "m",
-    "rad/s": "angular_frequency critical_angular_frequency",
+    "rad/s": "angular_frequency critical_angular_frequency omega",
     "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r",
     "Hz": "ring_frequency",
     "m^2": "area",
@@ -55,6 +55,7 @@ _BY_UNIT = {
     "kg": "mass",
     "N s/m": "damping gyroscopic",
     "N/m": "stiffness",
+    "m/N": "receptance deviation",
 }
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
 RESULT_UNIT = frozenset("value error low high amount absolute values lowest highest".split())  # noqa: SIM905 -- a list of words
@@ -168,7 +169,7 @@ def _record_html(record: FrozenRecord) -> Iterator[str]:
     if isinstance(record, Machine):
         yield figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCH_CAPTION)
     rows = []
-    for path, one in (record.parameters() if isinstance(record, Machine) else parameters(record)).items():
+    for path, one in (record.parameters() if isinstance(record, Rig) else parameters(record)).items():
         if one.value is not None:
             values = np.asarray(one.value)
             area = record.printed_area(path) if isinstance(record, Rig) else None

@@ -19,7 +19,8 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(find_spec("distributed") is None, reason="needs distributed, which takes long to import"),
 ]
-HERE = str(Path(attack.__file__).parent)
+PACKAGE = Path(ss.__file__).parents[1]  # workers have to run the package that is tested, wherever another is installed
+PATHS = os.pathsep.join([str(Path(attack.__file__).parent), str(PACKAGE)])
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ class Cluster:
     def start(self, *arguments):
         process = subprocess.Popen(
             [sys.executable, "-m", "dask", *arguments], cwd=self.folder, start_new_session=True,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": HERE},
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": PATHS},
         )  # fmt: skip
         self.processes.append(process)
         return process

@@ -10,6 +10,7 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS
+from steadyslip.verdict.judder import motion_after
 from steadyslip.verdict.support import support_stiffness
 from steadyslip.verdict.words import facts
 
@@ -262,6 +263,39 @@ def test_an_unstable_rig_says_what_it_does_instead(path):
     assert found.judders == run.sentence
     assert found.to_dict()["judders"] == run.sentence
     assert f"{run.sentence} (simulated, after a small disturbance)" in " ".join(str(found).split())
+
+
+def near_an_edge(path, share):
+    """Verdict on a rig just beyond its lowest oscillatory edge in stiffness."""
+    rig = ss.read_rig(path)
+    name = rig.stiffness_name() or rig.gain_name()
+    edge = next(one for one in ss.boundary(rig, name) if one.kind == "oscillatory")
+    return ss.analyze(rig.with_values({name: edge.value * (share if edge.stable == "above" else 1 / share)}))
+
+
+@pytest.mark.parametrize(
+    ("path", "share"),
+    [
+        ("examples/stick-slip.toml", 0.9863),
+        ("examples/stick-slip.toml", 0.7),
+        *(
+            pytest.param(path, share, marks=pytest.mark.campaign)
+            for path in ("examples/stick-slip.toml", "examples/slow-axis.toml")
+            for share in 1 - 10 ** np.random.default_rng(6).uniform(-3.5, -0.3, 6)
+        ),
+    ],
+)
+def test_an_oscillation_that_still_grows_is_not_told_as_what_a_rig_does(path, share):
+    found = near_an_edge(path, share)
+    assert found.stable is False
+    assert found.judders or share > 0.9
+    if found.judders:
+        run = motion_after(found.rig, found.eigenvalues, repeated=True)
+        long, speed = 16 * run["t"][-1], found.rig.drive.velocity
+        push = [ss.protocol.VelocityStep(at=part * long, to=to * speed) for part, to in ((0.001, 1.2), (0.002, 1.0))]
+        now, later = run.slip_events[-1], ss.simulate(found.rig, push, until=long).slip_events[-1]
+        assert now.slip == pytest.approx(later.slip, rel=0.015)
+        assert now.recurrence == pytest.approx(later.recurrence, rel=0.015)
 
 
 def test_what_does_not_repeat_itself_is_left_to_the_command_that_shows_it():

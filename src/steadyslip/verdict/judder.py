@@ -17,7 +17,7 @@ PERIODS = 12  # length of the first run in periods of the leading disturbance, s
 BEGIN, END = 0.05, 0.1  # shares of the first run between which the drive is faster
 LONGER = 4.0  # length of a run over that of the run before
 MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
-ALIKE = 0.01  # largest relative difference of slip, and of recurrence, of events that repeat
+ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
 def motion_after(
@@ -47,16 +47,22 @@ def motion_after(
 
 
 def repeats(run: History) -> bool:
-    """True if of each contact that slips the last two forward events are alike, in slip and in recurrence."""
+    """True if of each contact that slips all forward events in the last half of the run are alike.
+
+    Two in a row are alike also while an oscillation still grows slowly; over half of the time that it took to become
+    visible it would grow by more than `ALIKE`.
+    """
+    half = 0.5 * float(run["t"][-1])
     names = {_contact(one) for one in run.slip_events if one.slip > 0}
-    return bool(names) and all(_alike([one for one in run.slip_events if _contact(one) == name]) for name in names)
+    late = [one for one in run.slip_events if one.slip > 0 and one.begin > half]
+    return bool(names) and all(_alike([one for one in late if _contact(one) == name]) for name in names)
 
 
 def _alike(events: list[AnySlip]) -> bool:
-    last = [one for one in events if one.slip > 0][-2:]
-    return len(last) == 2 and all(
-        math.isclose(getattr(last[0], what), getattr(last[1], what), rel_tol=ALIKE) for what in ("slip", "recurrence")
-    )
+    return len(events) > 1 and all(
+        math.isclose(getattr(one, what), getattr(events[-1], what), rel_tol=ALIKE)
+        for one in events for what in ("slip", "recurrence")
+    )  # fmt: skip
 
 
 def _contact(one: AnySlip) -> str:

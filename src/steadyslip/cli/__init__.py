@@ -1,5 +1,5 @@
 """The command line: thin, every command calls one public function. Nothing may know it."""
 
-from steadyslip.cli.commands import app, main
+from steadyslip.cli.program import app, main
 
 __all__ = ["app", "main"]

@@ -1,0 +1,61 @@
+"""The program: all commands in the order in which `--help` lists them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from steadyslip.cli.analysis import analyze, compare, cure
+from steadyslip.cli.answers import print_text
+from steadyslip.cli.documents import explore, report
+from steadyslip.cli.dynamics import cycles, hunt, response, simulate, threshold, verdicts
+from steadyslip.cli.ending import end, print_message
+from steadyslip.cli.fits import fit
+from steadyslip.cli.mapping import map_, sensitivity
+from steadyslip.cli.starting import examples, init, reproduce, schema
+
+COMMANDS = (
+    *(analyze, cure, compare, fit, explore, report),
+    *(simulate, cycles, threshold, response, hunt, verdicts),
+    *(map_, sensitivity, reproduce, examples, init, schema),
+)
+
+
+class _Commands(TyperGroup):
+    """Group of commands that prints a message after Ctrl-C; Typer would exit without one."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stopped:
+            raise typer.Exit(print_message(str(stopped) or "before there was an answer", 130, "stopped")) from None
+
+
+app = typer.Typer(
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Stability of frictional sliding: will it slide steadily, what would make it, how far is the edge.",
+)
+
+
+@app.callback(invoke_without_command=True)
+def _start(version: Annotated[bool, typer.Option("--version", help="print the version and stop")] = False) -> None:
+    if version:
+        from steadyslip import __version__
+
+        print_text(f"steadyslip {__version__}")
+        raise typer.Exit
+
+
+for command in COMMANDS:
+    app.command(command.__name__.rstrip("_"))(command)
+
+
+def main() -> None:
+    """Run the command line and exit; entry point of the package."""
+    end(app)

@@ -121,6 +121,18 @@ def test_asinh_exp_of_arrays_at_the_ends():
     np.testing.assert_array_equal(function.rows(np.column_stack([x, y])[:7])[:, 0], function(x, y)[0])
 
 
+@pytest.mark.parametrize("literal", [-1.0, 1e-30, 3.0])
+def test_a_branch_that_is_a_number_may_become_a_divisor(literal):
+    """Python's own floats raise where numbers of every other language become infinite."""
+    branch = sp.Piecewise((literal, U > 0), (V, True))
+    expressions = [1 / (branch - literal), 2 / (branch * branch - literal**2), W / (1 / (branch - literal))]
+    table = np.array([np.resize(one, LANES) for one in ([1.0, -1.0], [0.0, -1.0, 2.0], [3.0, -3.0, 0.0, 1.0])])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        plain, *others = by_programs(expressions, table)
+    for other in others:
+        np.testing.assert_array_equal(plain, other)
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", range(2))
 def test_random_expressions_are_those_of_numpy(seed):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import linecache
 import math
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from steadyslip.kernels.printers.text import Writer
 
 _WORDS = {"and": "and", "or": "or"}
 _numbers = itertools.count(1)
+_FLOAT = re.compile(r"-?\d+(\.\d+(e[+-]\d+)?|e[+-]\d+)|\(?-?math\.(inf|nan)\)?")  # literals of floats
 _OF_INTEGERS = {"shl": "<<", "shr": ">>"}
 
 
@@ -44,13 +46,13 @@ def text(program: Program) -> str:
 
 class _Python(Writer):
     def number(self, value: Any) -> str:
-        finite = not isinstance(value, float) or math.isfinite(value)
-        return (
-            repr(value) if finite else "math.nan" if math.isnan(value) else "math.inf" if value > 0 else "(-math.inf)"
-        )
+        if not isinstance(value, float) or math.isfinite(value):
+            return repr(value)
+        return "math.nan" if math.isnan(value) else "math.inf" if value > 0 else "(-math.inf)"
 
     def select(self, condition: str, value: str, other: str) -> str:
-        value, other = (f"float64({one})" if one == "0.0" else one for one in (value, other))  # may be a divisor
+        # Python's own floats raise where they are divided by zero, and what follows from a literal may be a divisor.
+        value, other = (f"float64({one})" if _FLOAT.fullmatch(one) else one for one in (value, other))
         return f"({value} if {condition} else {other})"
 
     def operation(self, node: Node, arguments: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, replaced
 from steadyslip.core.pages import Displayed
-from steadyslip.core.questions import Keeper
+from steadyslip.core.questions import Keeper, question
 from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import inner_symbols
 
@@ -342,8 +342,8 @@ class Model(Keeper, Displayed):
         return (*self.parameters.values(), *(contact.sigma_ss for contact in self.contacts), *carried)
 
     def function(self, expressions: Iterable[sp.Expr], *further: sp.Symbol) -> ArrayFunction:
-        """Array function of `arguments` and further symbols; `OperatingPoint.evaluate` calls it."""
-        return ArrayFunction([*self.arguments, *further], [sp.sympify(e) for e in expressions])
+        """Array function of `arguments` and further symbols, cached; `OperatingPoint.evaluate` calls it."""
+        return _function(self, tuple(sp.sympify(e) for e in expressions), further)
 
     @property
     def rate_of(self) -> dict[sp.Symbol, sp.Expr]:
@@ -415,3 +415,8 @@ class Model(Keeper, Displayed):
     def _repr_latex_(self) -> str:
         rows = [f"{sp.latex(e.lhs)} &= {sp.latex(e.rhs)}" for e in self.equations()]
         return "$$\\begin{aligned}" + r" \\ ".join(rows) + "\\end{aligned}$$"
+
+
+@question
+def _function(model: Model, expressions: tuple[sp.Expr, ...], further: tuple[sp.Symbol, ...]) -> ArrayFunction:
+    return ArrayFunction([*model.arguments, *further], expressions)

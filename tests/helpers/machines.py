@@ -6,6 +6,39 @@ import numpy as np
 
 import steadyslip as ss
 
+BLOCK = """
+[bodies.block]
+motion = "plane"
+mass = 1
+press = 10
+[links.one]
+between = ["drive", "block"]
+angle = "30 deg"
+stiffness = 3.6666666666666665
+[links.two]
+between = ["drive", "block"]
+angle = "-30 deg"
+stiffness = 1
+[contacts.belt]
+body = "block"
+[contacts.belt.friction]
+law = "coulomb"
+mu_coulomb = 0.5
+[contacts.belt.contact]
+law = "compliant"
+normal_stiffness = 1.3333333333333333
+[drive]
+control = "steady"
+velocity = 1
+"""
+ALONG = '[links.along]\nbetween = ["drive", "block"]\ndamping = {}\n'
+ACROSS = '[links.across]\nbetween = ["ground", "block"]\ndirection = "normal"\ndamping = {}\n'
+
+
+def block(*more, contact=0.0):
+    """Block of Hoffmann & Gaul (theory 13), with further tables and the damping of its contact."""
+    return ss.rig_from_text("\n".join([BLOCK, *more])).with_values({"normal_damping": contact})
+
 
 def leading(machine):
     return ss.eigenvalues(machine)[0]

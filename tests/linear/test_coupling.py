@@ -7,41 +7,11 @@ import pytest
 
 import steadyslip as ss
 from command import run
+from machines import ACROSS, ALONG, BLOCK, block
 from steadyslip.linear.coupling import is_undamped
 from steadyslip.model.point import operating_point
 
-BLOCK = """
-[bodies.block]
-motion = "plane"
-mass = 1
-press = 10
-[links.one]
-between = ["drive", "block"]
-angle = "30 deg"
-stiffness = 3.6666666666666665
-[links.two]
-between = ["drive", "block"]
-angle = "-30 deg"
-stiffness = 1
-[contacts.belt]
-body = "block"
-[contacts.belt.friction]
-law = "coulomb"
-mu_coulomb = 0.5
-[contacts.belt.contact]
-law = "compliant"
-normal_stiffness = 1.3333333333333333
-[drive]
-control = "steady"
-velocity = 1
-"""
-ALONG = '[links.along]\nbetween = ["drive", "block"]\ndamping = {}\n'
-ACROSS = '[links.across]\nbetween = ["ground", "block"]\ndirection = "normal"\ndamping = {}\n'
 EXACT = 1e-13  # a double root is told from a close pair to within rounding of the polynomial
-
-
-def block(*more, contact=0.0):
-    return ss.rig_from_text("\n".join([BLOCK, *more])).with_values({"normal_damping": contact})
 
 
 def edges(machine, name="mu_coulomb"):

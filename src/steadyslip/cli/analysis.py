@@ -1,4 +1,4 @@
-"""Commands that judge a rig: `analyze`, `cure` and `compare`."""
+"""Commands that judge a rig: `analyze`, `modes`, `cure` and `compare`."""
 
 from __future__ import annotations
 
@@ -150,3 +150,23 @@ def compare(
     check_output(output or (), (".html",))
     found = compare_files(rig, other, changes or ())
     output_result(found, output or (), as_json, partial(write_page, kind="Comparison"))
+
+
+def modes(
+    rig: RigFile,
+    changes: Changes = None,
+    mode: Annotated[
+        int | None,
+        typer.Option(help="number of the oscillation to look at closely; the one that grows fastest unless given"),
+    ] = None,
+    output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Frequencies, dampings and shapes of a machine's modes; what feeds the one that grows, and what to change."""
+    from steadyslip.files.output import check_output
+    from steadyslip.files.specifications import read_rig
+    from steadyslip.linear.mode_table import ENDINGS, modes as run, write_modes
+
+    check_output(output or (), ENDINGS)
+    found = run(read_rig(rig, changes or ()), mode)
+    output_result(found, output or (), as_json, partial(write_modes, source=rig))

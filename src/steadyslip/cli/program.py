@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from steadyslip.cli.analysis import analyze, compare, cure
+from steadyslip.cli.analysis import analyze, compare, cure, modes
 from steadyslip.cli.answers import print_text
 from steadyslip.cli.documents import explore, report
 from steadyslip.cli.dynamics import cycles, hunt, response, simulate, threshold, verdicts
@@ -17,7 +17,7 @@ from steadyslip.cli.mapping import map_, sensitivity
 from steadyslip.cli.starting import examples, init, reproduce, schema
 
 COMMANDS = (
-    *(analyze, cure, compare, fit, explore, report),
+    *(analyze, modes, cure, compare, fit, explore, report),
     *(simulate, cycles, threshold, response, hunt, verdicts),
     *(map_, sensitivity, reproduce, examples, init, schema),
 )

@@ -29,6 +29,7 @@ from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 from steadyslip.figures.style import journal, save_with_footer
 from steadyslip.figures.tolerance_bars import tolerances
+from steadyslip.linear import Modes
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
@@ -80,6 +81,7 @@ register_figures(Analysis, locus=_locus)
 register_figures(
     MachineAnalysis, verdict=machine_verdict, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane
 )
+register_figures(Modes, mode=mode_shape)
 register_figures(Machine, sketch=machine_sketch)
 register_figures(History, history=history, phase=phase_plane)
 register_figures(CycleBranch, branch=cycle_branch)

@@ -13,6 +13,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLUE, GREY, ORANGE, SKY, STABLE, VERMILION
 from steadyslip.figures.style import axes_or_new
+from steadyslip.linear import Modes
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import MachineAnalysis
@@ -142,8 +143,10 @@ def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> No
     )  # fmt: skip
 
 
-def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
-    """Plot the amplitude of every body in the leading mode, and the largest shares of its energy.
+def mode_shape(found: MachineAnalysis | Modes, ax: Axes | None = None) -> Axes:
+    """Plot the amplitude of every body in a mode, and the largest shares of its energy.
+
+    It is the leading mode of an analysis, and the chosen one of `steadyslip.modes`.
 
     Blue bars: amplitudes over the largest one, each relative to the rigid motion of the machine; bars of bodies in
     opposite phase point to the left. Orange bars: shares of energy.
@@ -187,7 +190,8 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
         if mode.eigenvalue.imag
         else "no oscillation"
     )
-    ax.set_xlabel(typeset(f"leading mode\n{does}, {kind}"), fontsize=8)
+    title = f"mode {mode.number}" if isinstance(found, Modes) and mode.number else "leading mode"
+    ax.set_xlabel(typeset(f"{title}\n{does}, {kind}"), fontsize=8)
     ax.tick_params(axis="x", labelsize=8)
     return ax
 

@@ -9,7 +9,10 @@ from steadyslip.core.errors import UndecidedWarning
 from steadyslip.linear import paper
 from steadyslip.linear.boundary import Margin, boundary, margins
 from steadyslip.linear.formula import formula
-from steadyslip.linear.modes import Mode, modes
+from steadyslip.linear.mode_changes import ModeChange
+from steadyslip.linear.mode_origin import Origin
+from steadyslip.linear.mode_table import Modes, modes
+from steadyslip.linear.modes import Mode
 from steadyslip.linear.response import Response, small_signal
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stable_values import safety_factor, stable_values
@@ -26,6 +29,9 @@ __all__ = [
     "Boundary",
     "Margin",
     "Mode",
+    "ModeChange",
+    "Modes",
+    "Origin",
     "Response",
     "UndecidedWarning",
     "boundary",

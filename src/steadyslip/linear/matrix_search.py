@@ -321,11 +321,9 @@ def _followed(here: StatePencil, there: StatePencil, near: complex, step: float)
     at = near
     e, a = here.e, here.a
     for _ in range(2):  # inverse iteration from a place that is an eigenvalue to 1e-9
-        shifted = at * e - a
-        left, _, right = np.linalg.svd(shifted * np.outer(*here.scale))
-        u, v = left[:, -1].conj() * here.scale[0], right[-1].conj() * here.scale[1]
+        u, v = here.vectors(at)
         normal = u @ e @ v
-        at = complex(at - (u @ shifted @ v) / normal)
+        at = complex(at - (u @ (at * e - a) @ v) / normal)
     slope = u @ ((there.a - a) - at * (there.e - e)) @ v / normal / step
     return at, complex(slope)
 

@@ -11,21 +11,19 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.format import format_percent, format_quantity
-from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.laws.contact import ContactInputs
 from steadyslip.linear.pencil import matrix_function
+from steadyslip.linear.roots import ComplexArray
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, ContactPort, Mechanism
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
-from steadyslip.model.numeric import by_matrices
-from steadyslip.model.numeric.machine_point import MachinePoint, machine_point
-from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.numeric.machine_point import MachinePoint
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import delays_of
-from steadyslip.model.sliding import explain_absence, steady_machine
 
 WORDS = {
     "judder": "judders|judder", "drift": "drifts|drift", "still": "hardly moves|hardly move",
@@ -49,13 +47,47 @@ class Mode(Displayed):
         Of every coordinate, as shares of the largest; a body that moves in steady sliding is measured by how far the
         rigid motion of the machine would take it, so that motors and tables compare. Behind ``.normal``: away from
         the surface.
-    energy : dict of str to float
-        Shares of the energy, kinetic and elastic, over a cycle, by dotted name of bodies and links.
+    kinetic, elastic : dict of str to float
+        Shares of the energy over a cycle, by dotted name of bodies, links and contacts; all of both make one.
+    number : int
+        Place among the oscillations by rising frequency, from 1; 0 without oscillation.
     """
 
     eigenvalue: complex
     amplitudes: Mapping[str, complex]
-    energy: Mapping[str, float]
+    kinetic: Mapping[str, float]
+    elastic: Mapping[str, float]
+    number: int = 0
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """Shares of the energy, kinetic and elastic together, by dotted name."""
+        both = dict.fromkeys((*self.kinetic, *self.elastic))
+        return {name: self.kinetic.get(name, 0.0) + self.elastic.get(name, 0.0) for name in both}
+
+    @property
+    def frequency(self) -> float:
+        """Hz; 0 without oscillation."""
+        return abs(self.eigenvalue.imag) / (2 * np.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """−Re λ/|λ|: negative if the mode grows."""
+        return -self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units."""
+        return {
+            "eigenvalue": [self.eigenvalue.real, self.eigenvalue.imag],
+            "number": self.number,
+            "frequency": self.frequency,
+            "damping_ratio": self.damping_ratio,
+            "amplitudes": {name: [one.real, one.imag] for name, one in self.amplitudes.items()},
+            "energy": self.energy,
+            "kinetic": dict(self.kinetic),
+            "elastic": dict(self.elastic),
+            "words": self.words(),
+        }
 
     def words(self) -> str:
         """The shape of the mode as a sentence."""
@@ -120,35 +152,6 @@ def _listed(names: list[str]) -> str:
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + WORDS["and"] + words[-1]
 
 
-@checked()
-def modes(rig: Machine) -> tuple[Mode, ...]:
-    """The modes of a machine, the one that grows fastest, or decays slowest, first; of a pair the one with β > 0.
-
-    Raises
-    ------
-    NoSteadySliding
-        Naming the contact that locks up or lifts off.
-
-    Examples
-    --------
-    >>> machine = ss.read_rig("examples/machines/two-guides.toml")
-    >>> print(ss.modes(machine)[0])
-    mode with eigenvalue -0.403646+0j 1/s: the carriage drifts; 100 % of the energy is in the belt
-      carriage             1 at 0 deg
-      bodies.carriage      0 % of the energy
-      links.belt           100 % of the energy
-    """
-    if by_matrices(rig):
-        steady_machine(rig)  # raises, and says which contact locks or lifts
-        own = machine_point(rig)
-        return tuple(matrix_mode(own, complex(s)) for s in own.pencil.eigenvalues if s.imag >= 0)
-    point = operating_point(rig)
-    if not point.exists:
-        raise explain_absence(rig, point)
-    found = spectrum(point)
-    return tuple(mode_of(rig, point, complex(s)) for s in found if np.isfinite(s) and s.imag >= 0)
-
-
 def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     """Mode of a machine that belongs to the eigenvalue `s` (1/s)."""
     model = point.model
@@ -171,7 +174,13 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     largest = max(scaled.values(), key=abs)
     if largest == 0:  # memory alone
         largest = 1.0
-    return Mode(s, {n: complex(a / largest) for n, a in scaled.items()}, _energies(rig, places, s))
+    amplitudes = {name: complex(one / largest) for name, one in scaled.items()}
+    return Mode(s, amplitudes, *_energies(rig, places, s), _number(s, spectrum(point)))
+
+
+def _number(s: complex, eigenvalues: ComplexArray) -> int:
+    """Place of an oscillation among all by rising frequency, from 1; 0 of an eigenvalue that does not oscillate."""
+    return int(np.sum((eigenvalues.imag > 0) & (eigenvalues.imag <= abs(s.imag))))
 
 
 def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -203,7 +212,8 @@ def matrix_mode(point: MachinePoint, s: complex) -> Mode:
                 moved = sum(float(share) * places[one] for one, share in row.items())
                 scaled[name] = moved * (drive / speed if speed else 1.0)
     largest = max(scaled.values(), key=abs, default=1.0) or 1.0
-    return Mode(s, {n: complex(a / largest) for n, a in scaled.items()}, _energies(machine, places, s))
+    amplitudes = {name: complex(one / largest) for name, one in scaled.items()}
+    return Mode(s, amplitudes, *_energies(machine, places, s), _number(s, point.pencil.eigenvalues))
 
 
 @dataclass(frozen=True)
@@ -238,20 +248,23 @@ def stores(mechanism: Mechanism) -> list[EnergyStore]:
     return found
 
 
-def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[str, float]:
-    """Shares of the energy, kinetic and elastic, averaged over a cycle, by name of body, link or contact."""
-    found: dict[str, float] = {}
+def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> tuple[dict[str, float], dict[str, float]]:
+    """Shares of the energy, averaged over a cycle, by name of body, link or contact: kinetic, and elastic."""
+    found: tuple[dict[str, float], dict[str, float]] = {}, {}
     mechanism = rig.mechanism()
     for part in mechanism.structures:
         shape = np.array([places[name] for name in part.coordinates])
-        held = [np.real(shape.conj() @ matrix @ shape) for matrix in (part.mass, part.stiffness)]
-        found[f"bodies.{part.name}"] = float(abs(s) ** 2 * held[0] + held[1])
+        for held, matrix, factor in zip(found, (part.mass, part.stiffness), (abs(s) ** 2, 1.0), strict=True):
+            held[f"bodies.{part.name}"] = factor * float(np.real(shape.conj() @ matrix @ shape))
     for one in stores(mechanism):
         stretch = sum(float(c) * places[name] for name, c in one.row.items())
-        energy = float(one.weight) * abs(s * stretch if one.kinetic else stretch) ** 2
-        found[one.name] = found.get(one.name, 0.0) + energy
-    total = sum(found.values())
-    return {name: value / total for name, value in found.items()} if total > 0 and np.isfinite(total) else {}
+        held = found[0 if one.kinetic else 1]
+        held[one.name] = held.get(one.name, 0.0) + float(one.weight) * abs(s * stretch if one.kinetic else stretch) ** 2
+    total = sum(found[0].values()) + sum(found[1].values())
+    if not (total > 0 and np.isfinite(total)):
+        return {}, {}
+    kinetic, elastic = ({name: value / total for name, value in held.items()} for held in found)
+    return kinetic, elastic
 
 
 def _stiffness_of(touch: ContactPort) -> Any:

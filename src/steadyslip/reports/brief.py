@@ -48,8 +48,8 @@ _BY_UNIT = {
     "Pa s/m": "f S",
     "kg/m^2": "m",
     "rad/s": "angular_frequency critical_angular_frequency omega",
-    "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r",
-    "Hz": "ring_frequency",
+    "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r feeds",
+    "Hz": "ring_frequency frequency",
     "m^2": "area",
     "N": "load force normal_force friction_force force_drop pull",
     "kg": "mass",
@@ -66,10 +66,10 @@ DIMENSIONLESS = frozenset(
     residuals contact closing
     seen worth errors first second first_interval total_interval total missing spacing edge correlation
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
-    sides conditions amplitudes energy speeds links steady characteristic_terms gain gains phase phases shift
+    sides conditions amplitudes speeds links steady characteristic_terms gain gains phase phases shift
     mean_friction steady_friction distortion status linear_to lost_at crossings e_folds unstable_roots
     correlations cost otherwise sure chance windows limits pair pair_cost fails
-    part""".split()  # noqa: SIM905 -- a list of words
+    part kinetic elastic slope""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _HIDDEN = frozenset(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from steadyslip.core.checks import Check
 from steadyslip.core.pages import Displayed
 from steadyslip.linear.boundary import Margin
+from steadyslip.linear.mode_origin import Origin
 from steadyslip.linear.modes import Mode
 from steadyslip.linear.search import Boundary
 from steadyslip.machine.machine import Machine
@@ -146,6 +147,8 @@ class MachineFindings(Verdict):
     steady : SteadyMachine or None
     mode : Mode or None
         How the machine moves in the mode that grows fastest, or decays slowest.
+    origin : Origin or None
+        Why that mode grows: what feeds it, and which modes couple. None if it is no oscillation that grows.
     eigenvalues : tuple of complex
         1/s, by falling real part; with a delay the rightmost.
     characteristic_polynomial, routh : tuple of float
@@ -175,5 +178,6 @@ class MachineFindings(Verdict):
     rig: Machine
     steady: SteadyMachine | None = None
     mode: Mode | None = None
+    origin: Origin | None = None
     onset: Onset | None = None
     kicks: tuple[Threshold, ...] = ()

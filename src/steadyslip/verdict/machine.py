@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.checks import UNDECIDED
+from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
@@ -18,7 +18,10 @@ from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, margins_and_missing, oscillatory_edge
 from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.matrix_route import require_matrices
+from steadyslip.linear.mode_origin import Origin
+from steadyslip.linear.mode_table import growth_origin
 from steadyslip.linear.modes import Mode, matrix_mode, mode_of
+from steadyslip.linear.pencil import GOOD
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND
@@ -92,6 +95,7 @@ def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
         pulls = [row for name in found.rig.contacts for row in _pull(found.rig, name)]
         rows = [("steady sliding", _sliding(found.steady)), *pulls, ("a disturbance", disturbance(found))]
     rows += [("the mode", found.mode.words())] if found.mode else []
+    rows += [("why it grows", found.origin.words)] if found.origin else []
     rows += response_facts(found.rig, found.margins) if has_response(found.rig) else []
     rows += stable_speeds(found)
     rows += [("onset", onset_words(found.onset))] if found.onset else []
@@ -150,18 +154,21 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
         known = numbers["growth_rate"] not in (math.inf, None)
         leading = next(iter(numbers["eigenvalues"] if known else ()), None)
         onset = None if point.model.delays or undamped else _onset(machine, distances)
+        mode = None if leading is None else mode_of(machine, point, complex(leading.real, abs(leading.imag)))
+        origin, of_origin = _origin(machine, mode)
         found = MachineAnalysis(
             rig=machine,
             reason="",
             steady=steady,
-            mode=None if leading is None else mode_of(machine, point, complex(leading.real, abs(leading.imag))),
+            mode=mode,
+            origin=origin,
             on_edge=edged,
             undamped=undamped,
             margins=distances,
             onset=onset,
             kicks=_kicks(machine, kicks),
             warnings=_warnings(machine, steady),
-            checks=(*checks, *of_edges, *(onset.checks if onset else ())),
+            checks=(*checks, *of_edges, *of_origin, *(onset.checks if onset else ())),
             version=__version__,
             **numbers,
         )
@@ -189,10 +196,12 @@ def _analyze_by_matrices(machine: Machine, kicks: Sequence[str]) -> MachineAnaly
             )
         distances, of_edges = matrix_edge_checks(point, margins(machine))
         leading = next(iter(numbers.get("eigenvalues", ())), None)
+        mode = None if leading is None else matrix_mode(point, complex(leading.real, abs(leading.imag)))
+        origin, of_origin = _origin(machine, mode)
         found = MachineAnalysis(
             rig=machine, reason="", steady=steady, on_edge=edged, margins=distances, version=__version__,
-            mode=None if leading is None else matrix_mode(point, complex(leading.real, abs(leading.imag))),
-            kicks=_kicks(machine, kicks), warnings=_warnings(machine, steady), checks=(*checks, *of_edges), **numbers,
+            mode=mode, origin=origin, kicks=_kicks(machine, kicks), warnings=_warnings(machine, steady),
+            checks=(*checks, *of_edges, *of_origin), **numbers,
         )  # fmt: skip
     return replace(found, reason=_reason(found))
 
@@ -215,6 +224,16 @@ def _analyze_response(machine: Machine, kicks: Sequence[str]) -> MachineAnalysis
         version=__version__, **response_numbers(found),
     )  # fmt: skip
     return replace(answer, reason=_reason(answer))
+
+
+def _origin(machine: Machine, mode: Mode | None) -> tuple[Origin | None, tuple[Check, ...]]:
+    """Why the leading mode grows, and its check; None where that fails, and of a mode that does not grow."""
+    found = None if mode is None else growth_origin(machine, mode)
+    if found is None or mode is None:
+        return None, ()
+    off = abs(sum(found.feeds.values()) - mode.eigenvalue.real) / abs(mode.eigenvalue)
+    checked = check("why it grows", "work of all forces added up", off, GOOD)
+    return (found if checked.passed else None), (checked,)
 
 
 def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:
@@ -312,7 +331,8 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
 def as_dict(found: MachineAnalysis) -> dict[str, Any]:
     """Verdict on a machine as JSON-ready dict, SI units with forces in N; NaN and infinite numbers become None."""
     data: dict[str, Any] = common_numbers(found) | {
-        "steady": _steady(found.steady), "mode": _mode(found.mode),
+        "steady": _steady(found.steady), "mode": found.mode and found.mode.to_dict(),
+        "why_it_grows": found.origin and found.origin.to_dict(),
         "onset": None if found.onset is None else onset_dict(found.onset),
         "kicks": [kick.to_dict() for kick in found.kicks],
     }  # fmt: skip
@@ -334,14 +354,3 @@ def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:
         "velocity": steady.velocity, "speeds": steady.speeds, "contacts": contacts, "links": steady.links,
         "units": steady.units,
     }  # fmt: skip
-
-
-def _mode(mode: Mode | None) -> dict[str, Any] | None:
-    if mode is None:
-        return None
-    return {
-        "eigenvalue": [mode.eigenvalue.real, mode.eigenvalue.imag],
-        "amplitudes": {name: [one.real, one.imag] for name, one in mode.amplitudes.items()},
-        "energy": dict(mode.energy),
-        "words": mode.words(),
-    }

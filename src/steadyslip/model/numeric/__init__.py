@@ -28,7 +28,12 @@ def by_matrices(rig: object) -> TypeGuard[Machine]:
     """True for a machine whose equations are matrices: it has a structure, or is too large to be written out."""
     if has_structure(rig):
         return True
-    return isinstance(rig, Machine) and not rig.holds and _states(rig) > _WRITTEN_OUT and not _delayed(rig)
+    return isinstance(rig, Machine) and _states(rig) > _WRITTEN_OUT and in_numbers(rig)
+
+
+def in_numbers(machine: Machine) -> bool:
+    """True for a machine whose matrices can be had: it slides, without delays and measured responses."""
+    return not (machine.holds or _delayed(machine) or has_response(machine))
 
 
 def _states(machine: Machine) -> int:

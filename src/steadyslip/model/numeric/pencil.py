@@ -107,11 +107,15 @@ class StatePencil:
             return UNDECIDED
         return int(np.sum(roots.real > 0))
 
+    def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
+        """Left and right null vectors of s E − A, (N,) each, for an eigenvalue s (1/s)."""
+        rows, columns = self.scale
+        left, _, right = np.linalg.svd(rows[:, None] * (s * self.e - self.a) * columns)
+        return left[:, -1].conj() * rows, right[-1].conj() * columns
+
     def mode(self, s: complex) -> ComplexArray:
         """Right null vector of s E − A, (N,), for an eigenvalue s (1/s)."""
-        rows, columns = self.scale
-        shifted = rows[:, None] * (s * self.e - self.a) * columns
-        return np.asarray(np.linalg.svd(shifted)[2][-1].conj() * columns)
+        return self.vectors(s)[1]
 
     def error(self, s: complex) -> float:
         """Distance (1/s) of `s` from an eigenvalue, by one step of inverse iteration on the matrices themselves.

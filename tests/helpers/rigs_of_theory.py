@@ -44,6 +44,19 @@ ONE_MEMORY = (
     ss.laws.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10, viscous=5),
 )
 
+
+def plain_guide(**changes):
+    """Axis of 240 kg on a dry guide, forces on 200 cm²: sticks and slips at .5 mm/min, and rings after each slip."""
+    friction = ss.laws.LuGre(
+        mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, bristle_stiffness=125000, viscous=1.25,
+        **{"stribeck_exponent": 0.8, "bristle_damping": 0.0} | changes,
+    )  # fmt: skip
+    return ss.Slider(
+        friction=friction, contact=ss.laws.ConstantNormalStress(preload=3200 / 0.02), stiffness=12e6 / 0.02,
+        mass=240 / 0.02, damping=5e3 / 0.02, area=0.02, drive=ss.machine.SteadyDrive(0.5e-3 / 60),
+    )  # fmt: skip
+
+
 STICKING = ss.Slider(
     friction=ss.laws.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5),
     contact=ss.laws.ConstantNormalStress(preload=1e5), stiffness=1e8, mass=100.0, drive=ss.machine.SteadyDrive(1e-3),

@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from dimensionless import A, unit_rig
-from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, plain_guide, rig
 from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
@@ -273,18 +273,6 @@ def test_steps_of_the_drive_while_a_block_sticks_are_no_extremes_of_its_velocity
         run = ss.simulate(STICKING, plan, until=0.3, rtol=1e-8)
         assert min(event.velocity for event in extremes(run, "velocity peak")) > 1e-3
         assert len(extremes(run, "velocity trough")) <= len(extremes(run, "arrest"))
-
-
-def plain_guide(**changes):
-    """Axis of 240 kg on a dry guide, forces on 200 cm²: sticks and slips at .5 mm/min, and rings after each slip."""
-    friction = ss.laws.LuGre(
-        mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, bristle_stiffness=125000, viscous=1.25,
-        **{"stribeck_exponent": 0.8, "bristle_damping": 0.0} | changes,
-    )  # fmt: skip
-    return ss.Slider(
-        friction=friction, contact=ss.laws.ConstantNormalStress(preload=3200 / 0.02), stiffness=12e6 / 0.02,
-        mass=240 / 0.02, damping=5e3 / 0.02, area=0.02, drive=ss.machine.SteadyDrive(0.5e-3 / 60),
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,8 @@ def test_a_sentence_over_two_lines_is_one_paragraph():
     )
     assert text_html(text).count("<p>") == 3
     assert "above which sliding is stable, it seems." in text_html(text)
+    long = 12 * "words "
+    assert text_html(f"  {long}\n  checked: all\n  {long}\nat the rig").count("<p>") == 4
 
 
 def test_formulas_need_no_script_and_no_entity():

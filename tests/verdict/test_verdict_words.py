@@ -8,7 +8,7 @@ import pytest
 
 import steadyslip as ss
 from dimensionless import unit_rig
-from rigs_of_theory import rate_state, rig
+from rigs_of_theory import plain_guide, rate_state, rig
 from steadyslip.core.errors import ParameterError
 from steadyslip.linear.roots import roots
 from steadyslip.linear.status import on_edge
@@ -206,12 +206,7 @@ def test_no_oscillation_is_said_to_grow_where_roots_are_real(stiffness, mass):
 
 def test_all_speeds_at_which_an_axis_is_stable_are_told():
     """Between 0.365 and 55.5 mm/min this LuGre axis judders: on both sides `boundary` agrees with the sentence."""
-    axis = ss.Slider(
-        friction=ss.laws.LuGre(mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, stribeck_exponent=0.8,
-                               viscous=1.25, bristle_stiffness=1.25e5),
-        contact=ss.laws.ConstantNormalStress(preload=1.6e5), stiffness=6e8, mass=1.2e4, damping=2.5e5,
-        drive=ss.machine.SteadyDrive(0.5e-3 / 60), area=0.02,
-    )  # fmt: skip
+    axis = plain_guide()
     low, high = (edge.value for edge in ss.boundary(axis, "drive.velocity"))
     numbers = f"below {low * 6e4:.4g} mm/min, or above {high * 6e4:.4g} mm/min"
     assert f"stable speeds {1e6 * low:.4g} um/s" not in text_of(axis)

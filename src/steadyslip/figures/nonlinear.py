@@ -33,8 +33,9 @@ LEGEND_WIDTH = 36  # characters of a line of a legend in two columns
 def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     """Plot a bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
 
-    Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin. A
-    cross marks a place from which no cycles were followed.
+    Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin.
+    Diamonds are the cycles of the rig itself, filled if they attract; a cross marks a place from which no cycles were
+    followed.
 
     Parameters
     ----------
@@ -90,6 +91,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         label = "" if i else f"ends of the branch: {branch.end}"
         style = {"markersize": 12, "markeredgewidth": 1.5, "linestyle": "none", "label": fill(label, LEGEND_WIDTH)}
         ax.plot([(value - origin) / factor], [peak / speed], "|", color=BLACK, **style)  # type: ignore[arg-type]
+    _draw_own(branch, ax, (origin, factor), speed)
     left = [end.cycle for one in (branch, branch.doubled) if one for end, _ in one.not_followed if end.cycle]
     for i, one in enumerate(left):
         x, y = (one.value - origin) / factor, one.peak_velocity / speed
@@ -128,6 +130,17 @@ def _draw_velocities(
             velocity = np.array([getattr(cycle, quantity) for cycle in stretch.cycles])
             ax.plot(x, np.where(velocity > 0, velocity, np.nan) / speed, label=name, **style)  # type: ignore[arg-type]
             name = ""
+
+
+def _draw_own(branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float) -> None:
+    """Mark peak and lowest velocity of the cycles of the rig itself; `axis` and `speed` as in `_draw_velocities`."""
+    for i, one in enumerate(branch.at_rig):
+        velocity = np.array([one.peak_velocity, one.lowest_velocity])
+        face = BLACK if one.stable else "white"
+        ax.plot(
+            2 * [(one.value - axis[0]) / axis[1]], np.where(velocity > 0, velocity, np.nan) / speed, "D", markersize=5,
+            color=BLACK, markerfacecolor=face, zorder=3, label="" if i else "the rig itself",
+        )  # fmt: skip
 
 
 def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:

@@ -58,7 +58,10 @@ def cycles_of_file(
         def progress(count: int, cycle: Cycle) -> None:
             said(f"{count} cycles, period {format_quantity(cycle.period, 's')}; Ctrl-C keeps what there is")
 
-        return cycles(rig, along, between=between, doublings=doublings, progress=progress)
+        found = cycles(rig, along, between=between, doublings=doublings, progress=progress)
+        said("the cycle at the rig itself")
+        found.at_rig  # noqa: B018  (is computed here, and then known to all that is printed and written)
+        return found
 
 
 def _nearest_oscillation(machine: Slider | Machine) -> str:

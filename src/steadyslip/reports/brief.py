@@ -116,25 +116,31 @@ def text_html(text: str) -> str:
     parts: list[str] = []
     words: list[str] = []
     rows: list[list[str]] = []
+    indent = 0
     for line in text.splitlines():
         found = re.match(r"(\S(?:.*?\S)?) {2,}(\S.*)$", line.strip())
         if rows and re.match(r" {8,}\S", line):
             rows[-1][-1] += f" {line.strip()}"
         elif found:
             rows.append([found[1], *re.split(r" {2,}", found[2])])
-        elif line.strip() and words and _is_wrapped(words[-1]) and not rows:
+        elif line.strip() and words and _is_wrapped(words[-1], line, indent) and not rows:
             words[-1] += f" {line.strip()}"
             parts[-1] = paragraph(words[-1])
         elif line.strip():
             parts += [_padded_table(rows), paragraph(line.strip())]
             words.append(line.strip())
             rows = []
+        indent = len(line) - len(line.lstrip())
     return "".join([*parts, _padded_table(rows)])
 
 
-def _is_wrapped(line: str) -> bool:
-    """True if a line looks cut at the width of a terminal, so that the next one continues its sentence."""
-    return len(line) > 60 and line[-1] not in ".:;)"
+def _is_wrapped(line: str, after: str, indent: int) -> bool:
+    """True if a line looks cut at the width of a terminal, so that the next one continues its sentence.
+
+    The next one does not if it is indented less, or begins with a few words and a colon.
+    """
+    cut = len(line) > 60 and line[-1] not in ".:;)"
+    return cut and len(after) - len(after.lstrip()) >= indent and not re.match(r" *[A-Za-z][\w ]{0,20}: ", after)
 
 
 def _padded_table(rows: list[list[str]]) -> str:

@@ -292,7 +292,9 @@ def _branch(result: CycleBranch) -> Parts:
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
     question = f"Which stick-slip cycles does this rig have as {along} varies?"
-    return Parts(f"{len(result.cycles)} cycles along {along}", sentence(first), question, body, result.rig)
+    own = result.at_rig.sentence
+    lead = sentence(first) + (f" The rig itself: {own}." if own else "")
+    return Parts(f"{len(result.cycles)} cycles along {along}", lead, question, body, result.rig)
 
 
 def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:

@@ -8,7 +8,7 @@ import pytest
 
 import steadyslip as ss
 from dimensionless import A, unit_rig
-from rigs_of_theory import CONTACTS, rate_state, rig
+from rigs_of_theory import CONTACTS, plain_guide, rate_state, rig
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.kicks.spans import constant_inputs
@@ -238,13 +238,42 @@ def test_a_run_that_leads_nowhere_does_not_change_those_after_it():
 
 def test_the_cycle_of_a_block_that_rings_after_each_slip_is_found():
     """An axis on undamped bristles returns to its place once in 4.92 s, and passes the drive's velocity 29 times."""
-    friction = ss.laws.LuGre(
-        mu_coulomb=0.11, mu_static=0.19, v_stribeck=8e-3 / 60, stribeck_exponent=0.8, viscous=1.25,
-        bristle_stiffness=125000, bristle_damping=0.0,
-    )  # fmt: skip
-    axis = ss.Slider(
-        friction=friction, contact=ss.laws.ConstantNormalStress(preload=3200 / 0.02), stiffness=12e6 / 0.02,
-        mass=240 / 0.02, damping=5e3 / 0.02, drive=ss.machine.SteadyDrive(0.5e-3 / 60),
-    )  # fmt: skip
-    found = ss.cycles(axis, between=(11e6 / 0.02, 16e6 / 0.02), doublings=0).at(axis.stiffness)
-    assert [one.period for one in found if one.stable] == pytest.approx([4.924428], rel=1e-6)
+    axis = plain_guide()
+    branch = ss.cycles(axis, between=(11e6 / 0.02, 16e6 / 0.02), doublings=0)
+    own = branch.at_rig
+    (cycle,) = (one for one in own if one.stable)
+    assert cycle.period == pytest.approx(4.924428, rel=1e-6)
+    assert all(one.passed for one in cycle.checks)  # by the motion: its multipliers lose their digits
+    assert (cycle.multiplier_error > 1e-3, cycle.returned < 1e-5) == (True, True)
+    assert own.sentence.startswith(
+        "judders: every 4.92 s it sticks, then slips 33.2 um within 50.7 ms, 394 N; rings 21"
+    )
+    assert str(branch).endswith(f"{own.sentence}\n  checked: {len(own)} cycles, stability of {len(own)} cycles")
+    plain = branch.to_dict()["at_rig"]
+    assert (plain["value"], plain["sentence"]) == (axis.stiffness, own.sentence)
+    assert [one["period"] for one in plain["cycles"]] == [one.period for one in own]
+    marks = [line for line in branch.plot().lines if line.get_marker() == "D"]
+    assert [line.get_ydata()[0] * 1e-6 for line in marks] == pytest.approx([one.peak_velocity for one in own], rel=1e-3)
+
+
+def test_cycles_of_the_rig_itself_are_each_told_once(damped):
+    """Sheets of doublings may be one; beyond the edge the motion is told; a start is one that `simulate` takes."""
+    twice = replace(damped, doubled=damped)
+    rig = damped.rig.with_values({"stiffness": 0.5 * damped.onset.value})
+    (cycle,) = replace(twice, rig=rig).at_rig
+    back = ss.simulate(rig, until=cycle.period, initial=cycle.start, rtol=1e-11)
+    assert [back[name][-1] for name in cycle.start if name != "x"] == pytest.approx(
+        [value for name, value in cycle.start.items() if name != "x"], rel=1e-6
+    )
+    beyond = replace(damped, rig=rig.with_values({"stiffness": 1.2 * damped.onset.value}))
+    assert not beyond.at_rig
+    assert "settles to steady sliding" in str(beyond)
+
+
+def test_ctrl_c_while_the_rig_itself_is_simulated_keeps_the_rest(damped, monkeypatch):
+    def stop(*_arguments, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("steadyslip.nonlinear.orbits.at_value.motion_from", stop)
+    beyond = replace(damped, rig=damped.rig.with_values({"stiffness": 1.2 * damped.onset.value}))
+    assert "motion from beside steady sliding was interrupted" in str(beyond)

@@ -282,8 +282,4 @@ def orbit(rig: Slider | Machine, cycle: Cycle, periods: float = 1.0) -> History:
     >>> round(run.end / cycle.period, 6)
     1.0
     """
-    names = dict(cycle.start)
-    model = operating_point(rig).model
-    if model.is_single and model.memory and not model.inertial:
-        names.pop("v", None)  # follows from the memory
-    return simulate(rig, until=periods * cycle.period, initial=names, rtol=1e-10)
+    return simulate(rig, until=periods * cycle.period, initial=cycle.start, rtol=1e-10)

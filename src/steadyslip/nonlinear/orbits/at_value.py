@@ -16,7 +16,7 @@ from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import motion_from
 from steadyslip.nonlinear.orbits.cycle_search import AHEAD, PATIENCE
 from steadyslip.nonlinear.orbits.flow import Flow
-from steadyslip.nonlinear.orbits.ranges import Neighbour
+from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 
 Array = np.ndarray
@@ -91,12 +91,15 @@ class CyclesAt(tuple[Cycle, ...]):
     between : tuple of Neighbour or None
         Then, the nearest places below the value and above it at which cycles of the branch or its doublings change or
         stop: they bound the window in which none of these attracts. None where there is no such place.
+    sentence : str
+        Of the rig itself (`CycleBranch.at_rig`): what the slip events of its stable cycle are; else empty.
     """
 
     multiples: tuple[int, ...]
     missed: tuple[str, ...]
     simulated: tuple[Simulation, ...]
     between: tuple[Neighbour | None, Neighbour | None]
+    sentence: str
     _window: str
 
     def __new__(
@@ -107,16 +110,32 @@ class CyclesAt(tuple[Cycle, ...]):
         """Build the tuple of cycles with the outcomes of simulations and the description of the window."""
         made = super().__new__(cls, cycles)
         made.multiples, made.missed = tuple(multiples), tuple(missed)
-        made.simulated, made.between, made._window = tuple(simulated), between, window
+        made.simulated, made.between = tuple(simulated), between
+        made._window, made.sentence = window, ""
+        return made
+
+    def telling(self, sentence: str) -> CyclesAt:
+        """The same cycles with a sentence on the slip events."""
+        made = CyclesAt(self, self.multiples, self.missed, self.simulated, self.between, self._window)
+        made.sentence = sentence
         return made
 
     def __str__(self) -> str:
-        lines = [
-            f"{'stable' if one.stable else 'unstable'} cycle of period {format_quantity(one.period, 's')}"
-            f"{f', of those of {multiple} times the period' if multiple > 1 else ''}; {in_words(one.checks)}"
-            for multiple, one in zip(self.multiples, self, strict=True)
-        ]
-        return "\n".join([*lines, *self.missed, *map(str, self.simulated), *filter(None, [self._window])]) or "no cycle"
+        rows = list(map(_row, self, self.multiples))
+        rows += [("simulated", str(one)) for one in self.simulated]
+        rows += [("", one) for one in (*self.missed, self._window, self.sentence, in_words(checks_of(self))) if one]
+        return "\n".join(f"{name:<{NAMES}}{what}" if name else what for name, what in rows)
+
+
+NAMES = 16  # width of the names of lines
+
+
+def _row(cycle: Cycle, multiple: int) -> tuple[str, str]:
+    """Name and contents of the line on a cycle."""
+    low, high = (format_quantity(v, "m/s") for v in (cycle.lowest_velocity, cycle.peak_velocity))
+    of = f", of those of {multiple} times the period" if multiple > 1 else ""
+    name = "stable cycle" if cycle.stable else "unstable cycle"
+    return name, f"period {format_quantity(cycle.period, 's')}{of}, velocity {low} to {high}"
 
 
 def simulations(
@@ -125,12 +144,16 @@ def simulations(
     """Simulate from beside unstable cycles and steady sliding until a motion reaches a stable cycle."""
     tracer, found = tracer_of(onset, steady, rtol), list[Simulation]()
     for cycle in (*beside, None):
+        start = "beside a cycle" if cycle else "beside steady sliding"
         try:
             state, start = _start(tracer, value, cycle)
             seen = motion_from(tracer.flow, state, value, PATIENCE, attracts=True)
         except (Failure, np.linalg.LinAlgError) as failure:
-            found.append(Simulation("beside a cycle" if cycle else "beside steady sliding", f"cannot begin: {failure}"))
+            found.append(Simulation(start, f"cannot begin: {failure}"))
             continue
+        except KeyboardInterrupt:
+            found.append(Simulation(start, "was interrupted"))
+            break
         multiple = np.nan if cycle is None or seen.cycle is None else seen.cycle.period / cycle.period
         times = f", {multiple:.4g} times that of the unstable cycle" if np.isfinite(multiple) else ""
         found.append(Simulation(start, seen.words + times, seen.cycle, multiple))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
@@ -13,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.areas import outside, stress_name, total, totals
 from steadyslip.core.checks import Check, as_data, in_words
-from steadyslip.core.errors import unknown_name
+from steadyslip.core.errors import SteadyslipError, unknown_name
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -21,12 +22,14 @@ from steadyslip.core.version import version
 from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.motion import simulate
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.at_value import CyclesAt, cycles_at, simulations
 from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
 from steadyslip.nonlinear.orbits.ranges import Stretch, checks_of, neighbours, stretches_of
 
 Array = np.ndarray
+PERIODS = 4  # a recurrence is known from the third slip event on, which begins two periods after the start
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +136,7 @@ class CycleBranch(Displayed):
         levels = list[CycleBranch]()
         while branch is not None:
             here, gaps = cycles_at(self.onset, self.steady, self.rtol, value, branch._continuous())
+            here = [one for one in here if not any(map(one.is_like, found))]  # sheets of doublings can be one
             found, multiples = found + here, multiples + len(here) * [2 ** len(levels)]
             missed += [f"a cycle {self._between(*ends)} could not be computed" for ends in gaps]
             levels.append(branch)
@@ -146,6 +150,23 @@ class CycleBranch(Displayed):
         window = "none of the cycles that were followed attracts" + {0: "", 1: " beyond ", 2: " between "}[len(places)]
         window += " and ".join(places)
         return CyclesAt([*found, *also], [*multiples, *(0 for _ in also)], missed, seen, beside, window)
+
+    @cached_property
+    def at_rig(self) -> CyclesAt:
+        """The cycles at the rig's own value of the parameter, as of `at`, computed once.
+
+        Its ``sentence`` tells the slip events of the last stable cycle, from a run of `PERIODS` of its periods.
+        """
+        found = self.at(float(self.rig.value(self.along) or 0.0))
+        stable = [one for one in found if one.stable]
+        return found.telling(self._sentence(stable[-1])) if stable else found
+
+    def _sentence(self, cycle: Cycle) -> str:
+        """Sentence on the slip events of a cycle of the rig itself; empty if there are none."""
+        with suppress(SteadyslipError):
+            until = PERIODS * cycle.period
+            return simulate(self.rig, until=until, initial=cycle.start, branch=self.steady).sentence
+        return ""
 
     def _between(self, low: Cycle, high: Cycle) -> str:
         """Describe two neighbours between which a cycle lies, for a message."""
@@ -209,25 +230,34 @@ class CycleBranch(Displayed):
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-ready dict, SI units, as ``steadyslip cycles --json`` prints it."""
 
-        area, names = self._area("value"), quantities(self.rig)
+        at = self.at_rig
+        own = [self._cycle_as_dict(one) | {"multiple": n} for one, n in zip(at, at.multiples, strict=True)]
+        said = {"missed": list(at.missed), "simulated": list(map(str, at.simulated)), "sentence": at.sentence}
+        return self._as_dict() | {"at_rig": {"value": self.rig.value(self.along), "cycles": own, **said}}
+
+    def _cycle_as_dict(self, cycle: Cycle) -> dict[str, Any]:
+        """A cycle as JSON-ready dict, SI units."""
+        names = quantities(self.rig)
         units = {"value": self.unit} | {name: unit for name, (_, unit) in names.items()}
+        found: dict[str, Any] = {"value": cycle.value}
+        found |= {name: getattr(cycle, own) for name, (own, _) in names.items()}
+        if forces := totals(found, units, self._area("value")):
+            found["forces"] = forces
+        found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
+        found |= {"stable": cycle.stable, "start": cycle.start}
+        found |= {"closing": cycle.closing, "multiplier_error": cycle.multiplier_error}
+        if cycle.contacts:
+            found |= {"contact": cycle.contact, "contacts": {n: _plain(one) for n, one in cycle.contacts.items()}}
+        return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
 
-        def plain(cycle: Cycle) -> dict[str, Any]:
-            found: dict[str, Any] = {"value": cycle.value}
-            found |= {name: getattr(cycle, own) for name, (own, _) in names.items()}
-            if forces := totals(found, units, area):
-                found["forces"] = forces
-            found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
-            found |= {"stable": cycle.stable, "start": cycle.start}
-            found |= {"closing": cycle.closing, "multiplier_error": cycle.multiplier_error}
-            if cycle.contacts:
-                found |= {"contact": cycle.contact, "contacts": {n: _plain(one) for n, one in cycle.contacts.items()}}
-            return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
-
+    def _as_dict(self) -> dict[str, Any]:
+        """The branch and those of twice the period as JSON-ready dict, SI units, without the cycles at the rig."""
+        plain = self._cycle_as_dict
         return {
             "parameter": self.along,
             "unit": self.unit,
-            "onset": {"kind": self.onset.kind, "value": self.onset.value} | total(self.onset.value, self.unit, area),
+            "onset": {"kind": self.onset.kind, "value": self.onset.value}
+            | total(self.onset.value, self.unit, self._area("value")),
             "end": self.end,
             **({"contact": self.contact} if self.contact else {}),
             "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
@@ -243,7 +273,7 @@ class CycleBranch(Displayed):
                 {"kind": s.kind, "bracket": list(s.bracket), "precision": s.precision} | plain(s.cycle)
                 for s in self.special
             ],
-            "doubled": None if self.doubled is None else self.doubled.to_dict(),
+            "doubled": None if self.doubled is None else self.doubled._as_dict(),
         }
 
     def plot(self, kind: str = "branch", ax: Any = None) -> Any:
@@ -261,6 +291,12 @@ class CycleBranch(Displayed):
         return self.end.startswith("interrupted")
 
     def __str__(self) -> str:
+        rig = format_quantity(self.rig.value(self.along) or 0.0, self.unit, area=self._area("value"))
+        lines = [*self._lines(), f"at the rig itself, {rig}:", *("  " + line for line in str(self.at_rig).splitlines())]
+        return "\n".join(lines)
+
+    def _lines(self) -> list[str]:
+        """Summary of the branch and of those of twice the period."""
         area = self._area("value")
         edge = format_quantity(self.onset.value, self.unit, 6, area)
         drops, drop_unit = ("stress_drop", "Pa") if isinstance(self.rig, Slider) else ("force_drop", "N")
@@ -294,8 +330,8 @@ class CycleBranch(Displayed):
             lines.append(f"  not followed from the {at[0].kind}{'s' if len(at) > 1 else ''} at {places}: {why}")
         lines += [f"  {in_words(self.checks)}"]
         if self.doubled is not None:
-            lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]
-        return "\n".join(lines)
+            lines += ["twice the period:", *("  " + line for line in self.doubled._lines())]
+        return lines
 
 
 def _plain(one: CycleRange) -> dict[str, float | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -28,6 +29,10 @@ def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
 
 OPEN = 1e-4  # largest allowed closing error, as a share of the cycle's size; Newton's method leaves an order less
 IMPRECISE = 1e-3  # error of the trivial multiplier beyond which a cycle is rejected
+RETURNED = (
+    1e-5  # distance between returns of a motion, period after period, within which it shows that a cycle attracts
+)
+ALIKE = 1e-6  # relative difference within which cycles at one value of the parameter are one; Newton leaves less
 UNCERTAIN = 3.0  # assumed ratio of the errors of other multipliers to that of the trivial one
 
 
@@ -80,7 +85,7 @@ class Cycle(Displayed):
     stable : bool
         Whether the cycle attracts: all multipliers inside the unit circle.
     start : dict of str to float
-        State where the block, speeding up, is as fast as the load point: x, v and memory, SI units, for
+        State where the block, speeding up, is as fast as the load point: x, memory and, with mass, v, SI units, for
         ``simulate(rig, initial=...)``. Of a machine: where `contact` slips as fast as in steady sliding.
     speed : float
         Slip rate in steady sliding, m/s.
@@ -91,6 +96,9 @@ class Cycle(Displayed):
     closing : float
         Distance of the end of one period from its start, by an integration of the motion alone, as a share of the
         cycle's size: logarithms of large states, shares of natural sizes of small ones.
+    returned : float
+        Largest distance between returns of the simulated motion that led to the cycle, a period apart, over at least
+        two periods, in the same measure; NaN if none did.
     """
 
     value: float
@@ -109,6 +117,7 @@ class Cycle(Displayed):
     contact: str = ""
     contacts: Mapping[str, CycleRange] = field(default_factory=dict)
     closing: float = 0.0
+    returned: float = math.nan
     _orbit: Orbit | None = field(default=None, repr=False)
 
     @property
@@ -125,10 +134,17 @@ class Cycle(Displayed):
     def checks(self) -> tuple[Check, ...]:
         """Two checks: the motion closes after a period; the largest multiplier is farther from 1 than its error."""
         room = abs(self.growth - 1) / (UNCERTAIN * self.growth) if self.growth else IMPRECISE
-        return (
-            check("the cycle", "closing by an integration of the motion alone", self.closing, OPEN),
-            check("its stability", "the multiplier along the motion is 1", self.multiplier_error, min(IMPRECISE, room)),
+        stability = check(
+            "its stability", "the multiplier along the motion is 1", self.multiplier_error, min(IMPRECISE, room)
         )
+        if self.stable and not stability.passed and math.isfinite(self.returned):
+            stability = check("its stability", "the motion that led to it came back", self.returned, RETURNED)
+        return check("the cycle", "closing by an integration of the motion alone", self.closing, OPEN), stability
+
+    def is_like(self, other: Cycle) -> bool:
+        """True if period and extreme velocities agree with those of another cycle within `ALIKE`."""
+        mine, its = ((one.period, one.peak_velocity, one.lowest_velocity) for one in (self, other))
+        return all(math.isclose(a, b, rel_tol=ALIKE) for a, b in zip(mine, its, strict=True))
 
     @property
     def slip(self) -> float:

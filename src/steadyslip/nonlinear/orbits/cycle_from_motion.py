@@ -8,7 +8,7 @@ earlier.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import NUMBER, Recorded, Sampled
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.motion.engine import Outcome
 from steadyslip.nonlinear.continuation import Failure
-from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle, CycleRange
+from steadyslip.nonlinear.orbits.cycle import IMPRECISE, RETURNED, Cycle, CycleRange
 from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowRunner, FlowSetting, passages, states_between
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
@@ -44,9 +44,13 @@ def _range(velocity: Array, normal: Array, pull: Array) -> CycleRange:
 
 
 def _start(flow: FlowRunner, seen: dict[str, Array]) -> dict[str, float]:
-    """Initial values, by variable name (SI units), with which a simulation starts on the cycle."""
-    variables = [item.name for item in flow.reduction.model.variables]
-    return {name: float(seen[name][0]) for name in (*variables, *(["v"] if "v" in seen else []))}
+    """Initial values, by variable name (SI units), with which a simulation starts on the cycle.
+
+    The velocity of a slider without mass follows from its memory.
+    """
+    model = flow.reduction.model
+    names = [item.name for item in model.variables] + (["v"] if model.is_single and model.inertial else [])
+    return {name: float(seen[name][0]) for name in names}
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +220,7 @@ def motion_from(
                 if found is not None and (found.stable or not attracts):
                     return Simulated(found, f"comes to a cycle of period {format_quantity(found.period, 's')}")
     except FlowFailure as failure:
-        return Simulated(None, f"ends: {failure}")
+        return Simulated(None, f"ends: {failure.place}")
     if not returns:
         return Simulated(None, "does not come back to the velocity at which cycles begin")
     between = f"velocity between {format_quantity(low, 'm/s')} and {format_quantity(high, 'm/s')}"
@@ -335,17 +339,17 @@ def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle 
         seen_once = cycle_data(shooting, point.u)
     except (Failure, np.linalg.LinAlgError):
         return None
-    cycle = seen_once.cycle
+    cycle = replace(seen_once.cycle, returned=_returned(runs, seen, back))
     shrunk = cycle.amplitude < 0.5 * seen.amplitude
-    sure = abs(cycle.trivial - 1) <= IMPRECISE or _closes(runs, seen, back)
+    sure = abs(cycle.trivial - 1) <= IMPRECISE or cycle.returned <= RETURNED
     return cycle if sure and not shrunk and seen_once.turns == 1 else None
 
 
-def _closes(runs: FlowRunner, seen: _Stretch, back: int) -> bool:
-    """True if the motion itself came back each time, several times over, whatever the precision of the multipliers.
+def _returned(runs: FlowRunner, seen: _Stretch, back: int) -> float:
+    """Largest distance between returns of the motion a period apart, over at least two periods; NaN if it had fewer.
 
     Where a bristle rings between long rests, deviations grow and shrink by many decades within a period, and the
     multipliers lose their digits; the motion does not.
     """
     places = np.arcsinh(seen.states / runs.scales)
-    return len(places) > 2 * back and bool(np.abs(places[back:] - places[:-back]).max() < SMALLEST)
+    return float(np.abs(places[back:] - places[:-back]).max()) if len(places) > 2 * back else np.nan

@@ -54,8 +54,13 @@ class FlowFailure(Failure):
     """
 
     def __init__(self, status: str, contact: str = "") -> None:
-        super().__init__(f"a run ended with: {status}" + (f" at {contact}" if contact else ""))
         self.status, self.contact = status, contact
+        super().__init__(f"a run ended with: {self.place}")
+
+    @property
+    def place(self) -> str:
+        """The reason, of a machine with the contact concerned."""
+        return f"{self.status} at {self.contact}" if self.contact else self.status
 
 
 @question

@@ -104,8 +104,8 @@ def neighbours(levels: Sequence[Changing], value: float) -> tuple[Neighbour | No
     return below, above
 
 
-def checks_of(cycles: Sequence[Cycle], repeated: int) -> tuple[Check, ...]:
-    """Checks over all cycles of a branch, with the number that fail."""
+def checks_of(cycles: Sequence[Cycle], repeated: int = 0) -> tuple[Check, ...]:
+    """Checks over several cycles, with the number that fail; `repeated` were computed again."""
     kinds = (
         ("", 0, is_open, cycles),
         ("stability of ", 1, is_undecided, [one for one in cycles if not _is_small(one)]),
@@ -120,7 +120,7 @@ def checks_of(cycles: Sequence[Cycle], repeated: int) -> tuple[Check, ...]:
         failing, how = sum(map(fails, asked)), worst.how
         how += f"; {repeated} computed again with smaller errors per step" if repeated else ""
         many = f"{failing} of {len(cycles)}" if failing else f"{len(asked)}"
-        found.append(replace(worst, what=f"{what}{many} cycles", how=how))
+        found.append(replace(worst, what=f"{what}{many} cycle{'' if many == '1' else 's'}", how=how))
     return tuple(found)
 
 

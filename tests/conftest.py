@@ -9,7 +9,8 @@ Fresh random examples on a developer's machine, fewer and the same ones every ti
 ``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.
 
 Tests marked ``campaign`` do a fixed part of what scripts do by the thousand: random rigs and files against a second
-route, killed processes, repeated fits. A run of the whole leaves them out, ``-m campaign`` runs them; CI does both.
+route, killed processes, repeated fits, pages of many fits. A run of the whole leaves them out,
+``-m campaign`` runs them; CI does both.
 """
 
 import gc
@@ -26,6 +27,10 @@ if os.environ.get("CI"):
     settings.load_profile("ci")
 
 SLOW = Path(__file__).with_name("slow.txt")
+CAMPAIGN_PAGES = tuple(
+    f"docs/{name}.md::" for name in ("how-to/fit-normal-stress-steps", "how-to/fit-a-record", "explanation/slow-slip")
+)
+"""Pages of many fits or many branches of cycles, 6 to 18 CPU seconds each."""
 QUICK = 0.3  # CPU seconds that a test, with all of its parameters, may take before the rest of them is slow
 
 
@@ -37,6 +42,8 @@ def pytest_collection_modifyitems(items):
     listed = (line.rsplit(" ", 1) for line in SLOW.read_text(encoding="utf-8").splitlines())
     left = {test: int(quick) for test, quick in listed}
     for item in items:
+        if item.nodeid.startswith(CAMPAIGN_PAGES):
+            item.add_marker(pytest.mark.campaign)
         if item.get_closest_marker("campaign") or "browser" in item.fixturenames:
             item.add_marker(pytest.mark.slow)  # a browser works in processes of its own, whose seconds are not measured
         test = item.nodeid.partition("[")[0]

@@ -108,6 +108,7 @@ def test_a_file_that_says_nothing_finds_the_drainage(tmp_path):
     np.testing.assert_array_equal(again.comparison.model(again.coordinates[None])[0][0], fit.model)
 
 
+@pytest.mark.campaign
 def test_pores_are_asked_for_where_the_contact_has_none():
     fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), record(), starts=9)
     assert "has no pores; where drainage takes time, fit its rate" in " ".join(str(fit).split())

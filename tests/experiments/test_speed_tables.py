@@ -51,6 +51,7 @@ def within_bounds(hits, count):
 
 
 @pytest.mark.parametrize("errors", ["relative", "absolute"])
+@pytest.mark.campaign
 def test_intervals_cover(errors):
     assert within_bounds(hits := covered(30, 5, errors), 30), hits
 

@@ -70,6 +70,7 @@ def test_a_file_that_says_nothing_of_it_has_the_memories_compared():
     assert "'slip, linker-dieterich' it is" in str(found)
 
 
+@pytest.mark.campaign
 def test_a_file_that_says_nothing_has_the_evolution_compared_too():
     """With the slip law alone this record is said to have the other memory."""
     record = lab.record(lab.rig(ss.laws.Aging(), alpha=ALPHA), PRESSED, 1, count=300)

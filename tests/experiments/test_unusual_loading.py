@@ -45,6 +45,7 @@ def test_a_servo_does_not_look_like_the_fault():
         assert spring(servo_record(seed, 0.75, 0.35)[0]) is None
 
 
+@pytest.mark.campaign
 def test_a_fit_says_that_it_cannot_show_a_servo():
     told = {across: str(ss.fit(ss.lab_rig(), measured(1e11, 2e-8, across))) for across in (True, False)}
     assert "cannot show how a servo follows" in " ".join(told[True].split())
@@ -67,6 +68,7 @@ def test_a_column_of_slip_is_noted(tmp_path):
     assert not any("across the fault" in note for note in record.notes)
 
 
+@pytest.mark.campaign
 def test_changes_that_are_waviness_of_the_sensor_are_named_as_perhaps_none():
     found = measured(2e10, 2e-8, False)
     slightly, wavy = (

@@ -189,8 +189,15 @@ def unpainted_files(monkeypatch):
     monkeypatch.setattr(Figure, "savefig", savefig)
 
 
+FITTED = ROOT / "docs/how-to/fit-a-record.md"  # `tests/cli` runs this fit in every run of the whole
+
+
 @pytest.mark.usefixtures("unpainted_files")
-@pytest.mark.parametrize("page", SHOWN_PAGES, ids=names)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=pytest.mark.campaign) if page == FITTED else page for page in SHOWN_PAGES],
+    ids=names,
+)
 def test_commands_print_what_the_page_shows(page, tmp_path):
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     status = 0

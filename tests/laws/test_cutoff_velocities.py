@@ -233,6 +233,7 @@ def test_pages_from_creep_to_slip_are_those_of_python(mass):
 
 
 @pytest.mark.parametrize("faster", [1.0, 1e-9, 1e3])
+@pytest.mark.campaign
 def test_a_fit_tells_both_cutoffs(faster):
     """Steps over 3000-fold rates: where both effects fade, the record says at which velocities; of creep, slip too."""
     cutoffs = {"a_cutoff_velocity": 1e-3 * faster, "b_cutoff_velocity": 2e-4 * faster}

@@ -110,6 +110,7 @@ def test_killed_workers_scheduler_and_driver(tmp_path, cluster, undisturbed):
     assert sum(counts.values()) - len(counts) <= 4 * 2 * attack.CHUNK
 
 
+@pytest.mark.campaign
 def test_a_local_cluster_gives_the_same_store(tmp_path, undisturbed):
     log = tmp_path / "log"
     found = ss.run_map(attack.plan(log, 0.0), tmp_path / "map.zarr", cluster="local", workers=2)

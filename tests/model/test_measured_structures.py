@@ -60,6 +60,7 @@ def test_with_noise_edges_and_root_lie_within_told_errors(rough):
     assert abs(root - (12.4673358145 + 4565.039870161j)) < error < 25
 
 
+@pytest.mark.campaign
 def test_verdict_tells_what_the_response_leaves_open(rough):
     found = ss.analyze(by_response(rough))
     assert found.stable is False
@@ -71,6 +72,7 @@ def test_verdict_tells_what_the_response_leaves_open(rough):
     assert any(row["parameter"].endswith("normal_stiffness") for row in data["boundaries"])
 
 
+@pytest.mark.campaign
 def test_several_growing_pairs_are_counted_without_a_rate():
     found = ss.analyze(by_response(reed_response(reed_band()[::2]), 20.0))
     assert (found.stable, found.unstable_roots, found.growth_rate) == (False, 4, None)

@@ -25,6 +25,7 @@ def test_the_cycle_of_theory_14():
     assert found.sentence == "HUNTS ±65.65 mm about the target every 24.01 s"
 
 
+@pytest.mark.campaign
 def test_the_bristle_cycle_of_theory_14():
     """To the digits printed. A stroke starts where the speed passes v_stribeck, 1 mm/s; theory's first gap, 5 mm/s.
 

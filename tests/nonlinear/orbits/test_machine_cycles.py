@@ -164,6 +164,7 @@ def test_small_cycles_are_found_beside_forces_that_are_far_larger_than_theirs():
         assert one.amplitude == pytest.approx(float(found.onset.velocity_amplitude(one.value)), rel=0.15)
 
 
+@pytest.mark.campaign
 def test_a_frame_that_rings_ten_thousand_times_a_cycle_does_not_lead_its_steps():
     """The side blocks' frames have no dashpots, and hardly move in the cycle; its equations would ring with them."""
     example = ss.read_rig(EXAMPLES / "two-surfaces.toml")

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -62,7 +63,8 @@ def test_cycles_follow_the_drive_or_link_nearest_to_an_edge(monkeypatch, tmp_pat
     path = tmp_path / "axis.toml"
     path.write_text(ss.rig_to_text(two_mass(kp=4.0)), encoding="utf-8")
     asked = []
-    monkeypatch.setattr(commands, "cycles", lambda rig, along, **_: asked.append(along))
+    branch = SimpleNamespace(at_rig=())
+    monkeypatch.setattr(commands, "cycles", lambda rig, along, **_: asked.append(along) or branch)
     commands.cycles_of_file(path, (), None, None, 1)
     commands.cycles_of_file(path, (), "drive.kd", None, 1)
     commands.cycles_of_file("examples/stick-slip.toml", (), None, None, 1)

@@ -26,7 +26,7 @@ from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.numeric import by_matrices, in_numbers
-from steadyslip.model.numeric.machine_point import machine_point
+from steadyslip.model.numeric.machine_point import MachinePoint, machine_point
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence, steady_machine
 
@@ -202,14 +202,22 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     if chosen is None:
         count = sum(one.number > 0 for one in found)
         raise ParameterError([Problem("number", f"got {number}; allowed: 1 to {count}, the oscillations by frequency")])
-    changes = changes_of(machine_point(rig), chosen.eigenvalue) if in_numbers(rig) else ()
+    numeric = _numeric_point(rig)
+    changes = () if numeric is None else changes_of(numeric, chosen.eigenvalue)
     return Modes(rig, found, chosen, growth_origin(rig, chosen), changes)
 
 
 def growth_origin(rig: Machine, mode: Mode) -> Origin | None:
-    """Why a mode grows; None if it does not oscillate or grow, or of a machine with a delay."""
+    """Why a mode grows; None if it does not oscillate or grow, with a delay, and where numbers find no steady state."""
     grows = mode.number and mode.eigenvalue.real > ON_THE_EDGE * abs(mode.eigenvalue)
-    return origin_of(machine_point(rig), mode.eigenvalue, mode.number) if grows and in_numbers(rig) else None
+    point = _numeric_point(rig) if grows else None
+    return None if point is None else origin_of(point, mode.eigenvalue, mode.number)
+
+
+def _numeric_point(rig: Machine) -> MachinePoint | None:
+    """Steady sliding in numbers; None with a delay, and where Newton's method does not find it (very stiff links)."""
+    point = machine_point(rig) if in_numbers(rig) else None
+    return point if point is not None and not point.balance.problem and point.balance.exists else None
 
 
 def write_modes(found: Modes, path: Path, source: Path | None = None) -> None:

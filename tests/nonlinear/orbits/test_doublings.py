@@ -93,7 +93,9 @@ def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling
     seen = doubling.at(value)
     (once, twice), multiples = seen, seen.multiples
     assert multiples == (1, 2)
-    assert ", of those of 2 times the period; checked: " in str(seen).splitlines()[1]
+    _, second, *_, last = str(seen).splitlines()
+    assert ", of those of 2 times the period, " in second
+    assert last == "checked: 2 cycles, stability of 2 cycles"
     assert (once.stable, twice.stable) == (False, True)
     assert twice.period == pytest.approx(2 * once.period, rel=0.01)
     found = replace(doubling, doubled=None).at(value)

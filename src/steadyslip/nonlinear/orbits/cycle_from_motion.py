@@ -49,7 +49,7 @@ def _start(flow: FlowRunner, seen: dict[str, Array]) -> dict[str, float]:
     The velocity of a slider without mass follows from its memory.
     """
     model = flow.reduction.model
-    names = [item.name for item in model.variables] + (["v"] if model.is_single and model.inertial else [])
+    names = [item.name for item in model.variables] + (["v"] if model.inertial and "v" in seen else [])
     return {name: float(seen[name][0]) for name in names}
 
 

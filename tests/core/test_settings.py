@@ -11,7 +11,7 @@ import steadyslip as ss
 from file_schema import file_schema
 from steadyslip.core.entries import Label, LabelledNumbers, Names, Option, Quantity, Span, Text, Whole
 from steadyslip.core.records import Named, Part, Settings, is_required, role_of
-from steadyslip.core.roles import Parameter, Series
+from steadyslip.core.roles import Parameter, Placeholder, Series
 from steadyslip.experiments.fitting.settings import FitSettings
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.settings import RecordSettings
@@ -181,13 +181,14 @@ def test_all_faults_of_all_tables_come_at_once():
 
 def test_what_is_changed_is_given():
     plain_spec = spec_from_text("[friction]\n")
-    assert not any((plain_spec.v_ref_given, plain_spec.contact_given, plain_spec.drive_given))
+    assert not any((plain_spec.v_ref_given, plain_spec.contact_given))
+    assert isinstance(plain_spec.rig.drive.velocity, Placeholder)
     changes = ["v_ref=2 um/s", "contact.steady_normal_stress=3 MPa", "velocity=3 um/s"]
     spec = spec_from_text("[friction]\n", "spec", changes)
     assert (spec.rig.friction.v_ref, spec.rig.drive.velocity) == (2e-6, 3e-6)
     assert spec.v_ref_given
     assert spec.contact_given
-    assert spec.drive_given
+    assert not isinstance(spec.rig.drive.velocity, Placeholder)
 
 
 def test_a_contact_without_stress_says_nothing_of_the_stress():

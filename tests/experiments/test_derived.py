@@ -66,13 +66,20 @@ def test_a_slip_distance_that_no_rock_has_raises_a_word():
         assert any("laboratories find" in warning for warning in fit.to_dict()["warnings"]) is odd
 
 
-def test_without_a_displacement_the_rate_that_is_assumed_is_named():
-    """With another rate than the record's a came out half: it is the rig's own, which nothing in the record shows."""
+def test_without_a_displacement_the_rate_is_asked_for_and_named():
+    """With another rate than the record's a came out half: nothing in the record shows it."""
     faster = rig().with_values({"drive.velocity": 3e-6})
     protocol = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=60.13, to=15e-6),), until=150.0)
     found = columns(faster, protocol, 500)
     bare = ss.record_from_arrays(time=found["time"], friction=found["friction"], normal=found["normal"])
-    fit = ss.fit(ss.lab_rig(velocity="3 um/s"), bare, protocol=protocol)
+    for nobody_says in (ss.lab_rig(), ss.lab_rig("aging").with_values({"friction.a": 0.02})):
+        with pytest.raises(ss.ParameterError, match=r"drive.velocity: missing.*velocity='1 um/s'"):
+            ss.fit(nobody_says, bare, protocol=protocol)
+    full = ss.record_from_arrays(
+        found["time"], friction=found["friction"], normal=found["normal"], displacement=found["displacement"]
+    )
+    assert ss.fit(ss.lab_rig(), full, protocol=protocol).values["friction.a"] == pytest.approx(0.011, rel=0.01)
+    fit = ss.fit(ss.lab_rig().with_values({"drive.velocity": 3e-6}), bare, protocol=protocol)
     assert fit.values["friction.a"] == pytest.approx(0.011, rel=0.01)
     text = " ".join(str(fit).split())
     assert "the protocol that was given, from 3 um/s on" in text

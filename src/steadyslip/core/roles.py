@@ -45,6 +45,13 @@ class Role:
         return fault(f"got {repr_short(value)}; allowed: {self.allowed()}")
 
 
+class Placeholder(float):
+    """A number that stands for one nobody has given: fits take the value from records, or ask for it.
+
+    Any other value put in its place is a plain float.
+    """
+
+
 def fault(message: str) -> ParameterError:
     """Make a ParameterError that does not name a field yet."""
     return ParameterError([Problem("", message)])
@@ -183,7 +190,8 @@ class Parameter(Entry):
                 raise self.refused(value) from error
         if not self.domain.contains(number) and number != self.domain.apart:
             raise self.refused(value)
-        return number + 0.0  # turns -0.0 into 0.0, which equals the default when files are written
+        # + 0.0 turns -0.0 into 0.0, which equals the default when files are written
+        return value if isinstance(value, Placeholder) else number + 0.0
 
     def given(self, value: Any) -> float:
         """Check a constructor argument; text in a unit that depends on the rig becomes a `Total` or `InUnit`."""

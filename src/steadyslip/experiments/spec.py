@@ -16,7 +16,7 @@ from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.records import FrozenRecord, Part, given, role_of
-from steadyslip.core.roles import Parameter
+from steadyslip.core.roles import Parameter, Placeholder
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
@@ -64,8 +64,6 @@ class Spec(Displayed):
         True if the file gives the velocity at which mu_ref holds; otherwise that at the start of the first record.
     contact_given : bool
         True if the file has a table ``[contact]`` with a value.
-    drive_given : bool
-        True if the file gives the initial velocity of the drive; otherwise it is that of the records.
     population : PopulationSettings or None
         Settings of a population, if every record is an experiment of its own.
     """
@@ -79,7 +77,6 @@ class Spec(Displayed):
     windows: bool = False
     v_ref_given: bool = False
     contact_given: bool = True
-    drive_given: bool = True
     population: PopulationSettings | None = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
@@ -123,18 +120,9 @@ class Spec(Displayed):
                 "normal_stress = '20 MPa' in [record], or a table [contact]"
             )
             raise ParameterError([Problem("normal", message)])
-        rate = parts[0].initial_rate
         rig = self.referred_to(parts[0]).rig
         if any(record.pressure_changes for record in parts) and not self.contact_given:
             rig = with_pores(rig)
-        if self.protocol is not None and not self.drive_given:
-            if rate is None or not rate > 0:
-                message = (
-                    f"missing, and {parts[0].source} does not show it; write the rate before the first step, as "
-                    "velocity = '1 um/s' in [drive]"
-                )
-                raise ParameterError([Problem("drive.velocity", message)])
-            rig = rig.with_values({"drive.velocity": rate})
         return rig, parts
 
     def referred_to(self, record: Record) -> Spec:
@@ -197,11 +185,11 @@ def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
         options["free"] = sorted(name for name in missing if name in rig.parameters())
         if known := [name for name in rig.of_kind("friction level") if name not in missing]:
             options["fixed"] = [*settings.fixed, *known]
-    v_ref, contact, drive = (filled.given(kind, found.changed) for kind in _Placeholders.FROM_RECORDS)
+    v_ref, contact = (filled.given(kind, found.changed) for kind in _Placeholders.FROM_RECORDS)
     undecided = _undecided(rig.friction, filled.friction)
     return Spec(
         rig, found.protocol, record if isinstance(record, RecordSettings) else RecordSettings(), options,
-        settings.compare, undecided, settings.windows, v_ref, contact, drive, members,
+        settings.compare, undecided, settings.windows, v_ref, contact, members,
     )  # fmt: skip
 
 
@@ -226,7 +214,7 @@ def lab_rig(
     pores: bool = False,
     stiffness: Any = None,
     v_ref: Any = "1 um/s",
-    velocity: Any = "1 um/s",
+    velocity: Any = None,
 ) -> Slider:
     """Make a rig for fits, with rate-and-state friction and constant normal stress; its values are placeholders.
 
@@ -244,8 +232,9 @@ def lab_rig(
         Of the machine, Pa/m, where it is known; name it in ``fixed`` of `fit`.
     v_ref : float or str
         Rate at which mu_ref holds.
-    velocity : float or str
-        Rate of the load point before the first change of a protocol; needed where no record has a displacement.
+    velocity : float or str, optional
+        Rate of the load point before the first change of a protocol; by default that of the records. `fit` asks for it
+        where these have no displacement.
 
     Examples
     --------
@@ -257,7 +246,7 @@ def lab_rig(
     friction = {"evolution": evolution, "v_ref": rate, "normal_memory": {"law": normal_memory}}
     filled = _Placeholders()
     count = int(states) if isinstance(states, np.integer) else states
-    drive = {"velocity": _checked("velocity", "m/s", velocity)}
+    drive = {} if velocity is None else {"velocity": _checked("velocity", "m/s", velocity)}
     tables = {"friction": friction, "fit": {"states": count}, "drive": drive}
     rig = _spec(read_tables(tables, {}, "lab_rig", further=TABLES, complete=filled.complete), filled).rig
     rig = with_pores(rig) if pores else rig
@@ -282,7 +271,7 @@ class _Placeholders:
     The laws declare which values may be missing, with their placeholders (`Parameter.standing`).
     """
 
-    FROM_RECORDS = ("reference rate", "normal stress", "drive velocity")
+    FROM_RECORDS = ("reference rate", "normal stress")
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
@@ -312,8 +301,7 @@ class _Placeholders:
         if not {item.name for item in stiff} & set(slider) and not any(drive.get(name) for name in gains):
             self._fill(slider, stiff[0], "slider.")
         if "velocity" not in drive:
-            drive["velocity"] = 1e-6
-            self.standing["drive velocity"] = "drive.velocity"
+            drive["velocity"] = Placeholder(1e-6)
         if not pressed:
             contact["law"] = contact_laws.USUAL
         if contact.get("law") == contact_laws.USUAL:

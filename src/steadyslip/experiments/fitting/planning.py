@@ -16,6 +16,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, Unknow
 from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.records import Address, parameters
+from steadyslip.core.roles import Placeholder
 from steadyslip.experiments.fitting.input_tables import MIN_RATE_STEP
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import FitSettings, faults
@@ -85,11 +86,26 @@ def make_plan(
         options["calibrated"] = FitSettings(calibrated=options["calibrated"]).calibrated
     if plan_protocol is not None:
         options["drive"] = "protocol"
+        rig = _driven_as_recorded(rig, many)
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
     check_records(plan)
     plan = with_loading(plan)
     check_changes(plan)
     return plan
+
+
+def _driven_as_recorded(rig: Slider, records: Sequence[Record]) -> Slider:
+    """Rig with a drive's velocity that nobody gave taken from the first record that shows it."""
+    if not isinstance(rig.drive.velocity, Placeholder):
+        return rig
+    rate = next((rate for record in records if (rate := record.initial_rate or 0.0) > 0), None)
+    if rate is None:
+        message = (
+            f"missing, and {records[0].source} does not show it; give the rate before the first step: "
+            "lab_rig(velocity='1 um/s'), or velocity = '1 um/s' in [drive] of a file"
+        )
+        raise ParameterError([Problem("drive.velocity", message)])
+    return rig.with_values({"drive.velocity": rate})
 
 
 def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Address]:

@@ -105,8 +105,9 @@ def test_quantities_are_told_in_those_units_of_a_file_in_which_they_read_best():
 
 
 def test_what_takes_the_load_off_is_told_in_forces_where_the_rig_is():
-    for machine, area, word in ((True, None, "force"), (False, 0.1, "force"), (False, None, "stress")):
-        assert remedy("contact lost", machine, area).startswith(f"the normal {word} fell to zero")
+    block = ss.read_rig("examples/inclined-spring.toml")
+    for one, word in ((two_mass(), "force"), (block.with_values({"area": 0.1}), "force"), (block, "stress")):
+        assert remedy("contact lost", one).startswith(f"the normal {word} fell to zero")
 
 
 def test_kicks_of_the_command_line_end_with_words(tmp_path):

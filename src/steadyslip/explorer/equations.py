@@ -123,10 +123,9 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
 
 def _meanings(rig: Slider | Machine) -> dict[str, str]:
     """Meanings of observables by name, from the friction laws of a rig."""
-    if isinstance(rig, Machine):
-        own = ((name, one.friction.meanings()) for name, one in rig.contacts.items())
-        return {f"{name}.{key}": words for name, meant in own for key, words in meant.items()}
-    return {"spring_stress": "with the damping to the ground", **rig.friction.meanings()}
+    own = {f"{name}." if name else "": one.friction.meanings() for name, one in rig.laws_by_contact().items()}
+    named = {prefix + key: words for prefix, meant in own.items() for key, words in meant.items()}
+    return {"spring_stress": "with the damping to the ground", **named}
 
 
 def _shown_observables(model: Model) -> tuple[list[str], list[sp.Expr]]:

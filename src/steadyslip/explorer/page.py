@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
-from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.explorer.assembly import page
 from steadyslip.files.specifications.read import text_of
@@ -84,7 +83,6 @@ def explore(
     >>> rig = ss.read_rig("examples/inclined-spring.toml")
     >>> ss.explore(rig).save("rig.html")
     """
-    if branch and isinstance(rig, Machine):
-        raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
+    rig.check_branch(branch)
     text = "" if source is None else text_of(source)
     return Explorer(page(rig, title, branch, text), title, rig, branch, text)

@@ -30,7 +30,7 @@ _MAX_SPEED_RATIO = 1e12  # slip rates above this times the steady one (a blow-up
 
 def history(run: History, panels: np.ndarray) -> np.ndarray:
     """Plot slip rate, friction and normal force of every contact in three panels, slip events shaded; return these."""
-    names = list(run.rig.contacts)  # type: ignore[union-attr]
+    names = list(run.rig.contacts)
     colors = {name: _CONTACTS[i % len(_CONTACTS)] for i, name in enumerate(names)}
     factor, unit = display_unit("s", float(run.end) or 1.0)
     time = run["t"] / factor

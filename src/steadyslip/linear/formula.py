@@ -76,7 +76,7 @@ def formula(rig: Slider | Machine, along: str | None = None) -> sp.Eq:
 
 def _name(rig: Slider | Machine, along: str | None) -> str:
     """Dotted name of the parameter `along`; by default a slider's stiffness, or a machine's only one."""
-    if along is None and isinstance(rig, Machine):
+    if along is None and rig.default_along is None:
         springs = [name for name, one in rig.parameters().items() if one.value and one.role.kind == "stiffness"]
         if len(springs) == 1:
             return springs[0]

@@ -38,7 +38,6 @@ from steadyslip.linear.spectrum import (
 )
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral, on_edge, status_where_counted
 from steadyslip.linear.stiffness import STIFFNESS, set_of_one
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.model import Model
 from steadyslip.model.linearisation import linearise
@@ -176,7 +175,7 @@ class Search:
 
     def natural_size(self) -> float:
         """Typical size of the parameter by dimensional analysis, from σss, v0 and the slip distance v0/r."""
-        total = isinstance(self.rig, Machine) and self.rig.area_of(self.name) is None
+        total = self.rig.result_unit("Pa") == "N" and self.rig.area_of(self.name) is None
         return natural_size(self.role.unit, total, self.own.sigmas, self.own.drive, _decay_rate(self.own), self.value)
 
     # -- status of sliding along the parameter

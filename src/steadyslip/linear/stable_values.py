@@ -126,7 +126,7 @@ def name_along(rig: Slider | Machine, along: str | None) -> str:
     ParameterError
         If there is no such parameter, or none is given of a machine.
     """
-    if along is None and isinstance(rig, Machine):
+    if along is None and rig.default_along is None:
         known = {name: one for name, one in rig.parameters().items() if one.value and one.role.kind != "delay"}
         example = next((name for name, one in known.items() if one.role.kind == "stiffness"), next(iter(known)))
         raise ParameterError([Problem("along", f"missing; name a parameter that the machine has, such as {example!r}")])
@@ -135,7 +135,7 @@ def name_along(rig: Slider | Machine, along: str | None) -> str:
 
 def is_own_stiffness(rig: Slider | Machine, name: str) -> TypeGuard[Slider]:
     """True if the parameter is a slider's stiffness, for which there are closed forms."""
-    return isinstance(rig, Slider) and name == STIFFNESS
+    return name == STIFFNESS
 
 
 def _require_positive(rig: Slider | Machine, name: str) -> None:

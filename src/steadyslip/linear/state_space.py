@@ -84,9 +84,9 @@ def state_matrices(
 def _pressure_of(rig: Slider | Machine, name: str) -> float:
     """What a unit of an input is in the Model: a force on a contact with an area is a stress there."""
     contact, _, kind = name.rpartition(".")
-    if isinstance(rig, Slider) or kind not in ("press", "pores"):
+    if kind not in ("press", "pores"):
         return 1.0
-    return 1 / (rig.contacts[contact].area or 1.0)
+    return 1 / (rig.laws_by_contact()[contact].area or 1.0)
 
 
 def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:

@@ -19,6 +19,8 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
     """Base of drives: steady velocity and controller gains, which are zero unless overridden."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
+    turns: ClassVar[bool] = False
+    """True of a machine's load point that rotates."""
 
     velocity: float = parameter("m/s", positive, "velocity of the load point in steady sliding")
 

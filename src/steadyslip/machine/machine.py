@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, NamedTuple
+from difflib import get_close_matches
+from typing import Any, ClassVar
 
 import numpy as np
 
 from steadyslip.core.areas import is_per_area, stress_name, total_unit
 from steadyslip.core.domains import Condition
-from steadyslip.core.errors import Problem, unknown_name
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.ends import body_of, floating_body, unknown_body, unreferenced_bodies
+from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
     GROUND,
@@ -30,19 +32,13 @@ from steadyslip.machine.mechanism import (
 )
 from steadyslip.machine.rig import LawsOfContact, Rig
 from steadyslip.machine.servo import MachineDrive, control_for, wrong_control
+from steadyslip.machine.speeds import Tie, is_zero, rigid_motion, structure_ties
 from steadyslip.machine.structures import StructureBody
 from steadyslip.machine.surfaces import Surface
+from steadyslip.protocol import protocol
+from steadyslip.protocol.protocol import Piece
 
 _SPEED_TOLERANCE = 1e-9  # relative difference of two speeds of one end that counts as rounding; chosen by trial
-
-
-class Tie(NamedTuple):
-    """Coupling of two ends in steady sliding by link `name`: the second moves `ratio` times as fast as the first."""
-
-    name: str
-    first: str
-    second: str
-    ratio: Any
 
 
 class Machine(Rig):
@@ -55,6 +51,10 @@ class Machine(Rig):
 
     area: ClassVar[None] = None
     """Area of a slider, by which its stresses are shown as forces; results of a machine are forces already."""
+    words: ClassVar[Mapping[str, str]] = {
+        "rig": "machine", "block": "body", "damping": "a dashpot to the ground",
+        "mass": "the body that slips there a mass (or a damped link to the ground)",
+    }  # fmt: skip
 
     bodies: Any = members(Body, "bodies, by name")
     links: Any = members(Link, "links, by name", default=Members())
@@ -266,7 +266,7 @@ class Machine(Rig):
         driven = self.drive.driven()
         ties = ties if driven is None else [Tie("drive", LOAD_POINT, driven, 1), *ties]
         return [*ties, *(tie for name, body in self.bodies.items() if body.is_structure
-                         for tie in _structure_ties(name, body))]  # fmt: skip
+                         for tie in structure_ties(name, body))]  # fmt: skip
 
     def _speeds(self) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:
         still = {
@@ -275,7 +275,7 @@ class Machine(Rig):
         }  # fmt: skip
         pace = 1.0 if self.holds else self.drive.velocity  # at rest the ratios of the speeds count
         speeds, closing = rigid_motion({LOAD_POINT: pace, GROUND: 0, **still}, self._ties())
-        return {name: 0 if _is_zero(speed) else speed for name, speed in speeds.items()}, closing
+        return {name: 0 if is_zero(speed) else speed for name, speed in speeds.items()}, closing
 
     def speeds(self) -> dict[str, Any]:
         """Speeds of bodies and of points of structures in steady sliding (m/s or rad/s), by name."""
@@ -289,6 +289,40 @@ class Machine(Rig):
     @property
     def contact_names(self) -> tuple[str, ...]:
         return tuple(self.contacts)
+
+    def result_name(self, name: str) -> str:
+        return name.replace("stress", "force")
+
+    def result_unit(self, unit: str) -> str:
+        return unit.replace("Pa", "N")
+
+    def protocol_unit(self, piece: Piece, unit: str) -> str:
+        if unit in TURNING:
+            return TURNING[unit] if self.piece_turns(piece) else unit
+        if unit != "Pa":
+            return unit
+        return "N m" if self.piece_turns(piece) else "N"
+
+    @property
+    def protocol_area(self) -> float | None:
+        return 1.0  # its loads are forces already, in quantities declared as stresses
+
+    def piece_turns(self, piece: Piece) -> bool:
+        """True if the body or load point that a piece of a protocol acts on rotates."""
+        if piece.channel == protocol.LOAD_POINT or piece.frees_load_point:
+            return self.drive.turns
+        return piece.channel == protocol.DISTURBANCE and self.turns_on(getattr(piece, "on", None))
+
+    def turns_on(self, body: str | None) -> bool:
+        """True if the named body rotates; None names the only body of a machine that has one."""
+        name = body or (next(iter(self.bodies)) if len(self.bodies) == 1 else "")
+        # a misspelt name is reported later, by motion/targets.py
+        meant = [name] if name in self.bodies else get_close_matches(name, self.bodies, 1)
+        return any(self.bodies[one].turns for one in meant)
+
+    def check_branch(self, branch: int) -> None:
+        if branch:
+            raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
 
     def laws_by_contact(self) -> dict[str, LawsOfContact]:
         return {
@@ -408,18 +442,6 @@ def _combined(*parts: tuple[Any, Mapping[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _structure_ties(name: str, body: StructureBody) -> Iterator[Tie]:
-    """Yield the couplings of the points of a structure that is free to move in one way."""
-    motions = body.data.rigid_motions
-    if motions.shape[1] != 1:
-        return
-    moves = {f"{name}.{one}": float(body.rows(one)[0] @ motions[:, 0]) for one in body.point_names()}
-    first = next((end for end, move in moves.items() if move), None)
-    for end, move in moves.items():
-        if first is not None and end != first:
-            yield Tie(f"bodies.{name}", first, end, move / moves[first])
-
-
 def _structure_part(name: str, body: StructureBody, speeds: Mapping[str, Any]) -> StructurePart:
     """Matrices of a structure, and its rigid motion with the given speeds of its points."""
     data = body.data
@@ -431,37 +453,3 @@ def _structure_part(name: str, body: StructureBody, speeds: Mapping[str, Any]) -
         moving = motion * (speed / share)
     places = tuple(coordinate(name, i) for i in range(data.size))
     return StructurePart(name, places, data.mass, body.damping_matrix(), data.stiffness, body.forces(), moving)
-
-
-def rigid_motion(known: Mapping[str, Any], ties: list[Tie]) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:
-    """Speeds of all ends that the ties connect to known ones, and the redundant ties.
-
-    Parameters
-    ----------
-    known : mapping of str
-        Known speeds: of the ground and of the load point.
-    ties : list of Tie
-
-    Returns
-    -------
-    speeds : dict of str
-    closing : list of tuple
-        Ties that close a loop, each with the two speeds of its second end, which must be equal.
-    """
-    speeds, left = dict(known), list(ties)
-    closing: list[tuple[Tie, Any, Any]] = []
-    while True:
-        tie = next((one for one in left if one.first in speeds or one.second in speeds), None)
-        if tie is None:
-            return speeds, closing
-        left.remove(tie)
-        if tie.first in speeds and tie.second in speeds:
-            closing.append((tie, speeds[tie.second], tie.ratio * speeds[tie.first]))
-        elif tie.first in speeds:
-            speeds[tie.second] = tie.ratio * speeds[tie.first]
-        else:
-            speeds[tie.first] = speeds[tie.second] / tie.ratio
-
-
-def _is_zero(speed: Any) -> bool:
-    return isinstance(speed, (int, float)) and speed == 0

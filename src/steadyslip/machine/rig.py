@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.mechanism import Mechanism
+from steadyslip.protocol.protocol import Piece
 
 S = TypeVar("S", bound="Rig")
 
@@ -28,6 +29,17 @@ class LawsOfContact(NamedTuple):
 class Rig(FrozenRecord, Keeper):
     """Base of `Slider` and `Machine`: a frozen record with parameters by dotted name and a mechanism."""
 
+    if TYPE_CHECKING:  # fields of the records, or constants of the class: named bodies, named contacts
+
+        @property
+        def area(self) -> float | None: ...
+        @property
+        def bodies(self) -> Mapping[str, Any]: ...
+        @property
+        def contacts(self) -> Mapping[str, Any]: ...
+        @property
+        def drive(self) -> Any: ...
+
     always_symbols: ClassVar[Mapping[str, str]] = {}
     """Parameters that are symbols of the Model even if the rig does not give them, with their letters."""
     replaces: ClassVar[Mapping[str, str]] = {}
@@ -39,10 +51,49 @@ class Rig(FrozenRecord, Keeper):
     default_along: ClassVar[str | None] = None
     """Parameter along which edges and cycles are sought unless another is named; None if none stands out."""
 
+    words: ClassVar[Mapping[str, str]] = {}
+    """Words of messages about a rig of this class: `rig`, `block`, and what limits its speed, `damping` and `mass`."""
+
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts, which prefix their results; empty for the one contact of a slider."""
         return ()
+
+    def result_name(self, name: str) -> str:
+        """Name of a result: that of a slider's, or of a machine's, whose loads are forces."""
+        return name
+
+    def result_unit(self, unit: str) -> str:
+        """SI unit of a result: that of a slider's, or of a machine's, whose loads are forces."""
+        return unit
+
+    def protocol_unit(self, piece: Piece, unit: str) -> str:
+        """SI unit of a quantity of a piece of a protocol on this rig; `unit` is the declared one."""
+        return unit
+
+    @property
+    def protocol_area(self) -> float | None:
+        """Area (m²) by which stresses in a protocol are multiplied to be written as forces; None if they are not."""
+        raise NotImplementedError
+
+    def place_problems(
+        self, argument: str, name: str | None, known: Iterable[str], what: str = "body"
+    ) -> list[Problem]:  # fmt: skip
+        """Problem with the name of a body or contact (`what`), one of those `known`, as a list; empty for None.
+
+        A slider has no names of either. `argument` is what the message calls the name.
+        """
+        known = list(known)
+        return [] if name is None or name in known else [Problem(argument, unknown_name(what, name, known))]
+
+    def check_branch(self, branch: int) -> None:
+        """Raise an error for a branch (number of a steady sliding) that rigs of this class never have.
+
+        Raises
+        ------
+        ParameterError
+            If `branch` is not 0 for a machine.
+        """
 
     def laws_by_contact(self) -> dict[str, LawsOfContact]:
         """Laws of each contact by its name in the Model, which is empty for a slider's."""
@@ -51,7 +102,7 @@ class Rig(FrozenRecord, Keeper):
     @property
     def holds(self) -> bool:
         """True if a controller holds a place: the velocity of the drive is 0, and there is no steady sliding."""
-        velocity = self.drive.velocity  # type: ignore[attr-defined]
+        velocity = self.drive.velocity
         return isinstance(velocity, (int, float)) and velocity == 0
 
     def mechanism(self) -> Mechanism:
@@ -73,6 +124,10 @@ class Rig(FrozenRecord, Keeper):
     def declared(self) -> dict[str, Address]:
         """Collect the parameters (uncached)."""
         return parameters(self)
+
+    def parameter_along(self, name: str) -> str:
+        """Full name of a parameter; a slider's "stiffness" becomes what it has: a spring's, a press's, or a gain kp."""
+        return self.resolve(name)
 
     def resolve(self, name: str) -> str:
         """Full dotted name of a parameter.

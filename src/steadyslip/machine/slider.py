@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import ClassVar
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -33,6 +33,14 @@ class Slider(Rig, section="slider"):
     replaces: ClassVar[Mapping[str, str]] = {"slider.axial_stiffness": "slider.stiffness"}
     not_in_model: ClassVar[tuple[str, ...]] = ("slider.area",)
     default_along: ClassVar[str | None] = "stiffness"
+    words: ClassVar[Mapping[str, str]] = {
+        "rig": "slider", "block": "slider", "damping": "radiation_damping",
+        "mass": "the slider mass or radiation_damping",
+    }  # fmt: skip
+    bodies: ClassVar[Mapping[str, Any]] = {}
+    """Named bodies, as of a `Machine`; a slider's block has no name."""
+    contacts: ClassVar[Mapping[str, Any]] = {}
+    """Named contacts, as of a `Machine`; a slider's contact has no name."""
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
@@ -81,6 +89,10 @@ class Slider(Rig, section="slider"):
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
+    def parameter_along(self, name: str) -> str:
+        full = self.resolve(name)
+        return self.stiffness_name() if full == "slider.stiffness" and self.stiffness is None else full
+
     def gain_name(self) -> str | None:
         """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
         names = [name for name in self.of_kind("stiffness") if name.startswith("drive.")]
@@ -92,6 +104,18 @@ class Slider(Rig, section="slider"):
         return self.area
 
     printed_area = area_of
+
+    @property
+    def protocol_area(self) -> float | None:
+        return self.area
+
+    def place_problems(
+        self, argument: str, name: str | None, known: Iterable[str] = (), what: str = "body"
+    ) -> list[Problem]:  # fmt: skip
+        if name is None:
+            return []
+        one = "has one contact" if argument == "contact" else "is one block"
+        return [Problem(argument, f"got {name!r}; a slider {one}, leave it out")]
 
     def laws_by_contact(self) -> dict[str, LawsOfContact]:
         return {"": LawsOfContact("", self.friction, self.contact)}

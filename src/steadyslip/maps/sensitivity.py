@@ -228,7 +228,7 @@ def sensitivity(
 
 def default_results(rig: Slider | Machine) -> tuple[str, ...]:
     """Default results for a rig."""
-    return ("critical_stiffness", "margin") if isinstance(rig, Slider) else ("growth_rate",)
+    return ("critical_stiffness", "margin") if rig.default_along else ("growth_rate",)
 
 
 def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict[str, Array]:

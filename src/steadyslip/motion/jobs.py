@@ -243,8 +243,7 @@ def prepare(
     plan = in_units_of(rig, Protocol.of(protocol)).varied(
         {name: value for name, value in vary.items() if name not in own}
     )
-    if branch and isinstance(rig, Machine):
-        raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
+    rig.check_branch(branch)
     acting = targets(rig, plan)
     point = operating_point(rig, own, branch=branch, drive=acting.drive)
     _refuse_singular(rig, point, bool(own))

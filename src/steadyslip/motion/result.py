@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import stress_name, totals
-from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
@@ -40,7 +40,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         """Status in a sentence, with advice where the run ended early."""
         where = f" ({self.contact})" if self.contact else ""
         head = f"{self.status}{where} at {format_quantity(self.end, 's')}"
-        advice = remedy(self.status, isinstance(self.rig, Machine), self.rig.area)
+        advice = remedy(self.status, self.rig)
         return f"{head}: {advice}" if advice else head
 
     @property
@@ -66,7 +66,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     def summary(self) -> str:
         """Summary in a few lines."""
-        lines = [f"{self.message}", *(self._contacts() if isinstance(self.rig, Machine) else self._block())]
+        lines = [f"{self.message}", *self._contacts(), *self._block()]
         until = self.protocol.until or np.inf
         begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
         if late := [f"{name} at {format_quantity(at, 's')}" for name, at in begins if at >= until]:
@@ -132,7 +132,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def _block(self) -> list[str]:
         """Summary lines of a slider's block."""
         lines: list[str] = []
-        if not isinstance(self.rig, Slider) or not isinstance(self.velocities, tuple):
+        if not isinstance(self.velocities, tuple):
             return lines
         v, area = self.data["v"], self.rig.area
         if len(v):
@@ -166,7 +166,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         return {
             "version": self.version,
             "status": self.status,
-            **({"contact": self.contact or None} if isinstance(self.rig, Machine) else {}),
+            **({"contact": self.contact or None} if self.rig.contact_names else {}),
             "end": self.end,
             "message": self.message,
             "sentence": self.sentence,
@@ -219,12 +219,8 @@ def check_contact(rig: Slider | Machine, contact: str | None) -> None:
     ParameterError
         With the names of the contacts.
     """
-    if contact is None:
-        return
-    if isinstance(rig, Slider):
-        raise ParameterError([Problem("contact", f"got {contact!r}; a slider has one contact, leave it out")])
-    if contact not in rig.contacts:
-        raise ParameterError([Problem("contact", unknown_name("contact", contact, rig.contacts))])
+    if problems := rig.place_problems("contact", contact, rig.contacts, "contact"):
+        raise ParameterError(problems)
 
 
 @checked()

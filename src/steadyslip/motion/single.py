@@ -113,7 +113,7 @@ def simulate(
     if not jobs.exists[0]:
         steady_state(rig)  # raises, and says why
     if not jobs.posed[0]:
-        raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed', isinstance(rig, Machine))}")
+        raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed', rig)}")
     final = float(jobs.segments.end.max())
     requested = checked_times(times, final)
     machine = jobs.runner(lanes=1, dense=True)

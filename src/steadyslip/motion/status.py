@@ -8,6 +8,7 @@ import numpy as np
 
 from steadyslip.core.areas import stress_name
 from steadyslip.kernels.runner import STATUSES
+from steadyslip.machine.rig import Rig
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import slip_rates
 
@@ -35,16 +36,11 @@ REMEDIES = {
     "of magnitude (b, d_c, a normal stress near zero)",
     "running": "",
 }
-_MASS = {
-    True: "the body that slips there a mass (or a damped link to the ground)",
-    False: "the slider mass or radiation_damping",
-}
 
 
-def remedy(word: str, machine: bool, area: float | None = None) -> str:
-    """Advice for a status, worded for a machine or for a slider (with forces if it has an area); empty if done."""
-    normal = "force" if machine else stress_name("stress", area)
-    return REMEDIES[word].format(mass=_MASS[machine], stress=normal)
+def remedy(word: str, rig: Rig) -> str:
+    """Advice for a status in the words of the rig, with forces if it has an area; empty if done."""
+    return REMEDIES[word].format(mass=rig.words["mass"], stress=stress_name(rig.result_name("stress"), rig.area))
 
 
 def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any) -> np.ndarray:

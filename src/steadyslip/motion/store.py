@@ -16,6 +16,7 @@ from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.events import ContactEvent, Event
 from steadyslip.motion.history import HistoryData
@@ -125,7 +126,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     numbers = _event_units(rig)
     columns |= {f"event_{name}": ColumnRule(("event",), unit) for name, unit in numbers.items()}
     columns["event_kind"] = ColumnRule(("event",), text=True)
-    if isinstance(rig, Machine):
+    if rig.contact_names:
         columns["event_contact"] = ColumnRule(("event",), text=True)
         columns |= {name: ColumnRule(("contact",), "m/s") for name in ("lowest_velocity", "peak_velocity")}
     found = table.columns(columns)
@@ -136,7 +137,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
         raise table.fault(f"it has an event of unknown kind, {unknown.pop()!r:.40}")
     moments = list(zip(*(found[f"event_{name}"].tolist() for name in numbers), strict=True))
     velocities: Any = (attributes["lowest_velocity"], attributes["peak_velocity"])
-    if isinstance(rig, Machine):
+    if rig.contact_names:
         velocities = _velocities(table, rig, found)
     contacts = found.get("event_contact", [""] * len(kinds))
     events = [
@@ -157,7 +158,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     }
 
 
-def _velocities(table: ExpectedTable, rig: Machine, found: dict[str, Any]) -> dict[str, tuple[float, float]]:
+def _velocities(table: ExpectedTable, rig: Rig, found: dict[str, Any]) -> dict[str, tuple[float, float]]:
     """Lowest and highest slip rate of every contact."""
     names = list(rig.contacts)
     if table.sizes["contact"] != len(names) or set(found["event_contact"]) - set(names):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
@@ -84,9 +84,9 @@ class _TargetSearch:
     """Search for the targets of one protocol."""
 
     def __init__(self, rig: Slider | Machine, plan: Protocol) -> None:
-        self.plan, self.several = plan, isinstance(rig, Machine)
+        self.plan, self.rig = plan, rig
         self.laws = {name: own.contact for name, own in rig.laws_by_contact().items()}
-        self.bodies = list(rig.bodies) if isinstance(rig, Machine) else [""]
+        self.bodies = list(rig.bodies) or [""]
         self.problems: list[Problem] = []
 
     def found(self) -> Targets:
@@ -134,16 +134,12 @@ class _TargetSearch:
 
     def _chosen(self, piece: Piece, where: str, kind: str, names: list[str]) -> str | None:
         given = getattr(piece, "on", None)
-        if not self.several:
-            if given is not None:
-                self.problems.append(Problem(where, f"got {given!r}; a slider is one block, leave it out"))
-            return ""
         if given is None and len(names) > 1:
             message = f"missing; name the {kind} that {piece.name} acts on: {', '.join(names)}"
             self.problems.append(Problem(where, message))
             return None
-        if given is not None and given not in names:
-            self.problems.append(Problem(where, unknown_name(kind, given, names)))
+        if wrong := self.rig.place_problems(where, given, names, kind):
+            self.problems += wrong
             return None
         return given or names[0]
 

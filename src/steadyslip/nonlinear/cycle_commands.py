@@ -111,7 +111,7 @@ class Thresholds(Displayed):
     def basin(self) -> Basin:
         """The basin of the same rig, computed once; of a machine in the plane of the body that is kicked."""
         at = next((one.at for one in self.found if one.at), None)
-        if isinstance(self.rig, Machine) and at in self.rig.contacts:
+        if at is not None and at in self.rig.contacts:
             at = self.rig.contacts[at].held
         return basin(self.rig, at=at)
 

@@ -14,7 +14,6 @@ from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters
 from steadyslip.linear.frequency import resonances, transfer
 from steadyslip.linear.stiffness import growth_rate
-from steadyslip.machine.input_units import unit_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
@@ -194,7 +193,7 @@ class _Forced:
         self.names = (name, self.output)
         piece = self._piece(1.0, 1.0)
         unit = next(a.role.unit for name, a in parameters(piece).items() if name == "amplitude")
-        self.units = (unit_of(rig, piece, unit), model.observables[self.output][1])
+        self.units = (rig.protocol_unit(piece, unit), model.observables[self.output][1])
         start = simulate(rig, until=1.0, times=[0.0], events=False)
         self.steady = {name: float(start[name][0]) for name in model.observables}
         self.decay = float(growth_rate(rig))
@@ -204,19 +203,17 @@ class _Forced:
         of_slider, ending, _ = INPUTS[self.kind]
         if ending == of_slider:
             return ending, None
-        if isinstance(self.rig, Slider) and on is not None:
-            raise ParameterError([Problem("on", f"got {on!r}; a slider is one block, leave it out")])
-        if isinstance(self.rig, Slider) and of_slider:
+        if of_slider in model.inputs and on is None:
             return of_slider, None
         possible = [name.removesuffix(ending) for name in model.inputs if name.endswith(ending)]
         if on is None and len(possible) == 1:
             on = possible[0]
         if on not in possible:
-            if not possible:
+            if not possible and of_slider not in model.inputs:
                 wanted = "a contact of law pore-fluid" if self.kind == "injection" else "a place to act on"
                 raise NotAvailable(f"input {self.kind} needs {wanted}; this rig has none")
-            came = "missing" if on is None else f"got {on!r}"
-            raise ParameterError([Problem("on", f"{came}; allowed: {', '.join(possible)}")])
+            missing = [Problem("on", f"missing; allowed: {', '.join(possible)}")]
+            raise ParameterError(self.rig.place_problems("on", on, possible, "place") or missing)
         return on + ending, on or None
 
     def _output(self, model: Model, output: str | None) -> str:

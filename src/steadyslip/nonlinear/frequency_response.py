@@ -183,7 +183,7 @@ class FrequencyResponse(ReadOnly):
     def _explanation(self, status: str) -> str:
         if status.startswith("every"):
             return "the motion does not repeat with the input, but later: steady sliding is lost"
-        return EXPLAINED.get(status) or remedy(status, isinstance(self.rig, Machine), self._area)
+        return EXPLAINED.get(status) or remedy(status, self.rig)
 
     def _limits_at(self, i: int) -> str:
         """Both limits of amplitude at a period, for its row; empty where they were not asked for."""

@@ -109,9 +109,7 @@ class FrozenVerdicts(ReadOnly):
     @cached_property
     def slip_rates(self) -> dict[str, Array]:
         """Slip rate (m/s) over the run's own times, by contact; of a slider under ``""``."""
-        if isinstance(self.rig, Slider):
-            return {"": self.run["v"]}
-        return {name: self.run[f"{name}.slip_rate"] for name in self.rig.contacts}
+        return {name: self.run[f"{name}.slip_rate" if name else "v"] for name in self.rig.laws_by_contact()}
 
     def _at(self, time: float) -> str:
         found = {name: float(np.interp(time, self.t, own)) for name, own in self.values.items()}
@@ -153,7 +151,7 @@ class FrozenVerdicts(ReadOnly):
             label, factor, unit = self._shown(name)
             columns[f"{label} ({unit})"] = factor * own
         columns["growth rate (1/s)"] = self.growth_rate
-        if isinstance(self.rig, Slider):
+        if self.rig.default_along:
             factor, unit = outside("Pa/m", self.rig.area)
             columns[f"critical stiffness ({unit})"] = factor * self.critical_stiffness
         for name, own in self.slip_rates.items():
@@ -289,9 +287,9 @@ class _Slow:
 
     def critical_stiffness(self, values: dict[str, Array]) -> Array:
         """Pa/m, of a slider; else NaN."""
-        if isinstance(self.rig, Machine):
-            return np.full(len(values["drive.velocity"]), np.nan)
-        return self._where_it_slides(critical_stiffness, values)
+        if self.rig.default_along:
+            return self._where_it_slides(critical_stiffness, values)
+        return np.full(len(values["drive.velocity"]), np.nan)
 
     def _where_it_slides(self, asked: Callable[..., Any], values: dict[str, Array]) -> Array:
         sliding = np.logical_and.reduce([own > 0 for own in values.values()])

@@ -11,8 +11,7 @@ from typing import Any
 
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
-from steadyslip.machine.machine import Machine
-from steadyslip.machine.slider import Slider
+from steadyslip.machine.rig import Rig
 from steadyslip.reports import lab  # noqa: F401 -- registers documents of fits
 from steadyslip.reports.brief import brief
 from steadyslip.reports.document import Report, document_html, source_text
@@ -73,7 +72,7 @@ def report(
     """
     path = None if source is None else Path(source)
     block = {"project": project, "author": author, "revision": revision, "approval": approval}
-    if isinstance(result, Slider | Machine):
+    if isinstance(result, Rig):
         options["source"] = source_text(path)
     return Report(document_html(parts_of(result, **options), title, explorer, path, block), title)
 

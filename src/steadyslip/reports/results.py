@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip import figures
+from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_percent, format_quantity, format_range
 from steadyslip.core.pages import Displayed
@@ -21,6 +22,7 @@ from steadyslip.figures.inline import figure_html
 from steadyslip.figures.maps import MAX_FACETS
 from steadyslip.files.specifications.layout import own_fields
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
@@ -53,8 +55,8 @@ def parts_of(result: Any, **options: Any) -> Parts:
     if not isinstance(result, Displayed) or options:
         got = ", ".join([type(result).__name__, *options])
         raise ParameterError([Problem("result", f"got {got}; allowed: a rig or a result, such as that of analyze")])
-    rig = getattr(result, "rig", None)
-    rig = rig if isinstance(rig, Slider | Machine) else None
+    own = getattr(result, "rig", None)
+    rig: Any = own if isinstance(own, Rig) else None
     first = str(result).partition("\n")[0]
     kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr
@@ -223,12 +225,12 @@ def _history(result: History) -> Parts:
 
 def _load_name(rig: Slider | Machine) -> str:
     """Name of the normal load in the figures of a rig: force for machines and rigs with an area, else stress."""
-    return "normal force" if isinstance(rig, Machine) or rig.area is not None else "normal stress"
+    return stress_name(rig.result_name("normal stress"), rig.area)
 
 
 def protocol_table(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
     """HTML table of the pieces of a protocol, with numbers in display units."""
-    area = rig.area if isinstance(rig, Slider) else 1.0  # machines are loaded by forces: 1 m² shows Pa as N
+    area = rig.protocol_area
     turns = rig.parameters()["drive.velocity"].role.unit == "rad/s"
     rows = []
     for piece in protocol.pieces:
@@ -268,8 +270,7 @@ def _slip_table(result: History) -> Iterator[str]:
 @parts_of.register
 def _branch(result: CycleBranch) -> Parts:
     along, unit, area = result.along, result.unit, result.rig.printed_area(result.along)
-    stress = "Pa" if isinstance(result.rig, Slider) else "N"
-    drop = "stress drop" if isinstance(result.rig, Slider) else "force drop"
+    stress, drop = result.rig.result_unit("Pa"), result.rig.result_name("stress drop")
     first, _, rest = str(result).partition("\n")
     rows = [
         (format_quantity(one.value, unit, area=area), format_quantity(one.period, "s"),

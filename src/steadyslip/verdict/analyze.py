@@ -25,7 +25,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import steady_states
 from steadyslip.model.steady_results import SteadySliding
-from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
+from steadyslip.nonlinear.onset.hopf import Onset, onset_at
 from steadyslip.verdict.causes import undecided_without_mass
 from steadyslip.verdict.checks import critical_check, edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import as_dict
@@ -163,7 +163,7 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
 
 def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | None:
     """Onset at the oscillatory edge nearest to the rig's stiffness (or gain kp); None without such an edge."""
-    name = parameter_along(rig, "slider.stiffness")
+    name = rig.parameter_along("slider.stiffness")
     for margin in distances:
         if margin.parameter == name:
             edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]

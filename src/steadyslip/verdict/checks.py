@@ -28,7 +28,6 @@ from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -81,11 +80,8 @@ def undecided(checks: Sequence[Check]) -> str:
 
 def steady_check(rig: Rig, point: OperatingPoint, steady: SteadyMachine | None = None) -> Check:
     """Check that the laws, evaluated at steady sliding, give its stresses and constant memory, and bodies balance."""
-    frictions = (
-        [rig.contacts[contact.name].friction for contact in point.model.contacts]
-        if isinstance(rig, Machine)
-        else [rig.friction]  # type: ignore[attr-defined]
-    )
+    laws = rig.laws_by_contact()
+    frictions = [laws[contact.name].friction for contact in point.model.contacts]
     numbers = [float(one) for one in point.evaluate(_steady_numbers(point.model))]
     residuals: list[tuple[float, float]] = []
     for contact, law, sigma in zip(point.model.contacts, frictions, point.sigmas, strict=True):

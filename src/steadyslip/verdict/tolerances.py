@@ -124,7 +124,7 @@ class Tolerated(ReadOnly):
         lines = [self.headline()]
         if not np.all(self.exists):
             lines.append(f"{'no steady sliding':<{wide}}in {format_percent(1 - float(np.mean(self.exists)))} of them")
-        own = self.along == STIFFNESS and isinstance(self.rig, Slider)
+        own = self.along == STIFFNESS
         edge, over = (
             ("critical stiffness", "stiffness over critical") if own else (f"edge in {self.along}", "over its edge")
         )
@@ -239,7 +239,7 @@ def tolerate(
     stiffness over critical   0.24 to 0.436
     friction.a                0.01407 to 0.01494 alone: unstable, 0.24 to 0.4361 times critical
     """
-    name = "" if along is None and isinstance(rig, Machine) else name_along(rig, along)
+    name = name_along(rig, along) if along or rig.default_along else ""
     spreads = spreads_of(rig, tolerances)
     drawn = spreads.drawn(LOG2_CLOSED if model_of(rig, ()).has_closed_form else LOG2_OTHERS)
     possible = np.broadcast_to(spreads.possible(drawn), next(iter(drawn.values())).shape)

@@ -16,7 +16,7 @@ from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Setting
 from steadyslip.core.roles import Entry, Parameter
 from steadyslip.files.specifications.layout import find_law, has_choice, nested_keys, own_fields, selector
 from steadyslip.files.specifications.toml import Table
-from steadyslip.machine.input_units import TURNING, turns_on
+from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.machine import Machine
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
@@ -97,7 +97,7 @@ class TableReader:
         if law.channel != DISTURBANCE:
             return False
         on = table.get("on")
-        return turns_on(self.machine, on if isinstance(on, str) else None)
+        return self.machine.turns_on(on if isinstance(on, str) else None)
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
         """Records of tables by names that the user chooses."""

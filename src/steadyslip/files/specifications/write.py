@@ -98,8 +98,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
             first = [] if word == default else [f'{key} = "{word}"']
         blocks.append(_table(f"[{section.name}]", record, first, section.name, area))
     if protocol is not None:
-        own = 1.0 if isinstance(rig, Machine) else area  # in forces
-        blocks.append(_table(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, own))
+        blocks.append(_table(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, rig.protocol_area))
     return "\n".join(blocks)
 
 

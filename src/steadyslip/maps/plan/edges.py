@@ -19,7 +19,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.measures import Measure, Output, as_slider
 from steadyslip.model.point import Vary, operating_point
-from steadyslip.nonlinear.onset.hopf import KINDS, onset_map, parameter_along
+from steadyslip.nonlinear.onset.hopf import KINDS, onset_map
 from steadyslip.protocol import Protocol
 
 
@@ -157,7 +157,7 @@ class OnsetKind(Along, name="onset"):
     """Kind of onset at the nearest oscillatory edge in stiffness, or in another parameter; see `steadyslip.hopf`."""
 
     def name_of(self, rig: Slider | Machine) -> str:
-        return parameter_along(rig, self.along or "slider.stiffness")
+        return rig.parameter_along(self.along or "slider.stiffness")
 
     def is_own(self, rig: Slider | Machine) -> bool:
         return self.along is None and rig.default_along is not None

@@ -21,6 +21,7 @@ from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan import edges  # noqa: F401 -- registers its measures
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
@@ -78,7 +79,7 @@ class Map(Displayed):
 
     def __post_init__(self) -> None:
         problems: list[Problem] = []
-        if not isinstance(self.rig, Slider | Machine):
+        if not isinstance(self.rig, Rig):
             message = f"got {self.rig!r}; allowed: a Slider or Machine, such as read_rig gives"
             raise ParameterError([Problem("rig", message)])
         self._set("protocol", Protocol.of(self.protocol))
@@ -290,9 +291,9 @@ class Map(Displayed):
         return f"map of {what} over {' x '.join(parts)}: {self.size:,} points"
 
 
-def default_measures(rig: Slider | Machine) -> tuple[str, ...]:
+def default_measures(rig: Rig) -> tuple[str, ...]:
     """Default measures for a rig."""
-    return ("status", "critical_stiffness") if isinstance(rig, Slider) else ("status", "growth_rate")
+    return ("status", "critical_stiffness" if rig.default_along else "growth_rate")
 
 
 def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:

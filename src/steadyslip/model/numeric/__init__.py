@@ -8,23 +8,24 @@ from __future__ import annotations
 from typing import TypeGuard
 
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 
 _WRITTEN_OUT = 18
 """States, each of first order, up to which the polynomial of a machine is written out in symbols within some ten
 seconds: 8 blocks in a row with one contact have 17, and with 9 the time doubles for each block more."""
 
 
-def has_structure(rig: object) -> bool:
+def has_structure(rig: Rig) -> bool:
     """True for a machine with a structure, of which there are matrices only."""
-    return isinstance(rig, Machine) and any(body.is_structure for body in rig.bodies.values())
+    return any(body.is_structure for body in rig.bodies.values())
 
 
-def has_response(rig: object) -> bool:
+def has_response(rig: Rig) -> bool:
     """True for a machine with a structure given by its measured response, which has no eigenvalues to be computed."""
-    return isinstance(rig, Machine) and any(getattr(body, "response", None) is not None for body in rig.bodies.values())
+    return any(getattr(body, "response", None) is not None for body in rig.bodies.values())
 
 
-def by_matrices(rig: object) -> TypeGuard[Machine]:
+def by_matrices(rig: Rig) -> TypeGuard[Machine]:
     """True for a machine whose equations are matrices: it has a structure, or is too large to be written out."""
     if has_structure(rig):
         return True

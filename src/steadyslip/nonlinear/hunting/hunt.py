@@ -174,8 +174,8 @@ def _result(
             period = _average_period(recent)
     else:
         seen = -table[-1:, 1] if len(table) else np.zeros(1)
-    turns = isinstance(rig, Machine) and rig.drive.turns
-    force = "N m" if turns else "N" if isinstance(rig, Machine) else "Pa"
+    turns = rig.drive.turns
+    force = "N m" if turns else rig.result_unit("Pa")
     return Hunt(
         rig=rig, protocol=protocol, hunts=hunts, lowest=float(seen.min()), highest=float(seen.max()),
         period=float(period), repeats=bool(count), strokes=tuple(strokes), time=table[:, 0], error=table[:, 1],

@@ -110,9 +110,8 @@ class Hunt(ReadOnly):
                 f"{format_quantity(last.fastest, f'{self.unit}/s')}"
             )
         if len(self.force):
-            area = self.rig.area if isinstance(self.rig, Slider) else None
             ends = (self.force.min(), self.force.max())
-            low, high = (format_quantity(float(force), self.force_unit, area=area) for force in ends)
+            low, high = (format_quantity(float(force), self.force_unit, area=self.rig.area) for force in ends)
             lines.append(f"controller      {low} to {high}")
         accuracy = "exact pieces" if self.exact else f"rtol {self.rtol:g}"
         lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, NUMBERS, THREADS, checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
@@ -165,10 +165,8 @@ def basin(
     [['returns'], ['returns']]
     """
     steady_states(rig)  # raises, and says why
-    if isinstance(rig, Slider) and at is not None:
-        raise ParameterError([Problem("at", f"got {at!r}; a slider is one block, leave it out")])
-    if isinstance(rig, Machine) and at is not None and at not in rig.bodies:
-        raise ParameterError([Problem("at", unknown_name("body", at, rig.bodies))])
+    if problems := rig.place_problems("at", at, rig.bodies):
+        raise ParameterError(problems)
     options = options_for(operating_point(rig, branch=branch).model, rtol)
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
     rest = rest_of(own, np.atleast_1d(np.asarray(own.point.drive, dtype=float)), np.zeros(1))

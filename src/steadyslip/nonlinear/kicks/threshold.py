@@ -17,7 +17,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import out_of_range_error
 from steadyslip.model.sliding import steady_states
-from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
+from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked, kicks_of
 from steadyslip.nonlinear.kicks.spans import (
     BLOW_UP,
     CERTAIN,
@@ -445,13 +445,16 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
     survives it: the limit is 2.94 times this step
     velocity kick: survives up to 7.67288... um/s (size 2.037693, bracket ...); beyond: blow-up
     """
+    possible = kicks_of(rig)
     kinds: dict[type, tuple[str, str]] = {
-        VelocityStep: ("velocity", "to"),
-        DisplacementStep: ("displacement", "by"),
-        NormalStressStep: ("normal-stress", "by"),
-    }
-    if isinstance(rig, Machine):
-        kinds |= {NormalStressStep: ("normal-force", "by"), DisturbanceStep: ("force", "by")}
+        kind: (kick, attribute)
+        for kind, kick, attribute in (
+            (VelocityStep, "velocity", "to"), (DisplacementStep, "displacement", "by"),
+            (NormalStressStep, "normal-stress", "by"), (NormalStressStep, "normal-force", "by"),
+            (DisturbanceStep, "force", "by"),
+        )
+        if kick in possible
+    }  # fmt: skip
     if type(step) not in kinds:
         names = ", ".join(kind.__name__ for kind in kinds)
         raise NotAvailable(f"a margin is known for {names}, not for {step!r}; simulate it instead")
@@ -461,7 +464,7 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
         raise NotAvailable("a stop or reversal of the drive is no step from one steady sliding to another; simulate it")
     up = amount >= (rig.drive.velocity if kick == "velocity" else 0)
     at = getattr(step, "on", None)
-    if isinstance(rig, Machine) and at is None and kick in ("force", "normal-force"):
+    if at is None and kick in ("force", "normal-force"):
         places = list(rig.bodies if kick == "force" else rig.contacts)
         at = places[0] if len(places) == 1 else None
     found = threshold(rig, kick, at=at, direction=1 if up else -1, precision=precision, branch=branch)

@@ -125,7 +125,7 @@ def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> 
     known = np.all([one.known for one in linear], axis=0)
     c1 = np.where(known, np.real(sum(terms)), np.nan)
     error = np.where(np.isfinite(error), error + np.abs(c1) * share, np.inf)
-    pull = 2 * np.abs(q[:, spring]) * (1.0 if model.is_slider else areas)
+    pull = 2 * np.abs(q[:, spring]) * areas
     return Cubic(
         c1, error, np.abs(c1) / sum(np.abs(term) for term in terms), pull[each, most], most,
         np.abs(relative) / np.abs(relative[each, most])[:, None], q,

@@ -209,7 +209,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
     >>> onset.kind, round(onset.value / 1e9, 3)
     ('supercritical', 29.07)
     """
-    name = parameter_along(rig, along)
+    name = rig.parameter_along(along)
     edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]
     oscillatory = [edge for edge in edges if edge.kind == "oscillatory"]
     if not oscillatory:
@@ -218,16 +218,6 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
         raise NotAvailable(f"no oscillatory edge of stability along {name}: {found}")
     own = float(rig.parameters()[name].value)  # type: ignore[arg-type]  # boundary() refuses None
     return onset_at(rig, min(oscillatory, key=lambda edge: abs(edge.value - own)), branch)
-
-
-def parameter_along(rig: Slider | Machine, along: str) -> str:
-    """Full name of a parameter; "stiffness" becomes the one the rig has: a spring's, a press's, or a gain kp."""
-    name = rig.resolve(along)
-    if isinstance(rig, Machine):
-        return name
-    if name != "slider.stiffness" or rig.stiffness is not None:
-        return name
-    return rig.stiffness_name()
 
 
 def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
@@ -325,7 +315,7 @@ def onset_map(
         If the parameter does not enter linearly, or with a delay.
     """
     point = operating_point(rig, vary)
-    name = parameter_along(rig, along)
+    name = rig.parameter_along(along)
     unit = rig.parameters()[name].role.unit
     name = name if name in point.model.parameters else "slider.stiffness"  # k too where the axial one is given
     found = in_chunks(point, lambda part: _onsets(part, name))

@@ -28,7 +28,7 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, in_range
 from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve, turned_round
 from steadyslip.nonlinear.onset.coefficient import coefficients
-from steadyslip.nonlinear.onset.hopf import onsets, parameter_along
+from steadyslip.nonlinear.onset.hopf import onsets
 
 Array = np.ndarray
 DECADES = 6.0  # default range of a parameter to each side
@@ -156,7 +156,7 @@ def hopf_curve(
     >>> curve.names
     ('contact.angle', 'slider.stiffness')
     """
-    names = (parameter_along(rig, first), parameter_along(rig, second))
+    names = (rig.parameter_along(first), rig.parameter_along(second))
     if names[0] == names[1]:
         raise ParameterError([Problem("second", f"got {second!r}, the same parameter as first; give another one")])
     plane = _Plane(rig, names, between or {}, branch)
@@ -193,7 +193,7 @@ class _Plane:
             raise NotAvailable("an edge with a delay cannot be followed in two parameters; stable_values has it in one")
         self.reference = 1.0
         self.roles = [rig.parameters()[name].role for name in names]
-        given = {parameter_along(rig, name): pair for name, pair in between.items()}
+        given = {rig.parameter_along(name): pair for name, pair in between.items()}
         unknown = [name for name in given if name not in names]
         if unknown:
             raise ParameterError([Problem(f"between.{n}", f"is not one of {' and '.join(names)}") for n in unknown])

@@ -283,7 +283,7 @@ class CycleBranch(Displayed):
     @property
     def _drop(self) -> str:
         """Label of the stress drop (or force drop of a machine)."""
-        return stress_name("stress drop", self.rig.area) if isinstance(self.rig, Slider) else "force drop"
+        return stress_name(self.rig.result_name("stress drop"), self.rig.area)
 
     @property
     def interrupted(self) -> bool:
@@ -299,7 +299,7 @@ class CycleBranch(Displayed):
         """Summary of the branch and of those of twice the period."""
         area = self._area("value")
         edge = format_quantity(self.onset.value, self.unit, 6, area)
-        drops, drop_unit = ("stress_drop", "Pa") if isinstance(self.rig, Slider) else ("force_drop", "N")
+        drops, drop_unit = self.rig.result_name("stress_drop"), self.rig.result_unit("Pa")
         lines = [f"cycles along {self.along} from the {self.onset.title} at {edge}: {len(self.cycles)} cycles"]
         if self.cycles:
             v = self["peak_velocity"], self["lowest_velocity"]

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 from steadyslip.core.checks import Check, check
 from steadyslip.core.pages import Displayed
-from steadyslip.machine.machine import Machine
-from steadyslip.machine.slider import Slider
+from steadyslip.machine.rig import Rig
 from steadyslip.nonlinear.orbits.shooting import Orbit
 
 UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "stress_drop": "Pa",
@@ -20,11 +19,9 @@ RANGE_UNITS = {"peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1
                "lowest_normal_force": "N", "highest_normal_force": "N"}  # fmt: skip
 
 
-def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
+def quantities(rig: Rig) -> dict[str, tuple[str, str]]:
     """Attribute and SI unit of each quantity of a cycle, by its public name; stresses become forces for a machine."""
-    if isinstance(rig, Slider):
-        return {name: (name, unit) for name, unit in UNITS.items()}
-    return {name.replace("stress", "force"): (name, unit.replace("Pa", "N")) for name, unit in UNITS.items()}
+    return {rig.result_name(name): (name, rig.result_unit(unit)) for name, unit in UNITS.items()}
 
 
 OPEN = 1e-4  # largest allowed closing error, as a share of the cycle's size; Newton's method leaves an order less

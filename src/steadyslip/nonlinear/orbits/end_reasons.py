@@ -86,10 +86,8 @@ class EndRules:
         """Text of a reason, empty if there is none; names the contact of a machine."""
         if status not in ENDS:
             return ""
-        machine = isinstance(self.flow.rig, Machine)
-        words = {"force": "force", "block": "body", "damping": "a dashpot to the ground"} if machine else {
-            "force": "stress", "block": "slider", "damping": "radiation_damping"}  # fmt: skip
-        head, colon, reason = ENDS[status].format(**words).partition(": ")
+        rig = self.flow.rig
+        head, colon, reason = ENDS[status].format(force=rig.result_name("stress"), **rig.words).partition(": ")
         return f"{head} at {contact}{colon}{reason}" if contact else head + colon + reason
 
     def slows(self, now: BranchPoint) -> bool:

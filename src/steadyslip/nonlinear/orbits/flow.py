@@ -146,13 +146,10 @@ class FlowRunner:
     Raises
     ------
     NotAvailable
-        If the rig's motion is ill-posed, or pressed by a force prescribed in time.
+        If the rig is pressed by a force prescribed in time.
     """
 
     def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None, contact: int = 0) -> None:
-        if not jobs.posed[which if len(jobs.posed) > 1 else 0]:
-            what_to_do = remedy("ill-posed", machine=not jobs.point.model.is_slider)
-            raise NotAvailable(f"the motion of this rig is ill-posed: {what_to_do}")
         if jobs.point.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
         self.reduction, self.size, self.contact = jobs.reduction, len(jobs.reduction.state), contact
@@ -406,6 +403,11 @@ class Flow(FlowRunner):
         As for `FlowRunner`.
     contact : str, optional
         Name of the contact of a machine that is watched; the first unless given.
+
+    Raises
+    ------
+    NotAvailable
+        If the rig's motion is ill-posed, or pressed by a force prescribed in time.
     """
 
     def __init__(
@@ -418,6 +420,8 @@ class Flow(FlowRunner):
         self._settings: dict[float, FlowSetting] = {}
         own = float(address.value)  # type: ignore[arg-type]
         jobs = prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch)
+        if not jobs.posed[0]:
+            raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed', rig)}")
         names = [one.name for one in jobs.point.model.contacts]
         super().__init__(jobs, rtol=rtol, contact=names.index(contact) if contact else 0)
         self.rounding = self._rounding(own)

@@ -28,6 +28,19 @@ def test_every_disturbance_moves_the_rig(browser, tmp_path):
         visit.told("a number above 0")
 
 
+def test_a_run_that_ends_with_its_disturbance_is_drawn(browser, moved):
+    """The step lifts the block off: what there is to see is the time before it."""
+    with Visit(browser, moved["explorer"]) as visit:  # which hears the browser complain of numbers that are none
+        visit.told("slip event")
+        visit.page.get_by_label("after a disturbance").select_option("normal")
+        visit.page.get_by_label("size of the disturbance").fill("-50 MPa")
+        visit.page.get_by_label("size of the disturbance").press("Tab")
+        visit.told("It ends with the disturbance, at .*: the contact is lost")
+        frame, step = visit.page.locator(".strips .frame").first.bounding_box(), visit.page.locator(".strips .step")
+        assert not step.count() or step.bounding_box()["x"] <= frame["x"] + frame["width"] + 1
+        assert visit.page.locator(".strips .curve").first.get_attribute("d").startswith("M")
+
+
 def test_bare_numbers_count_in_the_unit_that_is_shown(browser, moved):
     """Size and length of a disturbance, as every parameter: what the field shows is what a number counts in."""
     with Visit(browser, moved["explorer"]) as visit:

@@ -1,6 +1,6 @@
 // Motion after a disturbance: curves over time, phase plane, events and moving sketch, with one time cursor for all.
 import { DISTURBANCES, Refused, asked, called } from "./disturbances.js";
-import { button, copy, make, svg, tell } from "./dom.js";
+import { button, copy, make, putAt, svg, tell } from "./dom.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
@@ -10,7 +10,7 @@ import { outcome, quantity, slow } from "./words.js";
 
 /** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; indices of those of the phase plane */
 
-const LEAD = 0.08; // part of the time after the disturbance that is drawn before it
+const LEAD = 0.08, BRIEF = 1e-6; // LEAD: part of the time after the disturbance that is drawn before it; BRIEF: time after the disturbance over that before it, below which the whole run is drawn
 const AWAY = 1e6; // velocity over that of steady sliding above which a run-away is not drawn
 const STILL = 1e-15, LOOSE = 1e-3; // slip rate and normal force over those of steady sliding below which the contact counts as stuck and as open
 const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // HIGH: height of a strip and PLANE: box of the phase plane, SVG units; LISTED: most events in the list; FILM: duration of replay, ms
@@ -157,7 +157,8 @@ export class Course {
       clearTimeout(this.late);
       this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own }));
       this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
-      this.course.since = Math.max(0, wanted.at - LEAD * (this.course.until - wanted.at)); // the curves begin just before the disturbance
+      const { at, until } = this.course;
+      this.course.since = until - at > BRIEF * at ? Math.max(0, at - LEAD * (until - at)) : 0; // the curves begin just before the disturbance
       this.told.textContent = outcome(this.course, this.page.rig.data);
       this.done.textContent = wanted.words;
       this.draw();
@@ -210,9 +211,9 @@ export class Course {
 
   draw() {
     if (!this.mover) return;
-    const { course } = this, shows = course ? "" : "none";
+    const { course } = this, drawn = course?.until > course?.since, shows = drawn ? "" : "none"; // a run that ends as it begins has no curves
     for (const part of [this.done, this.strips, this.phase.parentElement, this.time.parentElement, this.list, this.same]) part.style.display = shows;
-    if (!course) return;
+    if (!drawn) return;
     const past = this.before && this.before !== course && this.before.disturbance === course.disturbance ? [this.series(this.before)] : [], now = this.series(course), all = [...past, now];
     const { left, width } = this.page.size, { plane: [across, up] } = now, steady = (values) => values.every((one) => Math.abs(one - values[0]) <= 1e-6 * Math.abs(values[0]));
     const strips = now.shown.map((_, n) => n).filter((n) => n < 2 || !steady(now.shown[n][0]));
@@ -226,11 +227,11 @@ export class Course {
     this.strips.setAttribute("aria-label", `${now.shown.map(([, , label]) => label).join(", ")} over time: ${this.told.textContent}`);
     this.strips.replaceChildren(...parts.map((part) => part.group), ...(when < left + width ? [step] : []), ...(course.status === "blow-up" ? [svg("line", { class: "blow-up", x1: left + width, x2: left + width, y1: this.boxes[0].top, y2: bottom })] : []), this.cursor, ...this.dots);
     const named = (n) => /** @type {[string, string]} */ ([now.shown[n][1], now.shown[n][2]]);
-    const drawn = plane(PLANE, all.map((one) => ({ x: one.shown[across][0], y: one.shown[up][0] })), named(across), named(up));
+    const phase = plane(PLANE, all.map((one) => ({ x: one.shown[across][0], y: one.shown[up][0] })), named(across), named(up));
     this.mark = svg("circle", { class: "at", r: 5 });
     this.phase.setAttribute("aria-label", `${now.shown[up][2]} over ${now.shown[across][2]}`);
-    this.phase.replaceChildren(drawn.group, this.mark);
-    this.now = { ...now, strips, ups: parts.map((part) => part.up), drawn };
+    this.phase.replaceChildren(phase.group, this.mark);
+    this.now = { ...now, strips, ups: parts.map((part) => part.up), phase };
     this.sketch.take(course);
     this.table();
     this.show(Number(this.time.value) / 1000 || 0);
@@ -259,7 +260,7 @@ export class Course {
   /** Show the run at a time. @param {number} share of its duration, 0 to 1 */
   show(share) {
     if (!this.course || !this.now.times.length) return;
-    const { since, until } = this.course, at = since + Math.min(1, Math.max(0, share)) * (until - since), { times, shown: series, strips, drawn, plane: [across, up] } = this.now, { left, width } = this.page.size;
+    const { since, until } = this.course, at = since + Math.min(1, Math.max(0, share)) * (until - since), { times, shown: series, strips, phase, plane: [across, up] } = this.now, { left, width } = this.page.size;
     let low = 0, high = times.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
@@ -270,15 +271,9 @@ export class Course {
     const x = left + straight(this.course.since, this.course.until).of(at) * width;
     this.time.value = String(1000 * share);
     this.time.setAttribute("aria-valuetext", shown(at, "s"));
-    this.cursor.setAttribute("x1", x.toFixed(1));
-    this.cursor.setAttribute("x2", x.toFixed(1));
-    this.dots.forEach((dot, n) => {
-      const y = this.boxes[n].top + (1 - this.now.ups[n].of(between(series[strips[n]][0]))) * HIGH;
-      dot.setAttribute("cx", x.toFixed(1));
-      dot.setAttribute("cy", y.toFixed(1));
-    });
-    this.mark.setAttribute("cx", (PLANE.left + drawn.across.of(between(series[across][0])) * PLANE.width).toFixed(1));
-    this.mark.setAttribute("cy", (PLANE.top + (1 - drawn.up.of(between(series[up][0]))) * PLANE.height).toFixed(1));
+    putAt(this.cursor, { x1: x, x2: x });
+    this.dots.forEach((dot, n) => putAt(dot, { cx: x, cy: this.boxes[n].top + (1 - this.now.ups[n].of(between(series[strips[n]][0]))) * HIGH }));
+    putAt(this.mark, { cx: PLANE.left + phase.across.of(between(series[across][0])) * PLANE.width, cy: PLANE.top + (1 - phase.up.of(between(series[up][0]))) * PLANE.height });
     this.sketch.place(between, this.course);
     const { floor = 0 } = this.course.contacts[Number(this.view.value || 0)] ?? {};
     const now = series.map(([values, unit, label]) => (unit === "1" ? `friction ${Number.isNaN(between(values)) ? "–" : between(values).toPrecision(4)}` : label === "velocity" && floor ? `velocity ${slow(between(values), 1.5 * floor)}` : `${label === "ahead" ? "ahead by" : label} ${shown(between(values), unit, unit === "N" || unit === "Pa" ? 4 : 3)}`));

@@ -34,6 +34,13 @@ export function put(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
+/** Place an element of a drawing; one without a place, as where a value is not finite, is hidden. @param {any} element @param {Record<string, number>} places */
+export function putAt(element, places) {
+  const all = Object.entries(places), display = all.every(([, at]) => Number.isFinite(at)) ? "" : "none";
+  if (element.style.display !== display) element.style.display = display;
+  if (!display) for (const [name, at] of all) element.setAttribute(name, at.toFixed(1));
+}
+
 /** Set the text of an element only if it changes. @param {any} element @param {string} text */
 export function tell(element, text) {
   if (element.textContent !== text) element.textContent = text;

@@ -1,6 +1,6 @@
 // Stability chart over two parameters with the point of the rig.
 import { CLASSES, regions } from "./chart.js";
-import { make, put, svg } from "./dom.js";
+import { make, put, putAt, svg } from "./dom.js";
 import { axis } from "./plot.js";
 import { told } from "./quantities.js";
 
@@ -85,8 +85,7 @@ export class Chart {
       this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, WRITTEN[name])));
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
-    this.point.setAttribute("cx", String(box.left + at[0] * box.width));
-    this.point.setAttribute("cy", String(box.top + (1 - at[1]) * box.height));
+    putAt(this.point, { cx: box.left + at[0] * box.width, cy: box.top + (1 - at[1]) * box.height });
     const words = [i, j].map((n) => `${parameters[n].title} ${told(parameters[n], rig.values[n])}`);
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
   }

@@ -57,13 +57,13 @@ export function axis(box, scale, [low, high], one, label, upright) {
   return group;
 }
 
-/** Lowest and highest value of several series, without NaN; [0, 1] if there are none. @param {ArrayLike<number>[]} all @returns {[number, number]} */
+/** Lowest and highest finite value of several series; [0, 1] if there are none. @param {ArrayLike<number>[]} all @returns {[number, number]} */
 export function extent(...all) {
   let low = Infinity, high = -Infinity;
   for (const values of all) {
     for (let i = 0; i < values.length; i++) {
-      if (values[i] < low) low = values[i];
-      if (values[i] > high) high = values[i];
+      if (values[i] < low && values[i] > -Infinity) low = values[i];
+      if (values[i] > high && values[i] < Infinity) high = values[i];
     }
   }
   return low <= high ? [low, high] : [0, 1];
@@ -72,8 +72,8 @@ export function extent(...all) {
 /** Scale for values from low to high with a margin; logarithmic for positive velocities that span decades. @returns {Span} */
 export function spanning([low, high], label) {
   if (label === "velocity" && low > 0 && high / low > 30) {
-    const a = low / 1.15, b = high * 1.15;
-    return { scale: { at: (t) => a * (b / a) ** t, of: (v) => Math.log(v / a) / Math.log(b / a) }, range: [a, b], logarithmic: true };
+    const a = low / 1.15, b = high * 1.15, along = straight(Math.log(a), Math.log(b)); // logarithms, as b / a may overflow
+    return { scale: { at: (t) => Math.exp(along.at(t)), of: (v) => along.of(Math.log(v)) }, range: [a, b], logarithmic: true };
   }
   const room = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1, a = low - room, b = high + room;
   return { scale: straight(a, b), range: [a, b], logarithmic: false };
@@ -95,7 +95,7 @@ export function pathOver(box, times, values, along, up) {
   for (let i = 0; i < times.length; i++) {
     const x = box.left + along.of(times[i]) * box.width, y = clipped(box.top + (1 - up.of(values[i])) * box.height);
     if (x > box.left + box.width + 0.1) break;
-    if (Number.isNaN(y)) { // a gap
+    if (!Number.isFinite(x) || Number.isNaN(y)) { // a gap
       [pen, column, outside] = ["M", -1, []];
       continue;
     }

@@ -1,4 +1,6 @@
 // Moving sketches: block, load point and ground of a slider, bodies and links of a machine.
+import { extent } from "./plot.js";
+
 const SHIFT = 16, MOVING = ".ground, .body, .link"; // SHIFT: largest displacement of the block in the sketch, SVG units
 
 export class Sketch {
@@ -15,14 +17,14 @@ export class Sketch {
 
   /** @param {any} course */
   take(course) {
-    const [x] = course.x, most = course.x.reduce((a, b) => Math.max(a, Math.abs(b - x)), 0);
-    this.gain = most > 0 ? SHIFT / most : 0;
-    this.first = x;
+    this.gain = gainFor(SHIFT, lead(course.x));
+    this.first = course.x[0];
   }
 
   /** Move all parts to a time: slip relative to the load point and displacement of that, m. @param {(series: any) => number} now @param {any} course */
   place(now, course) {
     const x = now(course.x), load = now(course.load), shift = this.gain * (x - this.first), passed = this.gain * load;
+    if (!Number.isFinite(shift + passed)) return; // the sketch stays where it was
     for (const part of this.parts) {
       if (part.classList.contains("ground")) part.setAttribute("transform", `translate(${-(passed % this.period)} 0)`);
       else if (part.classList.contains("body")) part.setAttribute("transform", `translate(${shift} 0)`);
@@ -35,6 +37,15 @@ export class Sketch {
     between(part, x1 + shift, y1, x2, y2, 1);
   }
 }
+
+/** Largest finite distance from the first value of a series. @param {any} series */
+function lead(series) {
+  const [low, high] = extent(series);
+  return series.length ? Math.max(high - series[0], series[0] - low) : 0;
+}
+
+/** Scale that shows the largest displacement at a given size; 0 if there is none. @param {number} size @param {number} most */
+const gainFor = (size, most) => (most > 0 && Number.isFinite(size / most) ? size / most : 0);
 
 /** Place a link, drawn with a given length, between two points. */
 function between(part, x1, y1, x2, y2, unit) {
@@ -60,8 +71,8 @@ export class MachineSketch {
   /** @param {any} course */
   take(course) {
     const most = [0, 0]; // largest lead of sliding and of turning bodies
-    course.bodies.forEach(({ x }, n) => (most[Number(this.bodies[n].turns)] = x.reduce((a, b) => Math.max(a, Math.abs(b - x[0])), most[Number(this.bodies[n].turns)])));
-    const gain = [most[0] > 0 ? SHIFT / most[0] : 0, most[1] > 0 ? TURN / most[1] : 0];
+    course.bodies.forEach(({ x }, n) => (most[Number(this.bodies[n].turns)] = Math.max(lead(x), most[Number(this.bodies[n].turns)])));
+    const gain = [gainFor(SHIFT, most[0]), gainFor(TURN, most[1])];
     this.gain = this.bodies.map(({ turns }) => gain[Number(turns)]);
   }
 
@@ -69,6 +80,7 @@ export class MachineSketch {
   place(now, course) {
     const moved = /** @type {Record<string, number>} */ ({});
     this.bodies.forEach(({ name }, n) => (moved[name] = this.gain[n] * (now(course.bodies[n].x) - course.bodies[n].x[0])));
+    if (!Object.values(moved).every(Number.isFinite)) return;
     for (const part of this.parts) {
       const { body, turns } = part.dataset;
       part.setAttribute("transform", turns ? `rotate(${moved[body]} ${turns})` : `translate(${moved[body] ?? 0} ${-(moved[`${body}.normal`] ?? 0)})`);

@@ -1,6 +1,7 @@
 // Sentences of the page about verdicts and motions.
 import { ABSENT, SAME, STABLE, UNKNOWN } from "./linear.js";
 import { fill } from "./modes.js";
+import { extent } from "./plot.js";
 import { digits, shown, told } from "./quantities.js";
 import { NEW } from "./rig.js";
 
@@ -115,10 +116,11 @@ export const slow = (v, floor) => (Math.abs(v) < floor ? "0 (stuck)" : shown(v, 
 /** Sentence on the result of a motion. @param {any} course @param {any} data */
 export function outcome({ events, status, end, contacts, at }, { area, phrases, judders }) {
   if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: neither mass nor damping limits the velocity.`;
-  const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;
+  const ended = status === "done" ? "" : ` It ends ${end === at ? "with the disturbance, " : ""}at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;
+  if (!(end > 0) || !contacts[0].v.length) return `No motion: it ends as it begins, as ${ENDED[status] ?? status}.`;
   if (!events.length) {
     const ranges = contacts.map(({ name, v, floor }) => {
-      const least = v.reduce((a, b) => Math.min(a, b), Infinity), most = v.reduce((a, b) => Math.max(a, b), -Infinity);
+      const [least, most] = extent(v);
       return `${name ? `${name} ` : ""}${slow(least, floor)} to ${slow(most, floor)}`;
     });
     return `No slip event; ${phrases ? "slip rate of " : "velocity "}${ranges.join(", of ")}.${ended}`;

@@ -38,8 +38,8 @@ export class Banner {
     this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: one.name, textContent: one.title, selected: i === page.rig.bar })));
     this.choice.addEventListener("change", () => page.tell(this.choice.selectedIndex));
     this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar ", this.choice));
-    const ask = (kind) => make("button", { type: "button", textContent: kind, onclick: () => page.guessed(kind) });
-    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ask("unstable"));
+    const ask = (kind, textContent = kind) => make("button", { type: "button", textContent, onclick: () => page.guessed(kind) });
+    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ask("unstable"), " ", ask("none", "no steady sliding"));
     this.box = make("section", { className: "verdict", "aria-label": "verdict", tabIndex: -1 }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice, guess);
   }
 

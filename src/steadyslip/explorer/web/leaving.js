@@ -12,13 +12,15 @@ export function leaving(page) {
     make("a", { href: address, download: `${title}-${name}` }).click();
     setTimeout(() => URL.revokeObjectURL(address), 1000);
   };
-  const canvas = () => page.chart.canvas;
-  return [
-    ...(page.told ? [] : [button("link", "copy a link to what is shown", () => link(page))]),
-    button("rig file", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())),
+  const canvas = () => page.chart.canvas, tells = [
     button("chart SVG", "save the chart as a drawing", () => save("chart.svg", "image/svg+xml", drawing(canvas()))),
     button("chart PNG", "save the chart as a picture", () => picture(canvas()).then((blob) => save("chart.png", "image/png", blob), () => (page.banner.notice.textContent = "This browser cannot make a picture of the chart; save the drawing (SVG)."))),
     button("edges CSV", "save values and edges as a table", () => save("edges.csv", "text/csv", listed(page))),
+  ];
+  for (const one of tells) one.className = "tells";
+  return [
+    ...(page.told ? [] : [button("link", "copy a link to what is shown", () => link(page))]),
+    button("rig file", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())), ...tells,
   ];
 }
 

@@ -172,8 +172,16 @@ export class Page {
   guess(pressed) {
     this.guessing = !this.guessing;
     put(pressed, "aria-pressed", String(this.guessing));
-    if (this.guessing) this.root.dataset.guess = "yes";
-    else delete this.root.dataset.guess;
+    delete this.root.dataset.guess;
+    this.hide();
+  }
+
+  /** Hide all that tells the verdict while it is to be guessed; what that is stands in the style sheet. */
+  hide() {
+    if (!this.guessing) return;
+    this.say("");
+    this.open(OPENED.values);
+    this.root.dataset.guess = "yes";
   }
 
   /** Show the verdict after a guess, and say whether it was right. @param {string} kind */
@@ -239,7 +247,7 @@ export class Page {
     }
     this.future = [];
     this.rig.values = values;
-    if (this.guessing) this.root.dataset.guess = "yes";
+    this.hide();
     this.redraw();
   }
 
@@ -255,6 +263,7 @@ export class Page {
     if (!values) return;
     to.push(this.rig.values);
     this.rig.values = values;
+    this.hide();
     this.fit(values);
     this.course?.keep();
     this.redraw();

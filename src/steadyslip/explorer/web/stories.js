@@ -17,7 +17,7 @@ export function stories(page) {
   for (const [words, times] of /** @type {[string, number][]} */ ([["ten times as fast", 10], ["a tenth of the speed", 0.1]])) {
     if (drive >= 0 && inside(parameters[drive], times * home[drive])) found.push([words, drive, times * home[drive]]);
   }
-  const select = make("select", { "aria-label": "stories", title: "rigs to begin with" }, make("option", { textContent: "stories …", value: "" }), make("option", { textContent: "the rig of the file", value: "-1" }),
+  const select = make("select", { className: "tells", "aria-label": "stories", title: "rigs to begin with" }, make("option", { textContent: "stories …", value: "" }), make("option", { textContent: "the rig of the file", value: "-1" }),
     ...found.map(([words], n) => make("option", { textContent: words, value: String(n) })));
   select.addEventListener("change", () => {
     const [, i, value] = found[Number(select.value)] ?? ["", -1, 0];

@@ -292,14 +292,13 @@ def _twenty_cycles() -> float:
     from javascript import Script
     from steadyslip.explorer.motion import driver, motion_part
     from steadyslip.kernels.printers import javascript
-    from steadyslip.linear.boundary import present_zeros
 
     rig = ss.read_rig(EXAMPLES / "stick-slip.toml")
     text, facts = motion_part(rig, 0)
     base = f"{javascript.as_script(javascript.runtime(), driver())}\n{motion_text()}"
     made = f"new Motion({text}, {json.dumps(facts)}, {{ advance, observe }})"
     script = Script(f"{base}\nconst motion = {made};\nlet found = null;\nconst pause = async () => {{}};")
-    point = operating_point(rig, None, [name for name in present_zeros(rig) if name not in facts["missing"]])
+    point = operating_point(rig, None, [name for name in rig.kept_zeros() if name not in facts["missing"]])
     ask = "(motion.set(values, [sigma]).run(asked, () => '', pause).then((r) => (found = r)), 0)"
     asked = {"disturbance": "velocity", "size": 2, "at": 10.0, "until": 750.0}
     given = {"values": [float(v) for v in point.arguments], "sigma": float(point.sigma), "asked": asked}

@@ -25,7 +25,6 @@ from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, stable_set
 from steadyslip.linear.roots import roots
 from steadyslip.model.point import operating_point
@@ -376,7 +375,7 @@ def moved_on_a_page(own, kind, until, stop=""):
     script = Script(f"{base}\nconst motion = {made};\nlet found = null;\nconst pause = async () => {{}};")
     if script.context is None:
         pytest.skip("Node starts anew for every question; this needs mini-racer")
-    kept = [name for name in present_zeros(own) if name not in facts["missing"]]
+    kept = [name for name in own.kept_zeros() if name not in facts["missing"]]
     point = operating_point(own, None, kept)
     asked = "{ disturbance: kind, size, at: 1, until }"
     run = f"motion.set(values, [sigma]).run({asked}, () => stop, pause).then((r) => (found = r))"
@@ -432,7 +431,7 @@ def test_scales_of_a_page_are_those_of_python(name):
     own = MOVING[name]
     text, facts = motion_part(own, 0)
     script = Script(f"{library()}\n{motion_text()}\nconst motion = new Motion({text}, {json.dumps(facts)}, null);")
-    kept = [one for one in present_zeros(own) if one not in facts["missing"]]
+    kept = [one for one in own.kept_zeros() if one not in facts["missing"]]
     point = operating_point(own, None, kept)
     reduction = reduce_model(point.model, eliminable(point))
     scales, _ = natural_scales(point, reduction)

@@ -15,7 +15,6 @@ from steadyslip.explorer.assembly import MODULES
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import driver, motion_part
 from steadyslip.kernels.printers import javascript
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.modes import mode_of
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
@@ -44,7 +43,7 @@ class Explored:
     """One kind of rig as JavaScript, which answers at the numbers of any rig of that kind."""
 
     def __init__(self, rig):
-        self.present = present_zeros(rig)
+        self.present = rig.kept_zeros()
         text, facts = linear_part(rig)
         self.script = Script(f"{library()}\nconst linear = new Linear({text}, {json.dumps(facts)});")
 

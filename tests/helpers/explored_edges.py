@@ -32,7 +32,6 @@ from rigs_of_theory import CONTACTS, LAWS, V0, rig
 from steadyslip.core.format import typeset
 from steadyslip.explorer.assembly import _data
 from steadyslip.explorer.equations import linear_part
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.causes import ILL_POSED, why_always_stable, why_never_stable
@@ -95,7 +94,7 @@ class Edges:
 
 def judged(rig):
     """Status of a rig in Python, and whether rounding decides on it."""
-    point = operating_point(rig, None, present_zeros(rig))
+    point = operating_point(rig, None, rig.kept_zeros())
     found = int(status(point))
     return found, found in (STABLE, UNSTABLE) and bool(on_edge(point))
 

@@ -31,6 +31,7 @@ from steadyslip.laws import contact as contact_laws, friction as friction_laws
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 from steadyslip.protocol import Protocol
@@ -168,6 +169,7 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
 
 
 def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
+    found.refuse_machine()
     record, settings = found.further.get("record"), found.further.get("fit")
     settings = settings if isinstance(settings, FitSettings) else FitSettings()
     missing = filled.missing - found.changed
@@ -178,7 +180,7 @@ def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
         left += members.faults()
         if settings.compare:
             left.append(Problem("fit.compare", "cannot be combined with [population]; fit one law"))
-    rig = found.checked_rig(*filled.problems, *left)
+    rig = found.checked_slider(*filled.problems, *left)
     own = ("states", "compare", "windows")
     options = {n: list(v) if isinstance(v, tuple) else v for n, v in given(settings).items() if n not in own}
     if settings.free is None and missing:
@@ -379,7 +381,7 @@ def _kind(item: Field[Any]) -> str:
     return role.kind if isinstance(role, Parameter) else ""
 
 
-def _values_missing(missing: set[str], settings: FitSettings, rig: Slider) -> list[Problem]:
+def _values_missing(missing: set[str], settings: FitSettings, rig: Slider | Machine) -> list[Problem]:
     """Problems with parameters that have no value and are not fitted, whose placeholders must not be used."""
 
     problems: list[Problem] = []

@@ -30,7 +30,6 @@ from steadyslip.explorer.motion import DRIVER, driver, motion_part
 from steadyslip.explorer.own_file import display_unit, own_file
 from steadyslip.explorer.sketch import sketch
 from steadyslip.kernels.printers import javascript
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.search import Search
 from steadyslip.linear.status import STABLE, UNSTABLE, status
@@ -179,7 +178,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
 
     names = list(_variable_parameters(rig, facts))
     places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
-    point = operating_point(rig, None, present_zeros(rig), branch)
+    point = operating_point(rig, None, rig.kept_zeros(), branch)
     hints = [one.contact.lock_up for one in rig.laws_by_contact().values()]
     axial, file = "slider.axial_stiffness", own_file(rig, names, text)
     return {
@@ -253,7 +252,7 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     one = rig.parameters()[name]
     domain, value = one.role.domain, float(one.value or 0.0)
     factor, unit = display_unit(rig, one.role.unit)
-    natural = Search(rig, name, present_zeros(rig), branch).natural_size()
+    natural = Search(rig, name, rig.kept_zeros(), branch).natural_size()
     group = _group(rig, name)
     found = {
         "name": name,
@@ -281,7 +280,7 @@ _MEMBERS = {"bodies": "body", "links": "link", "contacts": "contact"}
 def _group(rig: Slider | Machine, name: str) -> str:
     """Heading of a parameter on the page."""
     kind, _, rest = name.partition(".")
-    return f"{_MEMBERS[kind]} {rest.partition('.')[0]}" if isinstance(rig, Machine) and kind in _MEMBERS else kind
+    return f"{_MEMBERS[kind]} {rest.partition('.')[0]}" if kind in _MEMBERS else kind
 
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
@@ -300,7 +299,7 @@ def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[s
 
 
 def _answer(rig: Slider | Machine, names: list[str], branch: int, bar: str | None) -> dict[str, Any]:
-    point = operating_point(rig, None, present_zeros(rig), branch)
+    point = operating_point(rig, None, rig.kept_zeros(), branch)
     answer: dict[str, Any] = {
         "values": [float(rig.value(name) or 0.0) for name in names],
         "status": int(status(point)),

@@ -19,7 +19,6 @@ from steadyslip.explorer.sliding import needs_search, steady_programs
 from steadyslip.kernels.nodes import Node, Program, Value, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing, cubic
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.response import has_closed_form, response
 from steadyslip.linear.status import ON_THE_EDGE
@@ -40,7 +39,7 @@ SLIP_RATE = "slip_rate"  # name of the slip velocity of a contact on pages
 
 def page_model(rig: Slider | Machine) -> Model:
     """Model of a rig in which zero terms that a page can vary are kept."""
-    return build_model(rig, present_zeros(rig))
+    return build_model(rig, rig.kept_zeros())
 
 
 def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
@@ -134,8 +133,7 @@ def _shown_observables(model: Model) -> tuple[list[str], list[sp.Expr]]:
     unseen = {f"{one.name}.x" for one in model.coordinates}
     unseen |= {f"{one.name}.v" for one in model.coordinates if one.speed == 0}
     kept = [(name, value) for name, value in zip(names, values, strict=True) if name not in unseen]
-    contacts = () if model.is_slider else model.contacts
-    slips = [(f"{one.name}.{SLIP_RATE}", model.steady[one.velocity]) for one in contacts]
+    slips = [(f"{one.name}.{SLIP_RATE}", model.steady[one.velocity]) for one in model.contacts if one.name]
     return [name for name, _ in (*slips, *kept)], [sp.sympify(value) for _, value in (*slips, *kept)]
 
 

@@ -20,7 +20,6 @@ from steadyslip.kernels.nodes import Program, as_node
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
 from steadyslip.kernels.runner import LOG_KINDS, STATUSES, TALLY
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
@@ -66,9 +65,9 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
         If the rig does not slide steadily, its motion is ill-posed, or an equation cannot be printed.
     """
     inertial = build_model(rig).inertial
-    kept = [name for name in present_zeros(rig) if inertial or not build_model(rig, [name]).inertial]
+    kept = [name for name in rig.kept_zeros() if inertial or not build_model(rig, [name]).inertial]
     point = operating_point(rig, None, kept, branch)
-    what = "machine" if isinstance(rig, Machine) else "rig"
+    what = rig.words["rig"]
     if not np.all(point.exists):
         raise NotAvailable(f"the {what} of the file does not slide steadily")
     if not np.all(well_posed(point)):
@@ -89,7 +88,7 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
     functions = "".join(javascript.text(one) for one in (*programs, *segments))
     own, several = (", ".join(one.name for one in some) for some in (programs, segments))
     text = f"(() => {{\n{functions}return {{ {own}, segments: {{ {several} }}, ...{kernel_text} }};\n}})()"
-    facts = _facts(reduction, kernel, set(present_zeros(rig)) - set(kept))
+    facts = _facts(reduction, kernel, set(rig.kept_zeros()) - set(kept))
     facts |= {"shares": shares.places(), "behind": len(shares.symbols)}
     return text, facts | {"segments": max(len(one.stores) for one in segments) // facts["segment"]}
 

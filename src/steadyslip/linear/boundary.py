@@ -112,9 +112,9 @@ def boundary(
         _require_answers(rig, branch)
         if limits is not None:
             operating_point(
-                rig, {full: np.asarray(limits)}, _kept(rig, full), branch
+                rig, {full: np.asarray(limits)}, rig.kept_zeros(full), branch
             )  # refuses what breaks a condition
-        search = search_for(rig, full, _kept(rig, full), branch)
+        search = search_for(rig, full, rig.kept_zeros(full), branch)
     found = search.boundaries(limits)
     if unknown := _unknown(rig, search, *(limits or search.searched)):
         why = _ERRORS if isinstance(search, MeasuredSearch) else _TOO_MANY
@@ -149,11 +149,6 @@ def _require_answers(rig: Rig, branch: int) -> None:
     require_digits(point)
 
 
-def _kept(rig: Rig, name: str) -> tuple[str, ...]:
-    """Names of zero parameters whose terms stay in the equations while the parameter `name` is varied."""
-    return (name,) if isinstance(rig, Machine) and not rig.value(name) else present_zeros(rig)
-
-
 @checked()
 def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first.
@@ -184,7 +179,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
     """
     if not by_matrices(rig):
         _require_answers(rig, branch)
-    present = present_zeros(rig)
+    present = rig.kept_zeros()
     asked = [
         (name, address)
         for name, address in rig.parameters().items()
@@ -242,20 +237,6 @@ def _urgency(margin: Margin) -> float:
         return 1e300
     distance = abs(margin.absolute if margin.unit == "rad" else margin.relative)
     return float(f"{distance:.{_TIED}g}") if distance > 10.0**-_TIED else 0.0
-
-
-def present_zeros(rig: Rig) -> tuple[str, ...]:
-    """Names of a slider's parameters that are zero but stay in the equations, so that they can be varied from zero.
-
-    Empty for a machine: masses and dampings kept so would raise the degree of its polynomial and hide other edges.
-    """
-    if isinstance(rig, Machine):
-        return ()
-    return tuple(
-        name
-        for name, a in rig.parameters().items()
-        if a.role.structural and a.value == 0 and not a.role.adds_state and a.role.kind != "delay"
-    )
 
 
 def _role(rig: Rig, full: str) -> Parameter:

@@ -22,7 +22,7 @@ from steadyslip.model import Model
 from steadyslip.model.eigenvalues import Matrices, blocks_of, descriptor
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import hidden_by_stiffest, out_of_range_error, require_range
-from steadyslip.model.sliding import explain_absence, steady_state
+from steadyslip.model.sliding import steady_state
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
@@ -66,10 +66,7 @@ def state_matrices(
             "a delay has no state space of finitely many variables; eigenvalues gives the rightmost ones"
         )
     require_range(point)
-    if isinstance(rig, Machine):
-        steady_state(rig)  # raises, and says which contact locks or lifts
-    elif not point.all_stresses():
-        raise explain_absence(rig, point)
+    steady_state(rig)  # raises, and says which contact locks or lifts
     if is_ill_posed(point):
         raise NotAvailable("ill-posed: the friction law does not determine the motion (its direct effect is zero)")
     blocks = blocks_of(point, outputs, known)
@@ -113,10 +110,8 @@ def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
 
 def _usual_outputs(model: Model) -> tuple[str, ...]:
     """Of a slider those of the paper, of a machine places and velocities, and friction and normal forces."""
-    if model.is_slider:
-        return ("x", "v", "shear_stress", "normal_stress")
-    ends = (".x", ".v", ".friction_force", ".normal_force")
-    return tuple(name for name in model.observables if name.endswith(ends))
+    usual = {"x", "v", "shear_stress", "friction_force", "normal_stress", "normal_force"}
+    return tuple(name for name in model.observables if name.rpartition(".")[2] in usual)
 
 
 @checked()

@@ -314,11 +314,13 @@ class Machine(Rig):
         return piece.channel == protocol.DISTURBANCE and self.turns_on(getattr(piece, "on", None))
 
     def turns_on(self, body: str | None) -> bool:
-        """True if the named body rotates; None names the only body of a machine that has one."""
         name = body or (next(iter(self.bodies)) if len(self.bodies) == 1 else "")
         # a misspelt name is reported later, by motion/targets.py
         meant = [name] if name in self.bodies else get_close_matches(name, self.bodies, 1)
         return any(self.bodies[one].turns for one in meant)
+
+    def kept_zeros(self, name: str | None = None) -> tuple[str, ...]:
+        return () if name is None or self.value(name) else (name,)
 
     def check_branch(self, branch: int) -> None:
         if branch:

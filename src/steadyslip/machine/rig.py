@@ -71,6 +71,10 @@ class Rig(FrozenRecord, Keeper):
         """SI unit of a quantity of a piece of a protocol on this rig; `unit` is the declared one."""
         return unit
 
+    def turns_on(self, body: str | None) -> bool:
+        """True if the named body rotates; None names the only body of a rig that has one."""
+        return False
+
     @property
     def protocol_area(self) -> float | None:
         """Area (m²) by which stresses in a protocol are multiplied to be written as forces; None if they are not."""
@@ -124,6 +128,18 @@ class Rig(FrozenRecord, Keeper):
     def declared(self) -> dict[str, Address]:
         """Collect the parameters (uncached)."""
         return parameters(self)
+
+    def gain_name(self) -> str | None:
+        """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
+        return None
+
+    def kept_zeros(self, name: str | None = None) -> tuple[str, ...]:
+        """Names of parameters that are zero but stay in the equations, so that they can be varied from zero.
+
+        For a machine that is at most `name`, the one that is varied: masses and dampings kept so would raise the degree
+        of its polynomial and hide other edges.
+        """
+        raise NotImplementedError
 
     def parameter_along(self, name: str) -> str:
         """Full name of a parameter; a slider's "stiffness" becomes what it has: a spring's, a press's, or a gain kp."""

@@ -89,12 +89,18 @@ class Slider(Rig, section="slider"):
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
+    def kept_zeros(self, name: str | None = None) -> tuple[str, ...]:
+        return tuple(
+            name
+            for name, a in self.parameters().items()
+            if a.role.structural and a.value == 0 and not a.role.adds_state and a.role.kind != "delay"
+        )
+
     def parameter_along(self, name: str) -> str:
         full = self.resolve(name)
         return self.stiffness_name() if full == "slider.stiffness" and self.stiffness is None else full
 
     def gain_name(self) -> str | None:
-        """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
         names = [name for name in self.of_kind("stiffness") if name.startswith("drive.")]
         if len(names) != 1 or self.value(names[0]) != self.drive.proportional():
             return None

@@ -85,8 +85,7 @@ def read_experiment(
     changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
     rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
-    machine = rig if isinstance(rig, Machine) else None
-    added = _pieces(pieces, rig.area, machine)
+    added = _pieces(pieces, rig)
     end = protocol.until if until is None else _seconds(until)
     if end is None and ends:
         raise ParameterError(
@@ -103,12 +102,12 @@ def progress_of(protocol: Protocol) -> Iterator[Callable[[float], None]]:
         yield lambda time: said(f"simulating, at {format_quantity(time, 's')} of {end}; Ctrl-C keeps what there is")
 
 
-def _pieces(texts: Iterable[str], area: float | None, machine: Machine | None) -> list[Piece]:
+def _pieces(texts: Iterable[str], rig: Slider | Machine) -> list[Piece]:
     """Parse pieces; raises all problems together."""
     found, problems = [], []
     for text in texts:
         try:
-            found.append(piece_from_text(text, area, machine))
+            found.append(piece_from_text(text, rig.area, rig))
         except ParameterError as error:
             problems += [problem.under(repr(text)) for problem in error.problems]
     if problems:

@@ -31,7 +31,7 @@ from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.nonlinear.kicks.basin import Basin, basin
-from steadyslip.nonlinear.kicks.kicks import kick_problems
+from steadyslip.nonlinear.kicks.kicks import kick_problems, kicks_of
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
@@ -122,7 +122,7 @@ def thresholds_of_file(
 ) -> Thresholds:  # fmt: skip
     """`thresholds_shown` for the rig of a file; for the usual kicks unless some are given."""
     rig = read_rig(path, changes)
-    usual = ("velocity",) if isinstance(rig, Machine) else ("velocity", "displacement")
+    usual = tuple(name for name, kick in kicks_of(rig).items() if kick.usual)
     return thresholds_shown(rig, tuple(kicks) or usual, at=at, direction=-1 if reverse else 1, reference=reference)
 
 

@@ -17,7 +17,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.linear import formula as linear_formula
-from steadyslip.linear.boundary import Margin, margins, margins_and_missing, present_zeros
+from steadyslip.linear.boundary import Margin, margins, margins_and_missing
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.machine import Machine
@@ -128,7 +128,7 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
             return Analysis(rig=rig, stable=None, reason=why, margins=margins(rig), version=__version__)
         if not 0 <= branch < len(states):
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
-        values = operating_point(rig, None, present_zeros(rig), branch)
+        values = operating_point(rig, None, rig.kept_zeros(), branch)
         numbers = numbers_of(rig, values)
         on_the_edge = bool(on_edge(values)) or decided_by_rounding(values)
         checks = verdict_checks(rig, values, numbers["stable"], on_the_edge)

@@ -33,7 +33,7 @@ def comparable(first: Slider | Machine, second: Slider | Machine) -> tuple[Slide
 
     Where areas differ, in those in which fewer values differ.
     """
-    if not (isinstance(first, Slider) and isinstance(second, Slider)) or first.area == second.area:
+    if first.area == second.area:
         return first, second
     stresses = replaced(first, {"slider.area": None}), replaced(second, {"slider.area": None})
     if first.area is None or second.area is None:
@@ -42,7 +42,7 @@ def comparable(first: Slider | Machine, second: Slider | Machine) -> tuple[Slide
     return min(stresses, totals, key=lambda pair: len(list(differing(*pair))))
 
 
-def _in_totals(rig: Slider) -> Slider:
+def _in_totals(rig: Slider | Machine) -> Slider | Machine:
     values = {name: one for name, one in rig.parameters().items() if one.value is not None}
     stresses = {name: one.value * rig.area for name, one in values.items() if is_per_area(one.role.unit)}  # type: ignore[operator]
     return replaced(rig, stresses | {"slider.area": 1.0})
@@ -121,7 +121,7 @@ class Between:
         with np.errstate(all="ignore"):
             found.words[rows] = np.broadcast_to(np.array(WORDS)[status(point)], rows.shape)
             found.growth[rows] = growth(point)
-            if isinstance(rig, Slider):
+            if rig.default_along:
                 found.safety[rows] = own_safety_factor(point)
 
     def _varies(self, place: Place) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 
 from steadyslip.core.arrays import Array, valid_together
 from steadyslip.files.specifications.tolerance_tables import Tolerances
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import STABLE, status
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -100,7 +99,7 @@ class Chances:
             varied[name] = np.broadcast_to(moved.quantile(shares[name].ravel()), (rows, size))
         flat = {name: values.ravel() for name, values in varied.items()}
         possible = np.broadcast_to(valid_together(self.rig, "", flat), rows * size) if flat else np.array([True])
-        point = operating_point(self.rig, flat, present_zeros(self.rig), scan=True)
+        point = operating_point(self.rig, flat, self.rig.kept_zeros(), scan=True)
         found = np.broadcast_to(status(point) == STABLE, rows * size)
         return found.reshape(rows, size), possible.reshape(rows, size)
 

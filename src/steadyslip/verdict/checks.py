@@ -22,7 +22,7 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.linear.allowance import at_most
-from steadyslip.linear.boundary import Margin, present_zeros, without_edges
+from steadyslip.linear.boundary import Margin, without_edges
 from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
@@ -300,7 +300,7 @@ def _rigs_beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: floa
         allowed = rig.parameters()[margin.parameter].role.domain.contains(beside[:, at])
         own[:, at] = np.where(allowed, beside[:, at], values[at])
         vary[margin.parameter] = own.ravel()
-    return operating_point(rig, vary, present_zeros(rig), branch, scan=True)
+    return operating_point(rig, vary, rig.kept_zeros(), branch, scan=True)
 
 
 def _sides_agree(edge: Boundary, below: int, above: int) -> bool:

@@ -213,7 +213,7 @@ def compare_rigs(
     >>> [one.parameter for one in found.differences]
     ['slider.stiffness']
     """
-    if isinstance(first, Slider) != isinstance(second, Slider):
+    if type(first) is not type(second):
         message = "one is a slider and the other a machine; describe the slider as a machine of one body"
         raise ParameterError([Problem("rigs", message)])
     a, b = comparable(first, second)

@@ -16,7 +16,6 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.specifications.tolerance_tables import Tolerances
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
@@ -365,7 +364,7 @@ class _Outcomes:
 
 
 def _outcomes(rig: Slider | Machine, varied: Mapping[str, Array], along: str) -> _Outcomes:
-    found = status(operating_point(rig, varied, present_zeros(rig)))
+    found = status(operating_point(rig, varied, rig.kept_zeros()))
     growth = np.asarray(growth_rate(rig, varied), dtype=float)
     edge = safety = np.full(len(growth), np.nan)
     if along:

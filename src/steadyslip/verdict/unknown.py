@@ -16,7 +16,6 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
-from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import STABLE, status
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -168,7 +167,7 @@ def _spread(low: float, high: float, share: Array) -> Array:
 
 
 def _is_stable(rig: Slider | Machine, varied: Mapping[str, Array]) -> Array:
-    return np.asarray(status(operating_point(rig, varied, present_zeros(rig))) == STABLE)
+    return np.asarray(status(operating_point(rig, varied, rig.kept_zeros())) == STABLE)
 
 
 def _values(rig: Slider | Machine, name: str, low: float, high: float) -> ValuesWithin:
@@ -187,7 +186,7 @@ def _values(rig: Slider | Machine, name: str, low: float, high: float) -> Values
 
 def _load(rig: Slider | Machine) -> float | None:
     """Normal force (N) of a slider with an area in steady sliding; None for others."""
-    if not isinstance(rig, Slider) or rig.area is None:
+    if rig.area is None:
         return None
     with suppress(SteadyslipError):
         return float(steady_state(rig).normal_stress * rig.area)

@@ -226,7 +226,7 @@ def stable_speeds(analysis: Verdict) -> list[tuple[str, str]]:
 def onset_words(onset: Onset) -> str:
     """Sentence on the kind of onset; for a subcritical one with the size of the unstable oscillation at this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
-    if not isinstance(onset.rig, Slider):
+    if onset.rig.default_along is None:
         text = text.replace("edge in stiffness", f"edge in {onset.along}")
     elif onset.along == onset.rig.gain_name():
         text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.along)}")

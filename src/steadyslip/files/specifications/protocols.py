@@ -13,7 +13,7 @@ from steadyslip.files.specifications.layout import selector
 from steadyslip.files.specifications.read import protocol_of, text_of
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import Table
-from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.protocol import Piece, Protocol
 
 
@@ -60,7 +60,7 @@ def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = 
 
 
 @checked()
-def piece_from_text(text: str, area: float | None = None, machine: Machine | None = None) -> Piece:
+def piece_from_text(text: str, area: float | None = None, machine: Rig | None = None) -> Piece:
     """Read one piece of a protocol from a line of text.
 
     Parameters
@@ -98,7 +98,7 @@ def piece_from_text(text: str, area: float | None = None, machine: Machine | Non
             reader.problem(name, "is given twice")
         else:
             table[name] = value_of(raw, name)
-    with reader.of_machine(machine):
+    with reader.of_rig(machine):
         piece = reader.record(Piece, table, "")
     if reader.problems:
         raise ParameterError(reader.problems, title=repr(text))

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import Any
+from typing import Any, cast
 
 from steadyslip.core.domains import positive, speed
 from steadyslip.core.errors import (
@@ -44,6 +44,7 @@ from steadyslip.files.structures.named_files import with_structures
 from steadyslip.machine.ends import unknown_ends
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -120,12 +121,12 @@ def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -
     """
     found = read_contents(_not_empty(text, source), source, changes)
     found.refuse()
-    return found.checked_rig() if found.machine is None else found.machine
+    return found.checked_rig()
 
 
 def slider_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
     """Read a slider from TOML text; NotAvailable for a machine."""
-    return read_contents(_not_empty(text, source), source, changes).checked_rig()
+    return read_contents(_not_empty(text, source), source, changes).checked_slider()
 
 
 def protocol_of(text: str, source: str, changes: Iterable[str]) -> Protocol | None:
@@ -141,10 +142,8 @@ class RigFileContents:
 
     Attributes
     ----------
-    rig : Slider or None
+    rig : Slider, Machine or None
         None if absent or faulty.
-    machine : Machine or None
-        In place of a slider.
     protocol : Protocol or None
     further : dict of str to FrozenRecord
         Records of the declared further tables; of a faulty table, its valid part.
@@ -158,8 +157,7 @@ class RigFileContents:
     """
 
     source: str
-    rig: Slider | None
-    machine: Machine | None
+    rig: Slider | Machine | None
     protocol: Protocol | None
     further: dict[str, FrozenRecord]
     problems: list[Problem]
@@ -167,11 +165,6 @@ class RigFileContents:
     lines: dict[str, int] = field(repr=False)
     tables: Table = field(repr=False)
     tolerances: dict[str, Tolerance] = field(repr=False)
-
-    @property
-    def given(self) -> Slider | Machine | None:
-        """The slider or machine; None if absent or faulty."""
-        return self.machine if self.rig is None else self.rig
 
     def line(self, name: str) -> int | None:
         """Line of a key, or of the table around it."""
@@ -188,24 +181,26 @@ class RigFileContents:
 
     def refuse_machine(self) -> None:
         """Raise an error if the file describes a machine."""
-        if self.machine is not None:
+        if isinstance(self.rig, Machine):
             raise NotAvailable("the file describes a machine; allowed: a slider, one block on one surface")
 
-    def checked_rig(self, *others: Problem) -> Slider:
-        """The slider of a file without problems.
+    def checked_rig(self, *others: Problem) -> Slider | Machine:
+        """The rig of a file without problems.
 
         Raises
         ------
         RigFileError
             With all problems of the file.
-        NotAvailable
-            If the file describes a machine.
         """
-        self.refuse_machine()
         self.refuse(*others)
         if self.rig is None:
-            raise InternalError("a slider in a file without problems")
+            raise InternalError("a rig in a file without problems")
         return self.rig
+
+    def checked_slider(self, *others: Problem) -> Slider:
+        """The slider of a file without problems; also NotAvailable if the file describes a machine."""
+        self.refuse_machine()
+        return cast(Slider, self.checked_rig(*others))
 
 
 def read_contents(
@@ -263,17 +258,15 @@ def read_tables(
         complete(tables)
     tolerances, faults = taken_out(tables)
     reader.tables = with_structures(tables, source)
-    found_rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
-    protocol = reader.protocol(found_rig if isinstance(found_rig, Machine) else None)
+    rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
+    protocol = reader.protocol(rig)
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
-    rig = found_rig if isinstance(found_rig, Slider) else None
-    machine = found_rig if isinstance(found_rig, Machine) else None
-    if found_rig is not None:
-        faults += wrong_ends(found_rig, tolerances)
+    if rig is not None:
+        faults += wrong_ends(rig, tolerances)
     wrong = {one.name for one in faults}  # told once, as a tolerance
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
-    return RigFileContents(source, rig, machine, protocol, said, problems, changed, lines, tables, tolerances)
+    return RigFileContents(source, rig, protocol, said, problems, changed, lines, tables, tolerances)
 
 
 def _not_empty(text: str, source: str) -> str:
@@ -386,7 +379,7 @@ class _ContentsReader(TableReader):
             return None
         return self._built(Slider, {**arguments, **parts}, "slider.")  # type: ignore[return-value]
 
-    def protocol(self, machine: Machine | None = None) -> Protocol | None:
+    def protocol(self, rig: Rig | None = None) -> Protocol | None:
         """Read the protocol, None if absent; after the rig, whose area it needs."""
         if PROTOCOL.name not in self.tables:
             return None
@@ -394,7 +387,7 @@ class _ContentsReader(TableReader):
         table = self._table(PROTOCOL.name)
         if len(self.problems) > before:
             return None
-        with self.of_machine(machine):
+        with self.of_rig(rig):
             return self._complete(Protocol, table, f"{PROTOCOL.name}.")  # type: ignore[return-value]
 
     def settings(self, section: Section) -> FrozenRecord | None:

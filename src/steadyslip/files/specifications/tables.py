@@ -17,7 +17,7 @@ from steadyslip.core.roles import Entry, Parameter
 from steadyslip.files.specifications.layout import find_law, has_choice, nested_keys, own_fields, selector
 from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.input_units import TURNING
-from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
 
@@ -30,7 +30,7 @@ class TableReader:
         self.turning = False
         """True if the load point turns, so that its displacements are angles."""
         self.in_totals = False
-        self.machine: Machine | None = None
+        self.acted_on: Rig | None = None
         self.twisted = False
         """True while a torque is read in place of a force."""
 
@@ -78,26 +78,24 @@ class TableReader:
         self.area, self.in_totals = outer
 
     @contextmanager
-    def of_machine(self, machine: Machine | None) -> Iterator[None]:
-        """Context for what acts on a machine: in forces, and in angles where its load point turns; None for a
-        slider.
-        """
-        outer = self.in_totals, self.turning, self.machine
-        if machine is not None:
-            self.in_totals, self.turning, self.machine = True, machine.drive.turns, machine
+    def of_rig(self, rig: Rig | None) -> Iterator[None]:
+        """Context for what acts on a rig: on a machine in forces, and in angles where its load point turns."""
+        outer = self.in_totals, self.turning, self.acted_on
+        if rig is not None:
+            self.in_totals, self.turning, self.acted_on = rig.result_unit("Pa") == "N", rig.drive.turns, rig
         yield
-        self.in_totals, self.turning, self.machine = outer
+        self.in_totals, self.turning, self.acted_on = outer
 
     def _twists(self, law: type[FrozenRecord], table: Table) -> bool:
         """True if a piece of a protocol acts on something that turns."""
-        if self.machine is None or not issubclass(law, Piece):
+        if self.acted_on is None or not issubclass(law, Piece):
             return False
         if law.frees_load_point:
-            return self.machine.drive.turns
+            return bool(self.acted_on.drive.turns)
         if law.channel != DISTURBANCE:
             return False
         on = table.get("on")
-        return self.machine.turns_on(on if isinstance(on, str) else None)
+        return self.acted_on.turns_on(on if isinstance(on, str) else None)
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
         """Records of tables by names that the user chooses."""

@@ -100,7 +100,7 @@ def read_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -> T
 def rig_and_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -> tuple[Slider | Machine, Tolerances]:
     """Rig and tolerances of a rig file; see `read_tolerances`."""
     contents = read_whole(path, changes)
-    rig = contents.given
+    rig = contents.rig
     if rig is None:  # a faulty or absent rig
         contents.refuse()
         return contents.checked_rig(), Tolerances()

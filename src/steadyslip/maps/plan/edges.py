@@ -25,7 +25,7 @@ from steadyslip.protocol import Protocol
 
 def _of_sliders(rig: Slider | Machine) -> Iterator[Problem]:
     """Problem of a machine for measures about the stiffness k of a slider."""
-    if isinstance(rig, Machine):
+    if rig.default_along is None:
         yield Problem(
             "", "is about the one stiffness of a slider, and a machine has several; compute 'edge' or 'stable_values' "
             "with along = 'links.NAME.stiffness', a gain, or any other parameter",

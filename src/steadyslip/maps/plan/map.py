@@ -299,7 +299,7 @@ def default_measures(rig: Rig) -> tuple[str, ...]:
 def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:
     """Parameters of a protocol by dotted name, in the units used for this rig."""
     reader = TableReader()
-    with reader.of_machine(rig if isinstance(rig, Machine) else None):
+    with reader.of_rig(rig):
         return {
             name: replace(one, role=reader.in_file_unit(one.role))
             for name, one in parameters(protocol, "protocol.").items()

@@ -157,7 +157,7 @@ def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), f
     """
     spec = read_contents(text, source, changes, (TABLE,))
     settings = spec.further.get(MAP)
-    plan = _MapReader(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None
+    plan = _MapReader(spec, settings, folder) if spec.rig is not None and isinstance(settings, MapSettings) else None
     spec.refuse(*(plan.placed() if plan is not None else ()))
     if plan is None or plan.found is None:
         raise InternalError("a map in a file without problems")
@@ -171,7 +171,7 @@ class _MapReader:
         self.problems: list[Problem] = []
         self.found: Map | None = None
         self.spec, self.folder = spec, folder
-        rig = spec.given
+        rig = spec.rig
         if rig is None:
             raise InternalError("a rig in a file with a map")
         self.rig = rig

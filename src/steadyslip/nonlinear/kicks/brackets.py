@@ -246,6 +246,6 @@ class _Search:
         low = np.where(self.beyond == INTERRUPTED, np.where(low > 0, low, np.nan), low)
         contact = np.full(len(size), "", dtype=object)
         ends = np.flatnonzero(np.isin(beyond, (CONTACT_LOST, BLOW_UP)) & self.whole)
-        if len(ends) and self.kicked.rest.is_machine:
+        if len(ends):
             contact[ends] = self.kicked.contacts(self.rig[ends], self.high[ends], self.threads)
         return size, low, high, beyond, contact

@@ -46,6 +46,8 @@ class Kick:
     size : str
         What a size without unit counts.
     doc : str
+    usual : bool
+        True if it is tried where none is named.
     """
 
     name: str
@@ -54,13 +56,14 @@ class Kick:
     high: float
     size: str
     doc: str
+    usual: bool = False
 
 
 KICKS = {
     kick.name: kick
     for kick in (
-        Kick("velocity", "m/s", 1e-3, 25.0, "ln(new/old velocity)", "step of the load-point velocity"),
-        Kick("displacement", "m", 1e-4, 1e5, "natural lengths (d_c)", "step of the load point"),
+        Kick("velocity", "m/s", 1e-3, 25.0, "ln(new/old velocity)", "step of the load-point velocity", True),
+        Kick("displacement", "m", 1e-4, 1e5, "natural lengths (d_c)", "step of the load point", True),
         Kick("normal-stress", "Pa", 1e-6, 1e2, "share of the steady one", "step of the normal stress"),
         Kick("impulse", "Pa s", 1e-4, 1e10, "change of velocity over the drive's", "blow on a block with mass"),
     )
@@ -69,7 +72,7 @@ OF_MACHINES = {
     kick.name: kick
     for kick in (
         replace(KICKS["velocity"], doc="step of the drive's velocity, or of that of the body at which it is"),
-        replace(KICKS["displacement"], doc="step of the load point, or of the body at which it is"),
+        replace(KICKS["displacement"], doc="step of the load point, or of the body at which it is", usual=False),
         Kick("force", "N", 1e-6, 1e2, "share of the largest steady normal force", "step of a force on a body"),
         Kick("normal-force", "N", 1e-6, 1e2, "share of the steady one", "step of the normal force at a contact"),
         replace(KICKS["impulse"], unit="N s", size="change of velocity over its own", doc="blow on a body with mass"),
@@ -155,7 +158,7 @@ class Kicked:
         self.of_drive = not at and kick in ("velocity", "displacement")
         self.from_other = kick == "velocity" and reference == "after" and self.of_drive
         values = operating_point(rig, vary, branch=branch)
-        if kick == "impulse" and isinstance(rig, Slider) and "slider.mass" not in values.named():
+        if kick == "impulse" and not at and "slider.mass" not in values.named():
             raise NotAvailable(
                 "an impulse needs a mass: without it the block takes any velocity at once; use a displacement or "
                 "normal-stress kick, or give the slider a mass"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import NotAvailable, Problem, unknown_name
+from steadyslip.core.errors import NotAvailable, Problem
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.machine.machine import Machine
@@ -24,18 +24,14 @@ Array = np.ndarray
 
 def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Problem]:
     """Problems with the place of a kick, as a list for error messages."""
-    if isinstance(rig, Slider):
-        if at is None:
-            return []
-        return [Problem("at", f"got {at!r}; a slider is one block, leave it out")]
     known = list(rig.contacts) if kick == "normal-force" else list(rig.bodies)
     what = "contact" if kick == "normal-force" else "body"
     if at is None:
-        if kick in ("velocity", "displacement"):
+        if kick in ("velocity", "displacement") or not known:
             return []
         return [Problem("at", f"missing; name the {what} that a {kick} kick acts at: {', '.join(known)}")]
-    if at not in known:
-        return [Problem("at", unknown_name(what, at, known))]
+    if problems := rig.place_problems("at", at, known, what):
+        return problems
     if kick == "impulse" and not rig.bodies[at].inertia_of():
         return [Problem("at", f"an impulse needs a mass, and {at!r} has none; allowed: a displacement or force kick")]
     if kick == "velocity" and not rig.bodies[at].inertia_of():

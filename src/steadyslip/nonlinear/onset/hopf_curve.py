@@ -19,7 +19,7 @@ from steadyslip.core.options import checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.linear.boundary import boundary, present_zeros
+from steadyslip.linear.boundary import boundary
 from steadyslip.linear.roots import roots
 from steadyslip.linear.search import Search
 from steadyslip.machine.machine import Machine
@@ -188,7 +188,7 @@ class _Plane:
         self, rig: Slider | Machine, names: tuple[str, str], between: Mapping[str, Sequence[Any]], branch: int
     ) -> None:
         self.rig, self.names, self.branch = rig, names, branch
-        self.present = tuple({*present_zeros(rig)} & {*names})
+        self.present = tuple({*rig.kept_zeros()} & {*names})
         if operating_point(rig).model.delays:
             raise NotAvailable("an edge with a delay cannot be followed in two parameters; stable_values has it in one")
         self.reference = 1.0

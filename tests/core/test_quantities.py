@@ -94,3 +94,28 @@ def test_whatever_is_written_is_a_unit_or_refused(text):
     assert all(math.isfinite(power) for power in dimension)
     if not text.replace("·", " ").strip().startswith("1"):  # a leading one is a number's, not a unit's
         assert unit(f"m/m*({text})") == (pytest.approx(factor), dimension)
+
+
+RUN_TOGETHER = {
+    "Nm": "N m", "kNm": "kN m", "mNm": "mN m", "Nmm": "N mm", "Nm/rad": "N m/rad", "Nms/rad": "N m s/rad",
+    "1/Nm": "1/(N m)", "Ns/m": "N s/m", "Pas/m": "Pa s/m", "kgm²": "kg m^2", "kgcm2": "kg cm^2", "gcm^2": "g cm^2",
+}  # fmt: skip
+ANGLES = {"arcsec/s": math.pi / 648000, "arcmin/s": math.pi / 10800, "mrad/s": 1e-3, "gon/s": math.pi / 200}
+
+
+def test_words_run_together_are_the_products_of_data_sheets():
+    """Nm is a torque, not the textile number metric that pint has under that name."""
+    assert {name: unit(name) for name in RUN_TOGETHER} == {name: unit(parted) for name, parted in RUN_TOGETHER.items()}
+    assert unit("nm")[1] == unit("m")[1]
+
+
+def test_angles_of_all_names_are_angles():
+    for name, size in ANGLES.items():
+        assert parse(f"1 {name}", "rad/s") == pytest.approx(size, rel=1e-14)
+
+
+def test_a_ratio_is_written_as_a_quotient():
+    assert parse("1/360", "1") == 1 / 360
+    for text, kind in (("1/360", "m"), ("1/0", "1"), ("1/2/3", "1"), ("1/-2", "1")):
+        with pytest.raises(QuantityError):
+            parse(text, kind)

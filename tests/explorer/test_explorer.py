@@ -321,6 +321,9 @@ def test_files_of_users_keep_every_digit_and_every_word(page_of_user, share, nam
     typed = f"{share:.5g}"
     for name, si in SI.items():
         assert script("exactly(typed, size)", typed=typed, size=unit(name)[0]) == parse(f"{typed} {name}", si)
+    for name in ("Nms/rad", "s/Nm", "kgcm²", "mm/Ns", "nm"):
+        factor, exponents = script("unitOf(name)", name=name)
+        assert (factor, tuple(exponents)) == (pytest.approx(unit(name)[0]), unit(name)[1])
 
 
 # -- drawings

@@ -1,6 +1,7 @@
 """Mistakes that one makes when a data sheet becomes a rig file: each is answered once, with what to write instead."""
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -18,12 +19,45 @@ MISTAKES = {
     "no contact area": ('area = "200 cm^2"\n', "", "add the contact's area"),
     "a unit on a pure number": ("0.8", '"0.8 mm"', "expected a number without unit"),
     "a full stop behind a unit": ('"0.5 mm/min"', '"0.5 mm/min."', "'mm/min.' is not a unit"),
+    "a letter for a key": ("mu_static =", "mu_s =", "unknown key 'mu_s'; did you mean 'mu_static'"),
+    "a unit without quotes": ('"0.5 mm/min"', "0.5 mm/min", "'velocity = 0.5 mm/min'; a number with a unit stands in"),
+    "a comment of another language": ("[drive]", "// feed\n[drive]", "a comment begins with #"),
+    "a colon": ("mass =", "mass:", "write KEY = VALUE"),
+    "a quote left open": ('"240 kg"', '"240 kg', "a text ends on its line with the quote"),
+    "a table in two places": ("[drive]", "[friction]\n[drive]", "the table [friction] is there before"),
+    "capital units": ('"240 kg"', '"240 KG"', "did you mean kg?"),
+    "a word that begins with inf": ('"12 ± 20 % N/um"', '"infinite"', "'infinite' is not a quantity in N/m"),
+    "a key in the wrong table": ("area =", 'preload = "3 kN"\narea =', "it is a key of [contact]"),
+    "a word for two tables": ("[contact]", "[guide]", "unknown table 'guide'; allowed"),
+    "a place held by a load point": ('"0.5 mm/min"', "0", "a controller, pd or pid, may hold a place"),
     "a force for a coefficient": (
         'mu_coulomb = "0.11 ± 20 %"',
         'mu_coulomb = "350 N"',
         "expected a number without unit",
     ),
 }
+
+
+MACHINE = (Path(__file__).parents[2] / "examples/machines/feed-axis.toml").read_text(encoding="utf-8")
+MISTAKES_OF_MACHINES = {
+    "a pitch for a lead": ("lead =", "pitch =", "did you mean 'lead'"),
+    "an area of a law": ('preload = "3 kN"', 'preload = "3 kN"\narea = "1 m^2"', "it is a key of [contacts.NAME]"),
+    "a stiffness for what turns": ('"120 N/um"', '"120 N m/rad"', "at a radius, divide by its square"),
+    "a mass for an inertia": ('"40 kg cm^2"', '"40 kg"', "expected a quantity in kg m^2, for example '1 kg m^2'"),
+    "a speed of what turns": ('v_ref = "1 mm/s"', 'v_ref = "6.5 rad/s"', "at a radius, multiply by the radius"),
+    "a torque for a force": ('"3 kN"', '"3 Nm"', "at a radius, divide by the radius"),
+    "bristles of what turns": ('"5 um"', '"5 deg"', "at a radius, multiply by the radius"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES_OF_MACHINES)
+def test_a_mistake_in_a_machine_is_answered_by_what_to_write(mistake):
+    right, wrong, answer = MISTAKES_OF_MACHINES[mistake]
+    text = MACHINE.replace(right, wrong, 1)
+    assert text != MACHINE
+    with pytest.raises(ss.RigFileError, match=re.escape(answer)) as raised:
+        ss.rig_from_text(text)
+    assert "per unit area" not in str(raised.value)
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)

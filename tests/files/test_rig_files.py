@@ -239,7 +239,7 @@ def test_changes_override_and_complete_the_file():
         ("contact.angle=5 MPa", "wrong dimension"),
         ("friction.states.1.b=3", "unknown|list of tables|cannot be set"),
         ("protocol.pieces.1.to=3", "a list of tables, [[protocol.pieces]]"),
-        ("protocol.end=3", "unknown key 'end'; allowed: until, pieces"),
+        ("protocol.end=3", "unknown key 'end'; did you mean 'until'? allowed: until, pieces"),
     ],
 )
 def test_bad_changes(change, words):

@@ -72,6 +72,8 @@ PREFIXABLE = PLAIN_WORDS | {prefix + base for base in _PREFIXED for prefix in _P
 """SI unit words with every prefix and without."""
 
 _TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
+_RUN_TOGETHER = re.compile(r"([TGMkmun]?N|[TGMk]?Pa|kg(?=m|cm)|g(?=[cm]m))(m|mm|cm)?(s)?")
+"""Words that data sheets run together: Nm, kNmm, Nms, Ns, Pas, kgm (of kgm^2), gcm."""
 _AT = re.compile(r"(.+?)\s+at\s+((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)", re.A)
 _ONE = re.compile(r"1\s*(?=/|$)")
 _SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
@@ -88,6 +90,8 @@ def unit(text: str) -> tuple[float, Dimension]:
 
     A unit is words with small integer powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
     arithmetic, a slash divides by the one factor after it. Words missing from the table are looked up in pint.
+
+    Words that data sheets run together are parted: ``Nm``, ``Nms/rad``, ``kgcm^2``.
 
     With ``at`` it is per that quantity: ``"N/um at 3.2 kN"`` are 1/m, the stiffness of bristles per load.
 
@@ -135,7 +139,9 @@ def factors(text: str) -> Iterator[tuple[str, int]]:
         if word:
             if len(power) > 3 or abs(int(power)) > MOST_POWER:
                 raise QuantityError(f"{text!r} is not a unit: powers are whole numbers up to {MOST_POWER}")
-            yield word, int(power) * sign * group
+            *others, last = _parted(word)
+            yield from ((other, sign * group) for other in others)
+            yield last, int(power) * sign * group
         elif mark == ")":
             if wanted or not outer:
                 raise fault
@@ -151,14 +157,22 @@ def factors(text: str) -> Iterator[tuple[str, int]]:
         raise fault
 
 
+def _parted(word: str) -> tuple[str, ...]:
+    """Words that a data sheet runs together, parted: Nm is a torque, and kgm^2 an inertia."""
+    whole = None if word in _TABLE else _RUN_TOGETHER.fullmatch(word)
+    return tuple(filter(None, whole.groups())) if whole else (word,)
+
+
 @lru_cache(maxsize=256)
 def _from_pint(word: str) -> tuple[float, Dimension]:
     """SI factor and dimension of one word, looked up in pint."""
     registry = _pint_registry()
-    fault = QuantityError(f"{word!r} is not a unit")
+    alike = sorted(one for one in _TABLE if one.casefold() == word.casefold())
+    fault = QuantityError(f"{word!r} is not a unit" + (f" (did you mean {' or '.join(alike)}?)" if alike else ""))
     try:
         bases = [registry.Quantity(size, word).to_base_units() for size in (1.0, 2.0)]
         exponents = dict(bases[0].dimensionality)
+        angle = float(dict(bases[0].to_root_units().unit_items()).get("radian", 0))  # arcsec, mrad, gon
         one, two = (float(base.magnitude) for base in bases)
     except Exception as error:  # pint raises exceptions of many types for words that are not units
         raise fault from error
@@ -167,7 +181,7 @@ def _from_pint(word: str) -> tuple[float, Dimension]:
     known = {"[mass]": "mass", "[length]": "length", "[time]": "time"}
     if not set(exponents) <= set(known):
         raise QuantityError(f"{word!r} has a dimension that no parameter has")
-    return one, Dimension(**{known[key]: float(power) for key, power in exponents.items()})
+    return one, Dimension(angle=angle, **{known[key]: float(power) for key, power in exponents.items()})
 
 
 @lru_cache(maxsize=1)

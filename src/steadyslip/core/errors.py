@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -163,12 +164,39 @@ def legible(name: str) -> str:
     return name if name.isprintable() and len(name) <= MOST_SHOWN // 2 else repr_short(name)
 
 
-def unknown_name(what: str, name: object, allowed: Iterable[str], guess: bool = True) -> str:
-    """Message that a name is unknown, with all allowed names and, if `guess`, the nearest of them."""
-    allowed = list(allowed)
-    close = get_close_matches(str(name), allowed, n=1, cutoff=0.5) if guess else []
+_LETTERS = str.maketrans(
+    {"α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "θ": "theta", "μ": "mu", "σ": "sigma",
+     "τ": "tau", "ψ": "psi", "Θ": "theta", "_": ""}
+)  # fmt: skip
+
+
+def named_in(name: str, texts: Mapping[str, str]) -> list[str]:
+    """Keys of the texts that have a word or a letter, such as ``mu_s`` for μ_S or ``ratio`` for a gear ratio.
+
+    >>> named_in("mu_s", {"mu_static": "static friction coefficient μ_S", "mass": "mass m"})
+    ['mu_static']
+    """
+    wanted = name.translate(_LETTERS).casefold()
+    return [key for key, text in texts.items() if wanted in re.findall(r"\w+", text.translate(_LETTERS).casefold())]
+
+
+def unknown_name(
+    what: str, name: object, allowed: Iterable[str], guess: bool = True, meanings: Mapping[str, str] | None = None,
+    taken: Iterable[str] = ()
+) -> str:  # fmt: skip
+    """Message that a name is unknown, with all allowed names and, if `guess`, the one meant.
+
+    That is the only one whose meaning has that word or letter, or the nearest; of those `taken`, given already, only
+    one that is nearly the same.
+    """
+    allowed, taken = list(allowed), set(taken)
+    free = [one for one in allowed if one not in taken]
+    meant = [one for one in named_in(str(name), meanings or {}) if one in free]
+    close = meant if len(meant) == 1 else get_close_matches(str(name), free, n=1, cutoff=0.5)
+    close = close or get_close_matches(str(name), taken.intersection(allowed), n=1, cutoff=0.75)
+    close = close if guess else []
     if guess and not close and "." not in str(name):  # users often give the last part of a dotted name only
-        last = {full.rpartition(".")[2]: full for full in allowed}
+        last = {full.rpartition(".")[2]: full for full in free}
         close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""
     return f"unknown {what} {repr_short(name)}; {hint}allowed: {', '.join(allowed) or 'none'}"

@@ -19,10 +19,16 @@ from steadyslip.core.dimensions import MICRO, MOST_TEXT, Dimension, unit
 from steadyslip.core.errors import QuantityError, repr_short
 
 _MASS, _WEIGHT = Dimension(1), Dimension(1, 1, -2)
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
+_BY_RADIUS = {
+    Dimension(length=-1, angle=1): "multiply by the radius",  # rad/s for m/s
+    Dimension(length=1, angle=-1): "divide by the radius",  # 1/rad for 1/m, s/rad for s/m
+    Dimension(length=2, angle=-1): "divide by its square",  # N m/rad for N/m
+}
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)(?![a-z])", re.I | re.A)
 PER_LOAD = ("1", "1/m", "s/m")
 """Units of friction per load, which machine people know as forces: a coefficient, bristles, viscous friction."""
 _COMMA = re.compile(r",(\d+)", re.A)
+_QUOTIENT = re.compile(r"/\s*(\d+\.?\d*)", re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
@@ -54,6 +60,9 @@ def parse(text: str, expected: str) -> float:
     if comma := _COMMA.match(name):
         raise QuantityError(f"{text!r} has a decimal comma: write {digits}.{comma[1]}")
     _, wanted = unit(expected)
+    divisor = _QUOTIENT.fullmatch(name)
+    if divisor and wanted == Dimension() and float(divisor[1]) > 0:  # a gear ratio, 1/360
+        return _scaled(digits, 1 / float(divisor[1]))
     if not name:
         if wanted != Dimension():
             raise QuantityError(f"{text!r} has no unit; write for example {example(expected)}")
@@ -70,23 +79,33 @@ def parse(text: str, expected: str) -> float:
         if per_area and found == wanted.times(AREA):
             message += (
                 "; it is the total of a contact, and this is per unit area: add the contact's area to the rig file, "
-                "[slider] area = '0.01 m^2', or divide by it"
+                "[slider] area = '0.01 m^2', or divide by it; if it is unknown, any will do: answers in N, N/m and kg "
+                "are the same"
             )
         elif per_area:
             message += (
                 f", or with the contact's area in the rig file, [slider] area = '0.01 m^2', {total_unit(expected)}"
             )
-        elif wanted == found.times(AREA):
+        elif wanted == found.times(AREA) and expected in TOTALS:
             message += (
                 "; it is per unit area: laws of a contact take that where it has an area, [contacts.NAME] "
                 "area = '0.01 m^2', all else is of the whole"
             )
         elif found == wanted.times(_WEIGHT) and expected in PER_LOAD:
             message += f"; name the load that it is of: '{text} at 3.2 kN'"
+        elif turned := _of_what_turns(found, wanted):
+            message += turned
         elif (found, wanted) == (_MASS, _WEIGHT):
             message += "; a mass presses with its weight, mass times 9.81 m/s^2"
         raise QuantityError(message)
     return _scaled(digits, factor)
+
+
+def _of_what_turns(found: Dimension, wanted: Dimension) -> str:
+    """Hint where a torque, angle or angular speed came for a force, path or speed; empty otherwise."""
+    torque = (found, wanted) == (_WEIGHT.times(AREA, 0.5), _WEIGHT)
+    step = "divide by the radius" if torque else _BY_RADIUS.get(found.times(wanted, -1), "")
+    return f"; that is of something that turns: at a radius, {step}" if step else ""
 
 
 def _scaled(digits: str, factor: float) -> float:

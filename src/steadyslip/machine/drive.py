@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from steadyslip.core.domains import nonnegative, positive, speed
+from steadyslip.core.domains import moving, nonnegative, speed
 from steadyslip.core.records import FrozenRecord, parameter
 from steadyslip.machine.holding import Holding, limit, windup
 from steadyslip.machine.mechanism import Limits
@@ -22,7 +22,7 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
     turns: ClassVar[bool] = False
     """True of a machine's load point that rotates."""
 
-    velocity: float = parameter("m/s", positive, "velocity of the load point in steady sliding")
+    velocity: float = parameter("m/s", moving, "velocity of the load point in steady sliding")
 
     def proportional(self) -> Any:
         """Stiffness added by the controller (Pa/m)."""

@@ -95,7 +95,9 @@ class Screw(Link, name="screw"):
 
     turning: ClassVar[tuple[bool | None, bool | None]] = (True, False)
 
-    lead: float = parameter("m/rad", positive, "travel for an angle, such as '5 mm/rev'")
+    lead: float = parameter(
+        "m/rad", positive, "travel for an angle, such as '5 mm/rev' (the pitch of a screw of one start)"
+    )
     stiffness: float | None = parameter("N/m", positive, "stiffness k along the slide", default=None, kind="stiffness")
     damping: float = parameter("N s/m", nonnegative, "damping c along the slide", default=0.0, structural=True)
 
@@ -114,7 +116,9 @@ class Shaft(Link, name="shaft"):
 
     turning: ClassVar[tuple[bool | None, bool | None]] = (True, True)
 
-    gear: float | None = parameter("1", positive, "turns of the second body for one turn of the first", default=None)
+    gear: float | None = parameter(
+        "1", positive, "gear ratio, turns of the second body for one turn of the first", default=None
+    )
     stiffness: float | None = parameter(
         "N m/rad", positive, "torsional stiffness at the second body", default=None, kind="stiffness"
     )

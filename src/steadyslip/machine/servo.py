@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from steadyslip.core.domains import nonnegative, positive, speed
+from steadyslip.core.domains import moving, nonnegative, positive, speed
 from steadyslip.core.entries import Text
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter, setting
@@ -26,7 +26,7 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
     turns: ClassVar[bool] = False
 
-    velocity: float = parameter("m/s", positive, "velocity v0 in steady sliding")
+    velocity: float = parameter("m/s", moving, "velocity v0 in steady sliding")
     velocity_of: str | None = setting(
         Text("the body whose velocity is given, in m/s or rad/s; that on which the drive acts unless given"),
         default=None,
@@ -61,7 +61,7 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
     """A shaft end that turns at constant speed; links tie bodies to it as ``drive``."""
 
     turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", positive, "speed of the load point in steady sliding")
+    velocity: float = parameter("rad/s", moving, "speed of the load point in steady sliding")
 
 
 class _Controller(Holding, MachineDrive):

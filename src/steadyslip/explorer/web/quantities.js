@@ -15,6 +15,7 @@ for (const [name, exponents] of BASES) {
   const prefixes = { T: 1e12, G: 1e9, M: 1e6, k: 1e3, c: 1e-2, m: 1e-3, u: 1e-6, n: 1e-9, p: 1e-12 };
   for (const [letter, factor] of Object.entries(prefixes)) TABLE[letter + name] ??= [factor, exponents];
 }
+const RUN_TOGETHER = /(?<![A-Za-z])([TGMkmun]?N|[TGMk]?Pa|kg(?=c?m)|g(?=[cm]m))(m|mm|cm)?(s)?(?![A-Za-z])/g; // Nm, Nms, kgm²
 const WORD = /\s*([/*·])?\s*([A-Za-z%°]+|1)\s*(?:\^\s*(-?\d)|(\d))?/y;
 const NUMBER = /^\s*([-+−]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+−]?\d+)?)\s*(.*?)\s*$/;
 const EITHER = /^[-+−]?[1-9]\d{0,2},\d{3}$/; // ambiguous comma: decimal or thousands separator
@@ -24,9 +25,12 @@ const SHOWN = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, 
 /** @type {[number, string][]} */
 const LONG = [[31557600, "yr"], [86400, "days"], [3600, "h"], [60, "min"]];
 
+/** Words run together, parted: Nm is N m. @param {string} word @param {any[]} found its parts, where it begins, and all text */
+const parted = (word, ...found) => Object.hasOwn(TABLE, word) ? word : found.slice(0, 3).filter(Boolean).join(/\/\s*$/.test(found[4].slice(0, found[3])) ? "/" : " ");
+
 /** SI factor and exponents of a unit. @param {string} text @returns {[number, number[]]} */
 export function unitOf(text) {
-  const plain = text.replace(/[µμ]/g, "u").replace(/²/g, "^2").replace(/³/g, "^3").trim();
+  const plain = text.replace(/[µμ]/g, "u").replace(/²/g, "^2").replace(/³/g, "^3").replace(RUN_TOGETHER, parted).trim();
   let factor = 1, at = 0;
   const exponents = [0, 0, 0, 0];
   while (at < plain.length) {

@@ -306,14 +306,15 @@ class _ContentsReader(TableReader):
         self.tables = tables
 
     def rig(self, further: Iterable[str]) -> Slider | Machine | None:
-        self._unknown_tables(machine_sections() if is_machine(self.tables) else sections(), further)
+        self.sections = machine_sections() if is_machine(self.tables) else sections()
+        self._unknown_tables(self.sections, further)
         return self._machine() if is_machine(self.tables) else self._slider()
 
     def _unknown_tables(self, own: Iterable[Section], further: Iterable[str]) -> None:
         known = {section.name for section in (*own, PROTOCOL)} | {MAP, UNKNOWN, *TOLERANCES, *further}
         for name in self.tables:
             if name not in known:
-                self.problem(name, unknown_name("table", name, sorted(known)))
+                self.problem(name, unknown_name("table", name, sorted(known), taken=self.tables))
 
     def _machine(self) -> Machine | None:
         """Read a machine; if tables are faulty, references of the others to absent bodies and links are still

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import Field, fields, replace
 from typing import Any
@@ -14,7 +14,14 @@ from steadyslip.core.errors import ParameterError, Problem, legible, repr_short,
 from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
-from steadyslip.files.specifications.layout import find_law, has_choice, nested_keys, own_fields, selector
+from steadyslip.files.specifications.layout import (
+    Section,
+    find_law,
+    has_choice,
+    nested_keys,
+    own_fields,
+    selector,
+)
 from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.rig import Rig
@@ -31,6 +38,8 @@ class TableReader:
         """True if the load point turns, so that its displacements are angles."""
         self.in_totals = False
         self.acted_on: Rig | None = None
+        self.sections: tuple[Section, ...] = ()
+        """Tables of the file, where hints look for a key in the wrong one."""
         self.twisted = False
         """True while a torque is read in place of a force."""
 
@@ -156,7 +165,12 @@ class TableReader:
                 self.problem(prefix + key, _missing(self.worded(role)))
         for name, value in rest.items():
             another = _key_of_another(law, name, value)
-            self.problem(prefix + legible(name), unknown_name("key", name, keys, guess=not another) + another)
+            elsewhere = "" if another else _tables_with(name, self.sections)
+            meanings = {key_of(item): role.doc for item, role in own_fields(law)}
+            told = unknown_name("key", name, keys, guess=not another, meanings=meanings, taken=table)
+            if elsewhere:
+                told = f"unknown key {repr_short(name)} here; it is a key of {elsewhere}"
+            self.problem(prefix + legible(name), told + another)
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
@@ -317,6 +331,31 @@ def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
     known = [word for word, other in family.registry.items() if name in (key_of(item) for item, _ in own_fields(other))]
     words = " or ".join(f'"{word}"' for word in known)
     return f"; it is a key of {key} = {words}" if words else ""
+
+
+def _tables_with(name: str, sections: Iterable[Section]) -> str:
+    """The tables of a file that have a key; empty if none has."""
+    found = [
+        f"[{path}]"
+        for path, laws in _nested_tables(sections)
+        if any(name == key_of(item) for law in laws for item, _ in own_fields(law))
+    ]
+    return " or ".join(found)
+
+
+def _nested_tables(every: Iterable[Section]) -> Iterator[tuple[str, list[type[FrozenRecord]]]]:
+    """Yield the tables of a kind of file, ``contacts.NAME.friction``, with the records that may fill them."""
+    left = [(f"{one.name}.NAME" if one.keyed else one.name, one.family) for one in every]
+    for path, family in left:
+        laws = list(family.registry.values()) if has_choice(family) else [family]
+        yield path, laws
+        parts = {
+            item.name: role.family
+            for law in laws
+            for item, role in own_fields(law)
+            if isinstance(role, Part) and not role.inline
+        }
+        left += [(f"{path}.{inner}", one) for inner, one in parts.items()]
 
 
 def _part_of_another(family: type[FrozenRecord], name: object) -> str:

@@ -21,6 +21,20 @@ _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST
 _COMMA = re.compile(r"^[^#\"'\n=]+=[ \t]*+([-+]?\d++),(\d++)[ \t]*+(?:#.*)?$", re.MULTILINE)
 """A line that gives one number with a decimal comma, with its digits before and behind."""
 
+_SLIPS = (
+    (re.compile(r"\s*(?://|;|--|%)"), "a comment begins with #"),
+    (re.compile(r"\s*[\w.-]+\s*:"), "write KEY = VALUE"),
+    (
+        re.compile(r"[^\"'#]*=\s*[-+]?[.\d]+\s*[^\W\d_°%]"),
+        "a number with a unit stands in quotes, as in velocity = '20 um/s'",
+    ),
+    (re.compile(r"[^\"'#]*=\s*[^\W\d_]"), "a word stands in quotes, as in law = 'lugre'"),
+    (re.compile(r"[^\"#]*\"[^\"]*$|[^'#]*'[^']*$"), "a text ends on its line with the quote with which it begins"),
+)
+"""Lines that are often written for TOML, and what to write instead; the first that fits is told."""
+_PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
+_TWICE = re.compile(r"Cannot declare \((.*?),?\) twice")
+
 _TOO_LARGE = "it has an integer that does not fit into 64 bits; write such a number with a decimal point or exponent"
 
 
@@ -46,9 +60,22 @@ def tables_of(text: str) -> Table:
         why = str(error) if isinstance(error, tomllib.TOMLDecodeError) else _TOO_LARGE
         comma = _COMMA.search(text)
         hint = f"; {comma[1]},{comma[2]} has a decimal comma: write {comma[1]}.{comma[2]}" if comma else ""
-        raise NotToml(f"{why}{hint}") from error
+        raise NotToml(_explained(why, text) + hint) from error
     _check(tables)
     return tables
+
+
+def _explained(why: str, text: str) -> str:
+    """The reason of the parser with the line that it stopped at, and what to write instead."""
+    place, lines = _PLACE.search(why), text.splitlines()
+    if place is None or not 0 < int(place[1]) <= len(lines):
+        return why
+    line = lines[int(place[1]) - 1]
+    told = next((told for slip, told in _SLIPS if slip.match(line)), "")
+    if twice := _TWICE.match(why):
+        name = ".".join(part.strip(" '\"") for part in twice[1].split(","))
+        told = f"the table [{name}] is there before; write its keys in one place"
+    return f"{why}: {line.strip()[:60]!r}" + (f"; {told}" if told else "")
 
 
 def _check(tables: Any) -> None:

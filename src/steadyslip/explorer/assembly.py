@@ -6,9 +6,9 @@ import html
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,7 +151,7 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
     known = _data(rig, title, branch, facts, file) | {
         "motion": moving,
         "still": still,
-        "sketch": sketch(rig) if isinstance(rig, Slider) else machine_sketch(rig),
+        "sketch": ways_of(rig).sketch(rig),
     }
     code = (
         f"{script}\nconst programs = {_minified(text, function_names(text))};\n"
@@ -193,7 +193,8 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "axial": names.index(axial) if axial in names else -1,
         "speed": "drive.velocity",
         "toml": file.pieces,
-        **(_machine_data(rig, names, facts) if isinstance(rig, Machine) else _slider_data(rig, names)),
+        "stiffness": ways_of(rig).compared(rig, names),
+        **ways_of(rig).further(rig, facts),
         "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
         "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints]},
         "remote": REMOTE,
@@ -203,9 +204,9 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     }
 
 
-def _slider_data(rig: Slider, names: list[str]) -> dict[str, Any]:
-    """Page data of sliders only: parameter of the bar, sentences with the reasons of a verdict."""
-    return {"stiffness": _stiffness(rig, names), "reasons": page_reasons(rig)}
+def _slider_data(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Page data of sliders only: sentences with the reasons of a verdict."""
+    return {"reasons": page_reasons(rig)}
 
 
 def _stiffness(rig: Slider, names: list[str]) -> str | None:
@@ -214,11 +215,10 @@ def _stiffness(rig: Slider, names: list[str]) -> str | None:
     return stiffness if stiffness in names else None
 
 
-def _machine_data(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Page data of machines only: parameter of the check, indices of the areas of contacts, phrases."""
+def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Page data of machines only: indices of the areas of contacts, phrases."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
-        "stiffness": _checked_parameter(rig, names),
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
         "phrases": {name: words for name, words in PHRASES.items() if name not in BEYOND},
     }
@@ -232,15 +232,8 @@ def _checked_parameter(rig: Machine, names: list[str]) -> str | None:
 
 
 def _variable_parameters(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Address]:
-    """Parameters that a page can vary: those in the equations that affect the verdict.
-
-    An axial stiffness replaces the stiffness along the slide.
-    """
-    known = set(facts["parameters"])
-    if isinstance(rig, Slider):
-        known = known - {"slider.stiffness"} | {"slider.axial_stiffness"}
-        if rig.axial_stiffness is None and rig.stiffness is not None:
-            known |= {"slider.stiffness"}
+    """Parameters that a page can vary: those in the equations that affect the verdict, or given in place of such."""
+    known = {*facts["parameters"], *rig.replaces}
     return {
         name: one
         for name, one in rig.parameters().items()
@@ -285,7 +278,7 @@ def _group(rig: Slider | Machine, name: str) -> str:
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
     """Answers of Python at the values of the rig and at some others, with which the page compares its own."""
-    stiff = _stiffness(rig, names) if isinstance(rig, Slider) else _checked_parameter(rig, names)
+    stiff = ways_of(rig).compared(rig, names)
     changes: list[dict[str, float]] = [{}]
     for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
         if name in names:
@@ -309,11 +302,8 @@ def _answer(rig: Slider | Machine, names: list[str], branch: int, bar: str | Non
     require_range(point)
     if answer["status"] in (STABLE, UNSTABLE):
         with np.errstate(all="ignore"):
-            numbers = numbers_of(rig, point) if isinstance(rig, Slider) else linear_numbers(point)
-        answer["critical"] = (
-            numbers.get("critical_stiffness") if isinstance(rig, Slider) else _nearest_edge(rig, point, bar)
-        )
-        answer["eigenvalues"] = [[s.real, s.imag] for s in numbers["eigenvalues"]]
+            answer["critical"], eigenvalues = ways_of(rig).judged(rig, point, bar)
+        answer["eigenvalues"] = [[s.real, s.imag] for s in eigenvalues]
     return answer
 
 
@@ -324,3 +314,43 @@ def _nearest_edge(rig: Machine, point: OperatingPoint, name: str | None) -> floa
         return None
     edges = found.edges[found.changes]
     return float(edges[np.argmin(np.abs(edges - float(rig.value(name) or 0.0)))])
+
+
+def _judged_slider(rig: Slider, point: OperatingPoint, name: str | None) -> tuple[float | None, Sequence[complex]]:
+    numbers = numbers_of(rig, point)
+    return numbers.get("critical_stiffness"), numbers["eigenvalues"]
+
+
+def _judged_machine(rig: Machine, point: OperatingPoint, name: str | None) -> tuple[float | None, Sequence[complex]]:
+    eigenvalues = linear_numbers(point)["eigenvalues"]
+    return _nearest_edge(rig, point, name), eigenvalues
+
+
+class _Ways(NamedTuple):
+    """What a page does in its own way for each kind of rig.
+
+    Attributes
+    ----------
+    sketch : callable
+        SVG of the rig.
+    compared : callable
+        Name of the parameter whose stable values the page compares with Python's, of the rig and the page's parameters.
+    further : callable
+        Page data of this kind alone, of the rig and the facts of its equations.
+    judged : callable
+        Edge in the compared parameter and eigenvalues, of the rig, its operating point and that parameter.
+    """
+
+    sketch: Callable[[Any], str]
+    compared: Callable[[Any, list[str]], str | None]
+    further: Callable[[Any, Mapping[str, Any]], dict[str, Any]]
+    judged: Callable[[Any, OperatingPoint, str | None], tuple[float | None, Sequence[complex]]]
+
+
+_OF_SLIDERS = _Ways(sketch, _stiffness, _slider_data, _judged_slider)
+_OF_MACHINES = _Ways(machine_sketch, _checked_parameter, _machine_data, _judged_machine)
+
+
+def ways_of(rig: Slider | Machine) -> _Ways:
+    """What a page does in its own way for the kind of this rig."""
+    return _OF_MACHINES if isinstance(rig, Machine) else _OF_SLIDERS

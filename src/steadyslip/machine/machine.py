@@ -52,7 +52,7 @@ class Machine(Rig):
     area: ClassVar[None] = None
     """Area of a slider, by which its stresses are shown as forces; results of a machine are forces already."""
     words: ClassVar[Mapping[str, str]] = {
-        "rig": "machine", "block": "body", "damping": "a dashpot to the ground",
+        "rig": "machine", "block": "body", "place": "bodies.{}", "damping": "a dashpot to the ground",
         "mass": "the body that slips there a mass (or a damped link to the ground)",
     }  # fmt: skip
 

@@ -52,7 +52,8 @@ class Rig(FrozenRecord, Keeper):
     """Parameter along which edges and cycles are sought unless another is named; None if none stands out."""
 
     words: ClassVar[Mapping[str, str]] = {}
-    """Words of messages about a rig of this class: `rig`, `block`, and what limits its speed, `damping` and `mass`."""
+    """Words of messages about a rig of this class: `rig`, `block`, `place` of a coordinate by its name, and what limits
+    its speed, `damping` and `mass`."""
 
     @property
     def contact_names(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ class Slider(Rig, section="slider"):
     not_in_model: ClassVar[tuple[str, ...]] = ("slider.area",)
     default_along: ClassVar[str | None] = "stiffness"
     words: ClassVar[Mapping[str, str]] = {
-        "rig": "slider", "block": "slider", "damping": "radiation_damping",
+        "rig": "slider", "block": "slider", "place": "the slider", "damping": "radiation_damping",
         "mass": "the slider mass or radiation_damping",
     }  # fmt: skip
     bodies: ClassVar[Mapping[str, Any]] = {}

@@ -21,6 +21,7 @@ from steadyslip.linear.boundary import Margin, margins, margins_and_missing
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import steady_states
@@ -108,13 +109,11 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     >>> verdict.stable, round(verdict.critical_stiffness / 1e9, 3)
     (False, 29.07)
     """
-    if isinstance(rig, Machine):
-        if branch:
-            raise NotAvailable("a machine has one steady sliding: leave the branch out")
-        return analyze_machine(rig, (kick,) if isinstance(kick, str) else tuple(kick))
-    if not isinstance(rig, Slider):
+    if not isinstance(rig, Rig):
         raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider or a Machine, such as read_rig gives")])
-    return _analyze_slider(rig, branch, (kick,) if isinstance(kick, str) else tuple(kick))
+    rig.check_branch(branch)
+    kicks = (kick,) if isinstance(kick, str) else tuple(kick)
+    return analyze_machine(rig, kicks) if isinstance(rig, Machine) else _analyze_slider(rig, branch, kicks)
 
 
 def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysis:

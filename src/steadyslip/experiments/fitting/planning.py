@@ -46,8 +46,6 @@ def make_plan(
     ParameterError
         Listing everything that is wrong.
     """
-    if not isinstance(rig, Slider):
-        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig or lab_rig gives")])
     many = (records,) if isinstance(records, Record) else tuple(records)
     if not many or not all(isinstance(record, Record) for record in many):
         raise ParameterError(

@@ -335,9 +335,9 @@ class _ContentsReader(TableReader):
             else:
                 found[section.name] = self._drive(self._table(section.name), found.get("bodies"))
         if len(self.problems) == before:
-            machine = self._built(Machine, found, "")
+            machine = cast("Machine | None", self._built(Machine, found, ""))
             try:
-                return joined(machine, *rigid) if isinstance(machine, Machine) else None
+                return None if machine is None else joined(machine, *rigid)
             except NotAvailable as error:
                 self.problem("links", str(error))
                 return None

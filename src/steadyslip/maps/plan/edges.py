@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.stable_values import edge_along, intervals_along, is_own_stiffness, name_along, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan.measures import Measure, Output, as_slider
+from steadyslip.maps.plan.measures import Measure, Output
 from steadyslip.model.point import Vary, operating_point
 from steadyslip.nonlinear.onset.hopf import KINDS, onset_map
 from steadyslip.protocol import Protocol
@@ -39,7 +39,7 @@ class CriticalStiffness(Measure, name="critical_stiffness"):
         return (Output("critical_stiffness", "Pa/m", "critical stiffness"),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"critical_stiffness": critical_stiffness(as_slider(rig), vary)}
+        return {"critical_stiffness": critical_stiffness(cast(Slider, rig), vary)}
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         yield from _of_sliders(rig)
@@ -56,7 +56,7 @@ class StableStiffness(Measure, name="stable_stiffness"):
         return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"stable_stiffness": stable_stiffness(as_slider(rig), vary)}
+        return {"stable_stiffness": stable_stiffness(cast(Slider, rig), vary)}
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         yield from _of_sliders(rig)
@@ -93,7 +93,7 @@ class Along(Measure):
     def unit(self, rig: Slider | Machine) -> tuple[float, str]:
         """Factor and unit of the results: the unit of the model, or totals for a contact of a machine with an area."""
         full = self.name_of(rig)
-        return outside(rig.parameters()[full].role.unit, rig.area_of(full) if isinstance(rig, Machine) else None)
+        return outside(rig.parameters()[full].role.unit, None if rig.area else rig.area_of(full))
 
     def room(self, rig: Slider | Machine, varied: Sequence[str]) -> int:
         """Largest possible number of intervals."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from steadyslip.core.domains import Domain, below_one, positive, steps, tolerance
 from steadyslip.core.entries import Text
-from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, unknown_name
+from steadyslip.core.errors import ParameterError, Problem, SteadyslipError, unknown_name
 from steadyslip.core.records import FrozenRecord, option, parameter, setting
 from steadyslip.linear import growth_rate
 from steadyslip.linear.response import has_closed_form
@@ -112,13 +112,6 @@ class Measure(FrozenRecord, family="measure"):
         if not type(self).__module__.startswith("steadyslip."):
             found["text"] = source_digest(type(self))
         return found
-
-
-def as_slider(rig: Slider | Machine) -> Slider:
-    """Return the rig as a `Slider`; an internal error for a machine, which `Measure.problems` should have refused."""
-    if isinstance(rig, Machine):
-        raise InternalError("a slider for a measure that refuses machines")
-    return rig
 
 
 class GrowthRate(Measure, name="growth_rate"):

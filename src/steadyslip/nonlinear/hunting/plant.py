@@ -128,11 +128,10 @@ def plant_of(rig: Slider | Machine) -> Plant:
     """
     mechanism = rig.mechanism()
     names = [one.name for one in mechanism.coordinates]
-    what = "the slider" if isinstance(rig, Slider) else None
     for one in mechanism.coordinates:
         if not one.inertia:
             raise NotAvailable(
-                f"{what or f'bodies.{one.name}'} has no mass; hunting needs the inertia of all that moves"
+                f"{rig.words['place'].format(one.name)} has no mass; hunting needs the inertia of all that moves"
             )
     size = len(names)
     stiffness, damping = np.zeros((size, size + 1)), np.zeros((size, size + 1))

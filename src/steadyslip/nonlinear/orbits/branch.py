@@ -118,9 +118,7 @@ class CycleBranch(Displayed):
 
     def _area(self, name: str) -> float | None:
         """Area (m²) by which a quantity is multiplied for display as a total; None if it is not."""
-        if name == "value" or isinstance(self.rig, Slider):
-            return self.rig.printed_area(self.along)
-        return None
+        return self.rig.printed_area(self.along)
 
     def at(self, value: float) -> CyclesAt:
         """The cycles that exist at one value of the parameter, corrected to full precision.

@@ -477,7 +477,7 @@ class Flow(FlowRunner):
 
     def _varied(self, around: Array) -> OperatingPoint:
         """Operating point with the free parameter changed; short cut where nothing else depends on it."""
-        if isinstance(self.rig, Machine) or self.rig.axial_stiffness is None:
+        if all(self.rig.value(other) is None for other in self.rig.replaces):
             named = self.base.point.named() | {self.name: around}
             return self.base.point.with_arguments(named.values(), np.shape(around))
         return operating_point(self.rig, {self.name: around}, self.present, self.branch, scan=True)

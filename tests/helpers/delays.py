@@ -1,6 +1,11 @@
 """Delay equations at random, and two routes to their roots that know nothing of the package."""
 
+from dataclasses import replace
+
 import numpy as np
+
+import steadyslip as ss
+from machines import surface, two_mass
 
 
 def spectral(c, h, nodes=40):
@@ -47,3 +52,21 @@ def winding(matrix, fast):
 def apart(terms):
     """Which delays act in each of so many terms of a sum: none in the first, one of its own in every other."""
     return np.eye(terms, dtype=bool)[:, 1:]
+
+
+def lagging(k, damping=0.05, slope=0.1, lag=1.0):
+    """theory 10's lag check: m s² + (c + S exp(−sδ)) s + k with m = 1, S and δ = `slope` and `lag` of the friction."""
+    difference = slope / (-2 * np.exp(-1.0))
+    friction = ss.laws.CoulombStribeck(mu_coulomb=0.6, mu_static=0.6 + difference, v_stribeck=1.0, lag=lag)
+    return ss.Machine(
+        bodies={"block": ss.machine.SlidingBody(mass=1.0)},
+        links={"spring": ss.machine.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
+        contacts={"guide": surface("block", friction)},
+        drive=ss.machine.Pull(velocity=1.0),
+    )
+
+
+def late_axis(delay="0 s"):
+    return replace(
+        two_mass(kp=4.0, kd=3.0), drive=ss.machine.PositionPD(velocity=1.0, body="motor", kp=4, kd=3, delay=delay)
+    )

@@ -10,7 +10,7 @@ from rigs_of_theory import CONTACTS, LAWS, rig
 from steadyslip.nonlinear.continuation import Failure, SolutionCurve
 from steadyslip.nonlinear.orbits import flow as flow_module
 from steadyslip.nonlinear.orbits.cut_segments import _cuts
-from steadyslip.nonlinear.orbits.flow import Flow
+from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.shooting import multipliers
 
 # -- continuation itself

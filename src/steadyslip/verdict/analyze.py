@@ -98,7 +98,7 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     Raises
     ------
     ParameterError
-        If `rig` is neither a Slider nor a Machine.
+        If `rig` is neither a Slider nor a Machine, or `branch` is not 0 for a machine.
     NotAvailable
         If `branch` does not exist, or the numbers of the rig leave the range of floating point.
 

@@ -157,7 +157,7 @@ def test_the_verdict_tells_kicks_of_bodies():
     assert found.to_dict()["kicks"][0]["at"] == "table"
     with pytest.raises(ss.ParameterError, match="name the body"):
         ss.analyze(two_mass(kp=1.0), kick="force")
-    with pytest.raises(ss.NotAvailable, match="one steady sliding"):
+    with pytest.raises(ss.ParameterError, match="one steady sliding"):
         ss.analyze(two_mass(), branch=1)
 
 

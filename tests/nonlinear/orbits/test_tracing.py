@@ -16,7 +16,8 @@ from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_mo
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_data, cycle_near
 from steadyslip.nonlinear.orbits.end_reasons import STANDING, retraces, stands, winds
-from steadyslip.nonlinear.orbits.flow import Flow, FlowRunner
+from steadyslip.nonlinear.orbits.flow import FlowRunner
+from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.shooting import Shooting
 from steadyslip.nonlinear.orbits.special import BranchPoint, changes
 from steadyslip.nonlinear.orbits.tracer import Tracer

@@ -15,7 +15,7 @@ from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import motion_from
 from steadyslip.nonlinear.orbits.cycle_search import AHEAD, PATIENCE
-from steadyslip.nonlinear.orbits.flow import Flow
+from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 

@@ -9,10 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure, turned_round
+from steadyslip.nonlinear.orbits.branch_piece import BranchPiece
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.special import BranchPoint, lies_between
-from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, USED_UP, BranchPiece, Tracer, orbit_of
+from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, USED_UP, Tracer, orbit_of
 
 Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a piece broke off to the end of the range

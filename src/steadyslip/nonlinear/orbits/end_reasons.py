@@ -14,7 +14,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle, End, SpecialCycle
-from steadyslip.nonlinear.orbits.flow import Flow
+from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, BranchPoint, lies_between
 
 WINDINGS = 6  # folds, each closer to the next, after which a branch counts as winding round one value

@@ -1,7 +1,6 @@
 """Integrate the motion over given times, with its derivatives in the starting state and one parameter.
 
-Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes them, and the rig, from prepared jobs;
-`Flow` leaves one parameter free, of a rig that is driven at its own velocity and not disturbed.
+Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes them, and the rig, from prepared jobs.
 """
 
 from __future__ import annotations
@@ -18,19 +17,16 @@ from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Final, Recorded, Sampled, Setting
 from steadyslip.kernels.runner import LOG_KINDS, SETTINGS, Runner, runner
-from steadyslip.machine.machine import Machine
-from steadyslip.machine.slider import Slider
-from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.reduction import V_LP, Reduction
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales, shortest_time
-from steadyslip.model.sliding import explain_absence
-from steadyslip.model.start import initial_values, restored_of
+from steadyslip.model.start import restored_of
 from steadyslip.model.variational import with_sensitivities
 from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
-from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
+from steadyslip.motion.jobs import Jobs, Options, automatic_method
 from steadyslip.motion.observe import observe
 from steadyslip.motion.single import areas as areas_of
-from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact, remedy
+from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.protocol.segments import Segments
 
@@ -44,7 +40,6 @@ MORE = 8  # such a factor for runs next to a known one
 UNHEARD = 1e12  # factor of the tolerances of sensitivities where they are not to affect the steps
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are reused
 KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
-DIFFERENCE = 1e-5  # relative step of the parameter for central differences of the constants
 
 
 class FlowFailure(Failure):
@@ -74,12 +69,6 @@ def _slip_shares(reduction: Reduction, contact: int) -> ArrayFunction:
     """Derivative of slip at a contact in each state variable, and its steady slip rate over the drive's (cached)."""
     sliding = reduction.slidings[contact]
     return reduction.model.function([*(derivative(sliding.slip, s) for s in reduction.state), sliding.ratio])
-
-
-@question
-def _shifts(reduction: Reduction) -> ArrayFunction:
-    """Change of each state variable for a unit displacement of the load point (cached)."""
-    return reduction.model.function(reduction.shifts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -388,122 +377,6 @@ class FlowRunner:
             )
             found.append((v, sigma, pull))
         return found
-
-
-class Flow(FlowRunner):
-    """Integrates a rig with one free parameter.
-
-    Parameters
-    ----------
-    rig : Slider or Machine
-    name : str
-        Full name of the free parameter.
-    branch : int
-    rtol : float, optional
-        As for `FlowRunner`.
-    contact : str, optional
-        Name of the contact of a machine that is watched; the first unless given.
-
-    Raises
-    ------
-    NotAvailable
-        If the rig's motion is ill-posed, or pressed by a force prescribed in time.
-    """
-
-    def __init__(
-        self, rig: Slider | Machine, name: str, branch: int = 0, rtol: float | None = None, contact: str = ""
-    ) -> None:
-        self.rig, self.name, self.branch = rig, name, branch
-        address = rig.parameters()[name]
-        self.present = (name,) if address.role.structural else ()
-        self.domain = address.role.domain
-        self._settings: dict[float, FlowSetting] = {}
-        own = float(address.value)  # type: ignore[arg-type]
-        jobs = prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch)
-        if not jobs.posed[0]:
-            raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed', rig)}")
-        names = [one.name for one in jobs.point.model.contacts]
-        super().__init__(jobs, rtol=rtol, contact=names.index(contact) if contact else 0)
-        self.rounding = self._rounding(own)
-
-    def _rounding(self, value: float) -> float:
-        """Error in the state, in natural sizes, that rounding of forces makes in steady sliding.
-
-        Forces are rounded as sums of far larger ones that balance; the state settles where what is left is zero.
-        """
-        steady = self.steady(value)
-        _, jacobian, _ = self.field(self.setting(value), steady[None])
-        rates = np.abs(jacobian[0]) @ np.abs(steady) * np.finfo(float).eps
-        try:
-            return float(np.max(np.abs(np.linalg.inv(jacobian[0])) @ rates / self.scales))
-        except np.linalg.LinAlgError:
-            return 0.0
-
-    def setting(self, value: float) -> FlowSetting:
-        """The rig with the free parameter at a value.
-
-        Raises
-        ------
-        Failure
-            If the value is outside its domain, or steady sliding does not exist there.
-        """
-        if value not in self._settings:
-            if len(self._settings) > 64:
-                self._settings.clear()
-            self._settings[value] = self._made(value)
-        return self._settings[value]
-
-    def _made(self, value: float) -> FlowSetting:
-        """Build the setting for a parameter value."""
-        if not self.domain.contains(value):
-            raise Failure(f"{self.name} leaves its domain")
-        point = self._varied(np.array([value]))
-        if not np.all(point.exists):
-            rig = self.rig.with_values({self.name: value})
-            raise Failure(str(explain_absence(rig, operating_point(rig))))
-        unit = abs(value) or 1.0
-        drive = np.ravel(point.drive)[0]
-        return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
-
-    def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
-        """Derivatives of constants and inputs in the parameter, per unit, by central differences."""
-        beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
-        found = self.sensitive.constants(beside)
-        if len(found) == 1:
-            found = np.repeat(found, 2, axis=0)
-        rates = (found[0] - found[1]) / (2 * DIFFERENCE)
-        drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
-        return rates[None, None], {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
-
-    def _varied(self, around: Array) -> OperatingPoint:
-        """Operating point with the free parameter changed; short cut where nothing else depends on it."""
-        if all(self.rig.value(other) is None for other in self.rig.replaces):
-            named = self.base.point.named() | {self.name: around}
-            return self.base.point.with_arguments(named.values(), np.shape(around))
-        return operating_point(self.rig, {self.name: around}, self.present, self.branch, scan=True)
-
-    def steady(self, value: float) -> Array:
-        """State (n,) in steady sliding at a parameter value."""
-        setting = self.setting(value)
-        continuous, _ = initial_values(self.reduction, setting.point, {})
-        where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
-        row = setting.plain[1][0]
-        guesses = [row[Setting.GUESS], *row[self.tolerances.stop :]]
-        where |= {w: guess for w, guess in zip(self.reduction.searched, guesses, strict=False) if w not in where}
-        return np.array([where[symbol] for symbol in self.reduction.state])
-
-    def ahead(self, value: float, ways: float) -> Array:
-        """State after the load point has jumped back from steady sliding by `ways` natural sizes of slip."""
-        shifts = self.setting(value).point.evaluate(_shifts(self.reduction))
-        found = self.steady(value)
-        for i, shift in enumerate(shifts):
-            found[i] -= ways * self.natural_slip / self._share * float(np.ravel(shift)[0])
-        return found
-
-    @property
-    def _share(self) -> float:
-        """Slip rate at the watched contact over the velocity of the load point."""
-        return self.own.speed / float(self.own.inputs[0])
 
 
 def states_between(runs: FlowRunner, setting: FlowSetting, record: Array, at: Array) -> Array:

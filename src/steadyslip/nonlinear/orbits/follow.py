@@ -21,13 +21,14 @@ from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.orbits.branch import CycleBranch
+from steadyslip.nonlinear.orbits.branch_piece import BranchPiece
 from steadyslip.nonlinear.orbits.cycle import Cycle, End
 from steadyslip.nonlinear.orbits.cycle_search import cut_back, met, search_on
 from steadyslip.nonlinear.orbits.end_reasons import ENDS
-from steadyslip.nonlinear.orbits.flow import Flow
+from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.ranges import is_open, is_undecided
 from steadyslip.nonlinear.orbits.special import MET, SMALL, log_features
-from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, BranchPiece, Tracer, orbit_of
+from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, Tracer, orbit_of
 
 Array = np.ndarray
 SMALLEST = 1e-12  # smallest amplitude of ln v: some thousand roundings of the velocity

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.onset.hopf import Onset
+from steadyslip.nonlinear.orbits.branch_piece import BranchPiece
 from steadyslip.nonlinear.orbits.cut_segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_data
 from steadyslip.nonlinear.orbits.end_reasons import ENDS, RETRACED, SHRUNK, STANDING, EndRules, retraces, stands, winds
-from steadyslip.nonlinear.orbits.flow import FAR_MORE, MORE, Flow, FlowFailure
+from steadyslip.nonlinear.orbits.flow import FAR_MORE, MORE, FlowFailure
+from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
@@ -32,61 +34,6 @@ LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tr
 HIDDEN = 0.1  # largest share of rounding in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
 USED_UP = "the work was used up"
-
-
-@dataclass(eq=False)
-class BranchPiece:
-    """Cycles in the order in which they were followed, and the bifurcations among them.
-
-    `whole` is False where the cycles could not be followed any further, and True for an end with a physical reason.
-    `contact` names the contact of a machine that lifts off at the end, or is the fastest. `begins` and `stops` are the
-    ends where these are not the first and last cycle; `beyond` is the next cycle past the end, not part of the piece.
-    `rest` yields the cycles that follow where its part of the work was used up, after `steps` steps of integration.
-    `followed` is False for a place from which nothing was followed; `end` is the reason.
-    """
-
-    points: list[BranchPoint] = field(default_factory=list)
-    special: list[SpecialCycle] = field(default_factory=list)
-    end: str = ""
-    whole: bool = False
-    contact: str = ""
-    begins: End | None = None
-    stops: End | None = None
-    beyond: BranchPoint | None = None
-    rest: Iterator[tuple[BranchPoint, BranchPoint]] | None = None
-    twice: bool = False
-    steps: int = 0
-    followed: bool = True
-
-    @property
-    def bounds(self) -> tuple[End, End]:
-        """First and last end of the piece."""
-        ends = []
-        for end, i in ((self.begins, 0), (self.stops, -1)):
-            if end is None and self.points:
-                end = End("last cycle", self.points[i].cycle.value, self.points[i].cycle)
-            ends.append(end or self.begins or End("last cycle", np.nan))
-        return ends[0], ends[1]
-
-    def reversed(self) -> BranchPiece:
-        """The piece with its cycles in reverse order."""
-        count = len(self.points)
-        special = [replace(one, index=count - one.index) for one in reversed(self.special)]
-        return BranchPiece(self.points[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
-
-    def joined(self, more: BranchPiece) -> BranchPiece:
-        """Join this piece and `more`, which begins where this one ends."""
-        count = len(self.points)
-        special = [replace(one, index=one.index + count) for one in more.special]
-        return BranchPiece(
-            self.points + more.points,
-            self.special + special,
-            more.end,
-            more.whole,
-            more.contact,
-            self.begins,
-            more.stops,
-        )
 
 
 class Tracer:

@@ -1,0 +1,66 @@
+"""Piece of a branch of cycles: cycles in the order in which they were followed, and how they end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from steadyslip.nonlinear.orbits.cycle import End, SpecialCycle
+from steadyslip.nonlinear.orbits.special import BranchPoint
+
+
+@dataclass(eq=False)
+class BranchPiece:
+    """Cycles in the order in which they were followed, and the bifurcations among them.
+
+    `whole` is False where the cycles could not be followed any further, and True for an end with a physical reason.
+    `contact` names the contact of a machine that lifts off at the end, or is the fastest. `begins` and `stops` are the
+    ends where these are not the first and last cycle; `beyond` is the next cycle past the end, not part of the piece.
+    `rest` yields the cycles that follow where its part of the work was used up, after `steps` steps of integration.
+    `followed` is False for a place from which nothing was followed; `end` is the reason.
+    """
+
+    points: list[BranchPoint] = field(default_factory=list)
+    special: list[SpecialCycle] = field(default_factory=list)
+    end: str = ""
+    whole: bool = False
+    contact: str = ""
+    begins: End | None = None
+    stops: End | None = None
+    beyond: BranchPoint | None = None
+    rest: Iterator[tuple[BranchPoint, BranchPoint]] | None = None
+    twice: bool = False
+    steps: int = 0
+    followed: bool = True
+
+    @property
+    def bounds(self) -> tuple[End, End]:
+        """First and last end of the piece."""
+        ends = []
+        for end, i in ((self.begins, 0), (self.stops, -1)):
+            if end is None and self.points:
+                end = End("last cycle", self.points[i].cycle.value, self.points[i].cycle)
+            ends.append(end or self.begins or End("last cycle", np.nan))
+        return ends[0], ends[1]
+
+    def reversed(self) -> BranchPiece:
+        """The piece with its cycles in reverse order."""
+        count = len(self.points)
+        special = [replace(one, index=count - one.index) for one in reversed(self.special)]
+        return BranchPiece(self.points[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
+
+    def joined(self, more: BranchPiece) -> BranchPiece:
+        """Join this piece and `more`, which begins where this one ends."""
+        count = len(self.points)
+        special = [replace(one, index=one.index + count) for one in more.special]
+        return BranchPiece(
+            self.points + more.points,
+            self.special + special,
+            more.end,
+            more.whole,
+            more.contact,
+            self.begins,
+            more.stops,
+        )

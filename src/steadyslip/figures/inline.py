@@ -67,11 +67,18 @@ def _png_base64(found: Any) -> str:
     return base64.b64encode(few.getvalue()).decode()
 
 
+def _shorter(path: str) -> str:
+    """Path of an SVG in hundredths of a point, without the spaces that it can do without."""
+    rounded = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
+    return re.sub(r"(?<=[A-Za-z])\s+|\s+(?=[A-Za-z])", "", rounded.strip())
+
+
 def _page_svg(svg: str, words: str) -> str:
     """SVG for use inside HTML: no metadata or comments, ids made unique to the figure, sizes in CSS pixels."""
     svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.S)
     svg = re.sub(r"<!--.*?-->\s*", "", svg, flags=re.S)
     svg = re.sub(r'<g id="[\w.-]+">', "<g>", svg)
+    svg = re.sub(r'(?<= d=")[^"]*', lambda path: _shorter(path[0]), svg)
     own = f"d{zlib.crc32(svg.encode())}-"
     svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{own}", svg)
     svg = re.sub(r'\s(?:width|height)="[\d.]+pt"', "", svg, count=2)

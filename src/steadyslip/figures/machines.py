@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Polygon, Rectangle
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import typeset
 from steadyslip.core.palette import BLACK, BLUE, VERMILION
 from steadyslip.figures.style import axes_or_new
@@ -35,12 +36,19 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
         Motion is to the right. Boxes slide, circles turn; zigzags are springs, pistons dashpots; hatched is the ground.
         Solid blue: action of the drive; dashed blue: its sensors; red: constant forces.
 
+    Raises
+    ------
+    NotAvailable
+        If a body is a structure given by matrices or modes.
+
     Examples
     --------
     >>> machine = ss.read_rig("examples/machines/two-guides.toml")
     >>> axes = ss.figures.machine_sketch(machine)
     >>> axes.figure.savefig("machine-sketch.svg")
     """
+    if any(body.is_structure for body in machine.bodies.values()):
+        raise NotAvailable("a structure has the shape of its matrices, which no sketch shows; draw its modes instead")
     pencil = AxesPencil(axes_or_new(ax))
     Drawing(machine, pencil).draw()
     own = pencil.ax

@@ -30,6 +30,19 @@ LARGEST, LONG = 4, 400
 """Degree of the characteristic polynomial up to which its condition is written, and operations beyond which not."""
 _LETTERS = {"mu": "mu_ss", "f1": "f_1"} | {f"B{i}": f"B_{i}" for i in range(4)}
 MU_SS = sp.Symbol("mu_ss", real=True)
+MEANINGS = {
+    "k_cr": ("Pa/m", "critical stiffness along the sliding direction"),
+    "mu_ss": ("1", "friction coefficient in steady sliding"),
+    "f": ("Pa s/m", "rise of friction stress with velocity at once, dampings included"),
+    "S": ("Pa s/m", "rise of friction stress with velocity in steady sliding, dampings included"),
+    "r": ("1/s", "rate at which the memory of friction decays"),
+    "f_1": ("1", "rise of friction stress with normal stress at once"),
+    "B_0": ("kg/m^2", "rise of normal stress with the acceleration of the block"),
+    "B_1": ("Pa s/m", "rise of normal stress with its velocity"),
+    "B_2": ("1", "rise of normal stress with the stress of the spring"),
+    "B_3": ("Pa/m", "rise of normal stress with its displacement"),
+}
+"""SI unit and meaning of the letters of formulas that are not those of the equations."""
 
 
 @checked()

@@ -15,6 +15,8 @@ LETTERS: Final = {
     "drive.velocity": "v_0",
 }
 """Letters of a slider's own parameters in equations; those of laws are declared with their parameters."""
+_UNWRITTEN: Final = {"slider.axial_stiffness": "k_s"}
+"""Letters of parameters that are not in the equations themselves."""
 _WORDS = {
     "friction level": "friction",
     "direct effect": "direct effect",
@@ -36,7 +38,7 @@ def letter_of(rig: Rig, name: str) -> str:
     ['σ_0', 'd_c', 'm']
     """
     last = name.rpartition(".")[2]
-    known = LETTERS.get(name) or rig.parameters()[name].role.letter
+    known = LETTERS.get(name) or _UNWRITTEN.get(name) or rig.parameters()[name].role.letter
     base, line, below = (known or last).partition("_")
     if not known and len(base) > 1 and base not in _GREEK:
         return ""

@@ -373,11 +373,7 @@ class Model(Keeper, Displayed):
         Internal symbols are named by position and differ from all others (`steadyslip.core.symbols`).
         """
         return expression.xreplace(
-            {
-                one: sp.Symbol(self.letters.get(one, one.name), **one.assumptions0)
-                for one in expression.free_symbols
-                if isinstance(one, sp.Dummy)
-            }
+            {one: sp.Symbol(self.letters.get(one, one.name), **one.assumptions0) for one in expression.atoms(sp.Dummy)}
         )
 
     def equations(self) -> list[sp.Eq]:

@@ -9,8 +9,8 @@ from steadyslip.core.format import format_quantity
 from steadyslip.motion.events import AnyEvent, AnySlip, ContactEvent, ContactSlip
 
 JUDDERS = {
-    "again": "judders: every {every} it {waits}, then slips {slip} within {within}, {drop}",
-    "alone": "slips {slip} within {within}, {drop}",
+    "again": "judders: every {every} it {waits}, then slips {slip} within {within}, a drop of {drop}",
+    "alone": "slips {slip} within {within}, a drop of {drop}",
     "sticks": "sticks",
     "lags": "lags",
     "rings": "; rings {rings} times at {often}",

@@ -191,7 +191,7 @@ def _record_html(record: FrozenRecord) -> Iterator[str]:
 def _result_html(result: Any) -> Iterator[str]:
     words = str(result)
     has_text = not words.startswith((f"{type(result).__name__}(", "<"))
-    yield heading(type(result).__name__, 3)
+    yield heading(kind_of(result), 3)
     if has_text:
         yield text_html(words)
     else:
@@ -199,6 +199,11 @@ def _result_html(result: Any) -> Iterator[str]:
     for name, many in _inner_tables(result):
         yield heading(name.replace("_", " ").capitalize(), 3) + many
     yield figure(_plot(result))
+
+
+def kind_of(result: Any) -> str:
+    """Kind of a result in words, such as "Rig comparison"."""
+    return " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).capitalize()
 
 
 def _plot(result: Any) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import singledispatch
 from typing import Any
 
@@ -18,9 +18,11 @@ from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, Population, predict
 from steadyslip.explorer.sketch import sketch
+from steadyslip.figures.hunting import hunting
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.maps import MAX_FACETS
 from steadyslip.files.specifications.layout import own_fields
+from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -29,12 +31,17 @@ from steadyslip.motion import History
 from steadyslip.motion.events import ContactSlip
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.cycle_commands import Thresholds
+from steadyslip.nonlinear.hunting.hunt import hunt
+from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.protocol import Protocol
 from steadyslip.reports import machine_parts as machine_report, rig as rig_report
-from steadyslip.reports.brief import result_html, text_html
+from steadyslip.reports.brief import kind_of, result_html, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
+from steadyslip.reports.sections import notes_of, references
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
+from steadyslip.verdict.compare import RigComparison
+from steadyslip.verdict.words import headline
 
 MAX_ROWS = 24  # rows of a table of slip events or cycles, so that a document stays short (by trial)
 PHASE_PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
@@ -58,18 +65,22 @@ def parts_of(result: Any, **options: Any) -> Parts:
     own = getattr(result, "rig", None)
     rig: Any = own if isinstance(own, Rig) else None
     first = str(result).partition("\n")[0]
-    kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
+    kind = kind_of(result).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr
         first = kind
     body = [*rig_section(rig), heading("What was found"), result_html(result)]
     return Parts(sentence(first).rstrip("."), "", f"What does the {kind} say?", body, rig)
 
 
-def rig_section(rig: Slider | Machine | None) -> list[str]:
-    """HTML of the sketch and inputs of a rig; empty for None."""
+def rig_section(rig: Slider | Machine | None, source: str = "") -> list[str]:
+    """HTML of the sketch and inputs of a rig, with comments of its file if its text is given; empty for None."""
     if isinstance(rig, Machine):
         return [heading("The machine"), result_html(rig)]
-    return [] if rig is None else [heading("The rig"), figure(sketch(rig)), rig_report.input_table(rig)]
+    return (
+        []
+        if rig is None
+        else [heading("The rig"), figure(sketch(rig)), rig_report.input_table(rig, {}, notes_of(source))]
+    )
 
 
 @parts_of.register
@@ -159,6 +170,8 @@ def _rig(
     charts: Sequence[tuple[str, str]] = (), source: str = "",
 ) -> Parts:  # fmt: skip
     found = None
+    if result.holds:
+        return _of_held(result, source, fit is not None or branch or tolerances or charts)
     if fit is not None:
         found = predict(result, fit)
         result = found.rig
@@ -172,6 +185,8 @@ def _machine(
     result: Machine, branch: int = 0, fit: Fit | Population | None = None, tolerances: Mapping[str, Any] | None = None,
     charts: Sequence[tuple[str, str]] = (), source: str = "",
 ) -> Parts:  # fmt: skip
+    if result.holds:
+        return _of_held(result, source, fit is not None or branch or tolerances or charts)
     if branch or fit is not None or charts:
         raise NotAvailable(
             "a machine has one steady sliding, and fits and charts are of a slider; leave branch, fit and charts out"
@@ -179,6 +194,59 @@ def _machine(
     within = tolerate(result, tolerances) if tolerances else None
     order = rig_report.Order((), getattr(tolerances, "adjust", ()), source)
     return machine_report.verdict_parts(analyze(result), within, order)
+
+
+def _of_held(rig: Slider | Machine, source: str, asked: Any) -> Parts:
+    """Contents of the document of a rig whose drive holds a place: whether it hunts."""
+    if asked:
+        raise NotAvailable(
+            "the drive holds a place (velocity = 0), so the document is on whether it hunts, which knows no branch, "
+            "fit, tolerances or charts; leave them out"
+        )
+    return replace(_hunt(hunt(rig), source), protocol=None)  # its own file is listed, not the push that was tried
+
+
+@parts_of.register
+def _hunt(result: Hunt, source: str = "") -> Parts:
+    rig, (first, _, rest) = result.rig, str(result).partition("\n")
+    words = "How far it is from its target, and the force of the drive, over time."
+    body = [
+        heading("What was found"), text_html(rest), figure(figure_html(lambda: hunting(result), words, 7.0), words),
+        *rig_section(rig, source), *references(rig),
+    ]  # fmt: skip
+    question = "Does this axis come to rest at the place that it holds, or does it hunt: how far, and how often?"
+    return Parts(first.capitalize(), "", question, body, rig, result.protocol)
+
+
+@parts_of.register
+def _comparison(result: RigComparison) -> Parts:
+    rigs: list[Any] = [one.rig for one in result.verdicts]
+    rows = [(one.parameter if one.parameter not in rigs[0].parameters() else said(rigs[0], one.parameter),
+             one.first, one.second, result.part_in_words(one), one.first_with, one.second_with)
+            for one in result.differences]  # fmt: skip
+    a, b = result.names
+    head = ("difference", a, b, f"its part in {result.of}", f"{a} with that of {b}", f"{b} with that of {a}")
+    (label, *names), *sides = result.side_by_side()
+    told = [tuple(_with_words(rigs, cells)) for cells in sides]
+    body = [
+        heading("Side by side"), table(told, (label, *names), caption="The two rigs."),
+        heading("What differs?"), table(rows, head, caption="Differences, the one with the largest part first."),
+        *map(paragraph, result.decisive()),
+        *(part for name, rig in zip(result.names, rigs, strict=True)
+          for part in (heading(f"Inputs of {name}"), *rig_section(rig)[1:])),
+        *references(*rigs),
+    ]  # fmt: skip
+    verdicts = [headline(one, capitals=False).partition(":")[0].lower() for one in result.verdicts]
+    question = "Which of the two slides steadily, and which of their differences decides it?"
+    return Parts(f"{a}: {verdicts[0]}; {b}: {verdicts[1]}", "", question, body)
+
+
+def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
+    """Cells of a row about two rigs, with a parameter at the beginning in words instead of by its path."""
+    yield cells[0]
+    for rig, cell in zip(rigs, cells[1:], strict=True):
+        name, _, rest = cell.partition(" ")
+        yield f"{said(rig, name)} {rest}" if name in rig.parameters() else cell
 
 
 @parts_of.register
@@ -287,7 +355,8 @@ def _branch(result: CycleBranch) -> Parts:
     body = [
         *rig_section(result.rig),
         heading("The cycles"), text_html(rest),
-        figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
+        figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5),
+               f"Cycles along {said(result.rig, along)}."),
         table(special, ("special", along, "period")),
         table(listed, (along, "period", "peak velocity", drop, ""), left=False),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
@@ -326,12 +395,12 @@ def _status_shares(result: MapResult) -> str:
 
 def _map_figures(result: MapResult) -> Iterator[str]:
     """HTML figure of a map over its first two parameters: a panel for each value of a third, or at the rig's values."""
-    others = [name for name in result.dims if name != "sample"][2:]
+    rig, others = result.rig, [name for name in result.dims if name != "sample"][2:]
     if len(others) == 1 and len(result.read(others[0])) <= MAX_FACETS:
-        words = f"One picture for each value of {others[0]}."
+        words = f"One picture for each value of {said(rig, others[0])}."
         yield figure(figure_html(lambda: result.plot(facet=others[0]), words), words)
         return
-    held = f"At the rig's own {', '.join(others)}, or next to it." if others else ""
+    held = f"At the rig's own {', '.join(said(rig, name) for name in others)}, or next to it." if others else ""
     yield figure(figure_html(lambda: result.plot(), "map", 6.5), held)
 
 

@@ -6,6 +6,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import sympy as sp
+
 from steadyslip import figures
 from steadyslip.core.areas import stress_name
 from steadyslip.core.checks import in_words
@@ -21,9 +23,10 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import Markup, figure, heading, inline_math, math, paragraph, table
+from steadyslip.reports.elements import figure, heading, inline_math, math, paragraph, table
 from steadyslip.reports.sections import (
     assumptions,
+    input_letter,
     letters,
     motion,
     notes_of,
@@ -36,7 +39,7 @@ from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.words import edge_rows, facts, headline, meaning
 
 VALIDITY = (
-    "The verdict is on small disturbances of steady sliding: it holds for the model and the numbers above, and says "
+    "The verdict is on small disturbances of steady sliding: it holds for the model and the inputs below, and says "
     "nothing of wear, heat or of what the laws leave out."
 )
 
@@ -66,7 +69,7 @@ def verdict_parts(
         *_confidence_section(prediction), *tolerance_section(tolerated),
         heading("How far is the edge?"), *edge_table(analysis), *checks_line(analysis),
         *_chart_section(analysis, order), *motion(analysis),
-        heading("The formulas"), *formula_section(analysis), letters(rig), *references(rig),
+        heading("The formulas"), *formula_section(analysis), *references(rig),
     ]  # fmt: skip
     question = f"Will this rig slide steadily at {speed}, what would make it, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
@@ -80,13 +83,12 @@ def input_table(
 
     With its tolerance if one is given, and where it comes from: the comment behind it in the rig file, if there is one.
     """
-    model = build_model(rig)
-    symbols = model.parameters
+    model = None if rig.holds else build_model(rig)
     rows = []
     for name, one in rig.parameters().items():
         if one.value is None:
             continue
-        known = inline_math(model.written(symbols[name])) if name in symbols else Markup("")
+        known = inline_math(sp.Symbol(input_letter(model, rig, name)))
         rows.append(
             (
                 name,
@@ -130,14 +132,16 @@ def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     if analysis.stable is not None:
         locus = figure_html(lambda: figures.root_locus(rig), "root locus", 6.0)
         yield figure(
-            locus, f"Eigenvalues of small disturbances as {stiffness} varies; to the right of the axis they grow."
+            locus,
+            f"Eigenvalues of small disturbances as {said(rig, stiffness)} varies; to the right of the axis they grow.",
         )
 
 
 def formula_section(analysis: Analysis) -> Iterator[str]:
     """HTML of the formula of the critical stiffness, if there is one, and of the equations of motion."""
+    printed: list[sp.Eq] = []
     try:
-        whole, *parts = formula_in_parts(analysis.rig)
+        whole, *parts = printed = formula_in_parts(analysis.rig)
         yield paragraph("The critical stiffness of every rig with the same terms, along the sliding direction:")
         yield f'<div class="formula" tabindex="0">{math(whole)}</div>'
         if parts:
@@ -147,8 +151,10 @@ def formula_section(analysis: Analysis) -> Iterator[str]:
     except NotAvailable as refused:
         yield paragraph(f"The critical stiffness has no formula here: {refused}.")
     yield paragraph("The equations of motion:")
-    for equation in build_model(analysis.rig).equations():
+    equations = build_model(analysis.rig).equations()
+    for equation in equations:
         yield f'<div class="formula" tabindex="0">{math(equation)}</div>'
+    yield letters(analysis.rig, [*printed, *equations])
 
 
 def _confidence_section(prediction: Prediction | None) -> Iterator[str]:

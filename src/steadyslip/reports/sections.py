@@ -5,21 +5,30 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import sympy as sp
+
 from steadyslip import figures
+from steadyslip.core.areas import outside, stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError, SteadyslipError
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.boundary import Margin
+from steadyslip.linear.formula import MEANINGS
 from steadyslip.linear.status import stability
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import letter_of, said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.model import Model
 from steadyslip.model.build import build_model
+from steadyslip.model.legend import legend, letters_in
+from steadyslip.model.numeric import has_structure
 from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table
+from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.judder import STEP, motion_after
@@ -32,7 +41,8 @@ _ROWS = 4  # changes that are recommended, nearest first
 def recommendation(analysis: Verdict, adjustable: Sequence[str] = ()) -> Iterator[str]:
     """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
 
-    `adjustable` names what can be changed; otherwise all but parameters of friction, and these if nothing else helps.
+    `adjustable` names what can be changed; otherwise all that the rig has but parameters of friction, and these if
+    nothing else helps.
     """
     yield heading("The recommendation")
     rig = analysis.rig
@@ -47,7 +57,8 @@ def recommendation(analysis: Verdict, adjustable: Sequence[str] = ()) -> Iterato
         return
     curing = [one for one in analysis.margins if _cures(one)]
     chosen = [one for one in curing if one.parameter in adjustable] if adjustable else []
-    chosen = chosen or [one for one in curing if "friction." not in one.parameter] or curing
+    present = [one for one in curing if one.value]  # from zero it is no change, but a part to be added
+    chosen = chosen or [one for one in present if "friction." not in one.parameter] or present
     rows = [row for one in chosen if (row := _change(analysis, one))][:_ROWS]
     if not rows:
         yield paragraph("No single change within range makes it stable; change several, as steadyslip cure proposes.")
@@ -92,8 +103,10 @@ def _value(analysis: Verdict, margin: Margin, value: float) -> str:
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
     """HTML of what the verdict takes for granted."""
     yield heading("Assumptions")
-    inertia = "with inertia" if build_model(rig).inertial else "without inertia (quasistatic)"
-    yield paragraph(f"The rig is modelled {inertia}; bodies are rigid, and each contact has one normal force.")
+    inertia = "with inertia" if has_structure(rig) or build_model(rig).inertial else "without inertia (quasistatic)"
+    bodies = "structures move as their matrices say, other" if has_structure(rig) else ""
+    words = f"The rig is modelled {inertia}; {bodies} bodies are rigid, and each contact has one normal force."
+    yield paragraph(words.replace("  ", " "))
     yield paragraph(validity)
     yield from (paragraph(text, "warning") for text in warnings)
 
@@ -114,9 +127,13 @@ def notes_of(text: str) -> dict[str, str]:
     {'friction.a': 'measured on B819', 'friction.b': ''}
     """
     found, section = {}, ""
+    many: Counter[str] = Counter()
     for line in text.splitlines():
-        if head := re.match(r"\s*\[+([\w.-]+)\]+", line):
-            section = head[1]
+        if head := re.match(r"\s*(\[+)([\w.-]+)\]+", line):
+            section = head[2]
+            if len(head[1]) > 1:  # one of several tables, which are counted from 1
+                many[section] += 1
+                section = f"{section}.{many[section]}"
         elif key := re.match(r"\s*([\w-]+)\s*=\s*(?:\"[^\"]*\"|[^#\"])*(?:#\s*(.*))?$", line):
             found[f"{section}.{key[1]}"] = (key[2] or "").strip()
     return found
@@ -143,23 +160,37 @@ def motion(analysis: Verdict) -> Iterator[str]:
     yield figure(figure_html(lambda: figures.phase_plane(run), words, 5.0), words)
 
 
-def letters(rig: Slider | Machine) -> str:
-    """HTML table of the letters of the equations that are no inputs."""
+def letters(rig: Slider, printed: Iterable[sp.Basic]) -> str:
+    """HTML table of the letters in printed equations that are not those of the inputs."""
     model = build_model(rig)
-    rows = [(inline_math(model.written(one.symbol)), one.unit, one.doc) for one in model.variables]
+    inputs = {input_letter(model, rig, name) for name, one in rig.parameters().items() if one.value is not None}
+    known = legend(model) | MEANINGS
+    rows = []
+    for letter in letters_in(printed):
+        if letter not in inputs:
+            unit, words = known.get(letter, ("", ""))
+            if unit:
+                unit = outside(unit, rig.area)[1]
+            rows.append((inline_math(sp.Symbol(letter)), unit, stress_name(words, rig.area)))
     return table(rows, ("letter", "unit", "meaning"), caption="Letters of the equations besides the inputs.")
 
 
-def references(rig: Slider | Machine) -> Iterator[str]:
-    """HTML of the laws of a rig with what their descriptions cite, and of the source of the method."""
+def input_letter(model: Model | None, rig: Slider | Machine, name: str) -> str:
+    """Letter of an input: as the equations write it, or would if it were in them, or there were any."""
+    if model is None or name not in model.parameters:
+        return letter_of(rig, name) or name.rpartition(".")[2]
+    return str(model.written(model.parameters[name]))
+
+
+def references(*rigs: Slider | Machine) -> Iterator[str]:
+    """HTML of the laws of rigs with what their descriptions cite, and of the source of the method."""
     yield heading("References")
-    both = [law for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
+    both = [law for rig in rigs for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
     laws = [one for law in both for one in (law, *records_in(law)) if one.name]
     rows = {law.name: (law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0]) for law in laws}
     yield table(
         list(rows.values()), ("law", "what it is"), caption="Laws that were used; their pages have the equations."
     )
-    yield paragraph(
-        "Method and numbered equations: P. E. Dupont and D. Bapna, Stability of sliding frictional surfaces with "
-        "varying normal force, Journal of Vibration and Acoustics 116 (2), 237-242, 1994, eqs 17-32, with corrections."
-    )
+    yield from map(paragraph, dict.fromkeys(one for _, words in rows.values() for one in cited(words)))
+    if not any(rig.holds for rig in rigs):
+        yield paragraph(f"Method and numbered equations: {METHOD}, eqs 17-32, with corrections.")

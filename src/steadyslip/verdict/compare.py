@@ -85,12 +85,13 @@ class RigComparison(Displayed):
 
     def __str__(self) -> str:
         lines = [f"{name}: {headline(one)}" for name, one in zip(self.names, self.verdicts, strict=True)]
-        rows = list(self._rows())
+        rows = list(self.side_by_side())
         wide = [max(len(row[i]) for row in rows) for i in range(2)]
         lines += ["", *(f"{a:<{wide[0]}}  {b:<{wide[1]}}  {c}".rstrip() for a, b, c in rows)]
         return "\n".join([*lines, "", *self._differences()])
 
-    def _rows(self) -> Iterator[tuple[str, str, str]]:
+    def side_by_side(self) -> Iterator[tuple[str, str, str]]:
+        """Rows of a table: what is told, and its text for either rig; the first row has the names."""
         yield ("", *self.names)
         for label, of in (
             ("k/k_cr", _ratio), ("growth rate", _growth), ("oscillation", _period), ("nearest edge", _edge),
@@ -110,28 +111,33 @@ class RigComparison(Displayed):
         wide = 2 + max(len(one.parameter) for one in self.differences)
         values = [f"{one.first} -> {one.second}" for one in self.differences]
         across = 2 + max(map(len, values))
-        of = {"safety": "k/k_cr", "growth": "the growth rate"}.get(self.measure, "")
         yield (
-            f"What differs, by its part in the change of {of} (Shapley value)"
-            if of
+            f"What differs, by its part in the change of {self.of} (Shapley value)"
+            if self.of
             else ("What differs; no parts are told, since some rig between the two has no growth rate")
         )
         for one, value in zip(self.differences, values, strict=True):
-            text = f"{one.parameter:<{wide}}{value:<{across}}{self._part(one)}"
+            text = f"{one.parameter:<{wide}}{value:<{across}}{self.part_in_words(one)}"
             yield from (
                 textwrap.wrap(text, 110, subsequent_indent=" " * (wide + 2), drop_whitespace=True)
                 if (len(text) > 110)
                 else [text]
             )
-        yield from self._alone()
+        yield from self.decisive()
 
-    def _part(self, one: Difference) -> str:
+    @property
+    def of(self) -> str:
+        """What the parts are of, in words; empty if there are none."""
+        return {"safety": "k/k_cr", "growth": "the growth rate"}.get(self.measure, "")
+
+    def part_in_words(self, one: Difference) -> str:
+        """Part of a difference as text, with its share of all."""
         if not self.measure:
             return ""
         part = f"x {one.part:.3g}" if self.measure == "safety" else f"{one.part:+.3g} 1/s"
         return part if math.isnan(one.share) else f"{part} ({format_percent(round(one.share, 2))})"
 
-    def _alone(self) -> Iterator[str]:
+    def decisive(self) -> Iterator[str]:
         """Sentences on the differences that decide the verdict alone."""
         first, second = ("stable" if one.stable else "unstable" for one in self.verdicts)
         if first == second:

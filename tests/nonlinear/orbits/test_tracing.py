@@ -247,7 +247,7 @@ def test_the_cycle_of_a_block_that_rings_after_each_slip_is_found():
     assert all(one.passed for one in cycle.checks)  # by the motion: its multipliers lose their digits
     assert (cycle.multiplier_error > 1e-3, cycle.returned < 1e-5) == (True, True)
     assert own.sentence.startswith(
-        "judders: every 4.92 s it sticks, then slips 33.2 um within 50.7 ms, 394 N; rings 21"
+        "judders: every 4.92 s it sticks, then slips 33.2 um within 50.7 ms, a drop of 394 N; rings 21"
     )
     assert str(branch).endswith(f"{own.sentence}\n  checked: {len(own)} cycles, stability of {len(own)} cycles")
     plain = branch.to_dict()["at_rig"]

@@ -1,0 +1,24 @@
+"""Figure of a held axis: how far it is from its target, and the force of the drive, over time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steadyslip.core.palette import BLUE, GREY
+from steadyslip.figures.style import axis_label, display_unit, new_panels
+from steadyslip.nonlinear.hunting.hunt_result import Hunt
+
+
+def hunting(result: Hunt) -> np.ndarray:
+    """Plot error and force of the drive over time in two panels; grey: the target."""
+    panels = new_panels(2, 1, (6.4, 4.4), sharex=True)[:, 0]
+    across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)
+    series = (("target less place", result.error, result.unit), ("force of the drive", result.force, result.force_unit))
+    for axes, (name, values, si) in zip(panels, series, strict=True):
+        area = result.rig.area if si == "Pa" else None
+        factor, unit = display_unit(si, float(np.max(np.abs(values), initial=0.0)) or 1.0, area)
+        axes.axhline(0.0, color=GREY, linewidth=0.8)
+        axes.plot(result.time / across, values / factor, color=BLUE)
+        axes.set_ylabel(axis_label(name, unit))
+    panels[1].set_xlabel(axis_label("time", seconds))
+    return panels

@@ -1,0 +1,76 @@
+"""Unit and meaning of every letter in the equations of a Model that is not a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import sympy as sp
+
+from steadyslip.model.equations import Contact, Coordinate, Model
+
+Meaning = tuple[str, str]
+"""SI unit and words."""
+
+
+def legend(model: Model) -> dict[str, Meaning]:
+    """SI unit and meaning of each letter that may occur in the equations, by the letter as written.
+
+    >>> from steadyslip.model import build_model
+    >>> from steadyslip.reproduce import paper_rig
+    >>> legend(build_model(paper_rig()))["v_lp"]
+    ('m/s', 'velocity of the load point')
+    """
+    found = {
+        model.inputs["load_velocity"]: ("m/s", "velocity of the load point"),
+        model.inputs["time"]: ("s", "time"),
+    }
+    for coordinate in model.coordinates:
+        found |= _of_coordinate(coordinate, model.is_slider)
+    for contact in model.contacts:
+        found |= _of_contact(contact, model.is_slider)
+    found |= {model.parameters[name]: (model.roles[name].unit, model.roles[name].doc) for name in model.parameters}
+    found |= {one.symbol: (one.unit, one.doc) for one in model.variables}
+    for late, (symbol, _) in model.late.items():
+        unit, words = found[symbol]
+        found[late] = (unit, f"{words}, a delay ago")
+    if model.letting_go is not None:
+        found[model.letting_go.free] = ("1", "1 while the force of the drive is imposed, else 0")
+    return {str(model.written(symbol)): meaning for symbol, meaning in found.items()}
+
+
+def letters_in(expressions: Iterable[sp.Basic]) -> Iterator[str]:
+    """Names of the symbols and functions of expressions, in order of appearance, each once."""
+    seen: dict[str, None] = {}
+    for expression in expressions:
+        for one in sp.preorder_traversal(expression):
+            if isinstance(one, sp.Symbol):
+                seen[str(one)] = None
+            elif isinstance(one, sp.core.function.AppliedUndef):
+                seen[str(one.func)] = None
+    yield from seen
+
+
+def _of_coordinate(one: Coordinate, only: bool) -> dict[sp.Symbol, Meaning]:
+    body, turns = "the block" if only else one.name, one.unit == "rad"
+    push = ("Pa", "stress") if only else ("N m", "torque") if turns else ("N", "force")
+    return {
+        one.displacement: (one.unit, f"displacement of {body} ahead of the load point"),
+        one.velocity: (f"{one.unit}/s", f"velocity of {body}"),
+        one.acceleration: (f"{one.unit}/s^2", f"acceleration of {body}"),
+        one.push: (push[0], f"disturbance: {push[1]} on {body}"),
+    }
+
+
+def _of_contact(one: Contact, only: bool) -> dict[sp.Symbol, Meaning]:
+    at = "" if only else f" at {one.name}"
+    found = {
+        one.velocity: ("m/s", f"slip rate{at}"),
+        one.spring: ("Pa", f"stress of spring and drive on the block{at}"),
+        one.friction: ("Pa", f"friction stress{at}"),
+        one.normal: ("Pa", f"normal stress{at}"),
+        one.sigma_ss: ("Pa", f"normal stress in steady sliding{at}"),
+        one.press: ("Pa", f"disturbance: normal stress added{at}"),
+    }
+    if one.outside is not None:
+        found[one.outside] = ("Pa", f"change of the surrounding pressure{at}")
+    return found

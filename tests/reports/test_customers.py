@@ -1,0 +1,137 @@
+"""Reports for who ordered them: letters, references, recommendation, held axes, two rigs beside each other."""
+
+import inspect
+import re
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+import steadyslip as ss
+from read_pages import words
+from rigs_of_theory import CONTACTS, LAWS, rig
+from steadyslip.core.errors import NotAvailable
+from steadyslip.figures.inline import _shorter
+from steadyslip.linear.formula import MEANINGS, formula_in_parts
+from steadyslip.machine.letters import said
+from steadyslip.model.build import build_model
+from steadyslip.model.legend import legend, letters_in
+from steadyslip.reports.literature import PUBLICATIONS, cited
+from steadyslip.reports.rig import input_table
+from steadyslip.reports.sections import letters, notes_of, recommendation
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
+RIGS = [path for path in EXAMPLES if "[drive]" in path.read_text() and path.stem not in ("hunting-axis", "reed")]
+LAW_CLASSES = [one for one in vars(ss.laws).values() if inspect.isclass(one)]
+SLIDERS = list(product(LAWS.values(), CONTACTS, (0.0, 1e6)))
+
+
+def printed(one):
+    equations = build_model(one).equations()
+    try:
+        return [*formula_in_parts(one), *equations]
+    except NotAvailable:
+        return equations
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_every_letter_of_the_equations_of_an_example_has_a_meaning(path):
+    """In the table of inputs or in that of letters, which has no other; each with its unit."""
+    own = ss.read_rig(path)
+    model, known = build_model(own), legend(build_model(own))
+    equations = printed(own) if isinstance(own, ss.Slider) else model.equations()
+    found = list(letters_in(equations))
+    assert {"v_lp", "t"} <= set(found)
+    assert not {one for one in found if one not in known | MEANINGS}
+    assert all(unit and meaning for unit, meaning in (known | MEANINGS).values())
+    if isinstance(own, ss.Slider):
+        inputs, besides = (re.findall("<mi>.*?</math>", text) for text in (input_table(own), letters(own, equations)))
+        assert len(inputs) == sum(one.value is not None for one in own.parameters().values())
+        assert len(besides) == len(set(besides))
+        assert not set(inputs) & set(besides)
+        assert len(re.findall("<tr>", letters(own, equations))) == len(besides) + 1
+
+
+@pytest.mark.parametrize(("law", "contact", "mass"), SLIDERS[::7])
+def test_every_letter_of_any_slider_has_a_meaning(law, contact, mass):
+    own = rig(friction=law, contact=contact, mass=mass, stiffness=9e9)
+    model = build_model(own)
+    assert set(letters_in(model.equations())) <= legend(model).keys()
+
+
+def test_reports_name_no_inner_symbol():
+    """Time is t in equations, and inputs that they leave out have the letters of the others."""
+    text = ss.report(ss.read_rig("examples/inclined-spring.toml"), explorer=False).html
+    assert "<mi>_" not in text
+    assert "<msub><mi>_" not in text
+    rows = re.findall("<tr>.*?</tr>", input_table(ss.read_rig("examples/inclined-spring.toml")))
+    assert all("<math" in row for row in rows[1:])
+
+
+@pytest.mark.parametrize("law", LAW_CLASSES, ids=lambda law: law.__name__)
+def test_every_publication_that_a_law_names_is_given_in_full(law):
+    first = (law.__doc__ or "").partition("\n")[0]
+    named = re.findall(r"\b(?:19|20)\d{2}\b", first.replace("Bapna (1994)", ""))
+    assert sorted(one[-5:-1] for one in cited(first)) == sorted(named)
+
+
+def test_publications_are_told_apart():
+    assert [len(cited(one)) for one in ("Ruina 1983", "Dieterich 1992", "Canudas de Wit et al. 1995")] == [1, 0, 1]
+    assert all(re.search(r"\b(19|20)\d{2}\.$", one) for one in PUBLICATIONS)
+
+
+def test_a_recommendation_changes_what_is_there():
+    """No dashpot of many GPa s/m to a rig that has none, unless a dashpot is what can be added."""
+    found = ss.analyze(ss.read_rig("examples/inclined-spring.toml"))
+    assert "damping" not in words("".join(recommendation(found)))
+    assert "damping c" in words("".join(recommendation(found, ("slider.damping",))))
+
+
+def test_comments_in_tables_of_several_are_found():
+    text = '[[friction.states]]\nb = 1  # first\n[[friction.states]]\nb = 2\n[drive]\nvelocity = "1 um/s" # slow'
+    assert notes_of(text) == {"friction.states.1.b": "first", "friction.states.2.b": "", "drive.velocity": "slow"}
+
+
+def test_a_held_axis_has_a_report_on_its_hunting():
+    path = Path("examples/hunting-axis.toml")
+    found = ss.report(ss.read_rig(path), source=path).html
+    text = words(found)
+    assert ss.hunt(ss.read_rig(path)).sentence.capitalize() in text
+    assert "There is no explorer at the end: the drive holds a place" in text
+    assert "does it hunt" in text
+    assert "Canudas de Wit" in text
+    assert "[protocol]" not in text or "[protocol]" in path.read_text()
+    assert len(found.encode()) <= 500_000
+    with pytest.raises(ss.NotAvailable, match="knows no branch, fit, tolerances or charts"):
+        ss.report(ss.read_rig(path), branch=1)
+
+
+@pytest.mark.parametrize("name", ["two-states", "structures/reed"])
+def test_the_longest_report_and_that_of_a_structure_are_documents(name):
+    """Two states have the largest charts; matrices have no equations, and no sketch."""
+    path = Path(f"examples/{name}.toml")
+    found = ss.report(ss.read_rig(path), source=path).html
+    text = words(found)
+    assert len(found.encode()) <= 500_000
+    assert "Change preload" in text or "Change reed angle" in text
+    assert ("structures move as their matrices say" in text) == ("reed" in name)
+
+
+def test_paths_of_figures_keep_their_places():
+    """Rounded to hundredths of a point, which no eye tells apart."""
+    assert _shorter("M 1.234567 -20.5 \nL 3.000001 4 \nz\n") == "M1.23 -20.5L3 4z"
+
+
+def test_two_rigs_are_told_beside_each_other():
+    a, b = (ss.read_rig(f"examples/{name}.toml") for name in ("inclined-spring", "stick-slip"))
+    found = ss.compare_rigs(a, b, names=("old", "new"))
+    text = words(ss.report(found).html)
+    assert "RigComparison" not in text
+    assert "old: unstable; new: unstable" in text
+    for one in found.differences:
+        if one.parameter in a.parameters():
+            assert said(a, one.parameter) in text
+    assert "nearest edge evolution effect b" in text
+    assert "Inputs of old" in text
+    assert "Inputs of new" in text
+    assert all(found.part_in_words(one).replace("x ", "× ") in text for one in found.differences)

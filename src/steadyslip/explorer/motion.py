@@ -34,7 +34,9 @@ from steadyslip.motion.jobs import Options, automatic_method
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep
 from steadyslip.protocol.segments import pack
 
-OPTIONS = Options(rtol=1e-6, most_steps=100_000)
+OPTIONS = Options(
+    rtol=1e-6, most_steps=100_000
+)  # errors below a pixel of the page; steps for some seconds in a browser
 DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
     "velocity": lambda at, size, drive: VelocityStep(at=at, to=drive * size),
     "hold": lambda at, size, drive: Hold(at=at, duration=size),

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from steadyslip.machine.slider import Slider
 
-WIDTH, HEIGHT = 340, 174
+WIDTH, HEIGHT = 340, 174  # of the whole sketch
 GROUND_Y = 132.0  # y of the surface
 PERIOD = 10.0  # of the hatching of the ground
 BLOCK_LENGTH, TOP_Y = 80.0, 86.0  # length of the block, height of its top

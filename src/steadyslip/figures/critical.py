@@ -16,7 +16,7 @@ from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider
 from steadyslip.units import deg
 
-ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))
+ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))  # those of the paper
 
 
 def critical_stiffness_against_mass(

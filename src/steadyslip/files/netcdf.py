@@ -17,8 +17,8 @@ import numpy as np
 
 Array = np.ndarray
 T = TypeVar("T")
-_DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
-_TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}
+_DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12  # tags of lists in the header of netCDF classic
+_TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}  # numbers of types there
 _MOST = 100_000  # most entries of all lists together; chosen by trial, far more than any file of ours has
 _LONGEST = 1000  # numbers of an attribute; ours have one
 _DEEPEST = 32  # dimensions of a variable; NumPy's limit up to version 1

@@ -18,12 +18,15 @@ from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
 from steadyslip.model.point import OperatingPoint
 
-_DIGITS = (50, 100, 200, 400, 800, 1100)
+_DIGITS = (50, 100, 200, 400, 800, 1100)  # each twice the last; `_SHARE` of 1100 is more than the 308 decades of floats
 _SHARE = 0.3  # of the digits: decades beyond the machine's own rate from which on an eigenvalue is infinite
 _PLACE = 1.2345678  # in units of that rate, where the matrix is inverted: no eigenvalue
 _SAME = 1e-13  # relative difference of an eigenvalue at a number of digits and at half of them,
 _NEARLY = 1e-9  # and from what another route found, within which they agree
-_NEWTON_DIGITS, _MOST_STEPS = 60, 30
+_NEWTON_DIGITS, _MOST_STEPS = (
+    60,
+    30,
+)  # three times those of `_ARRIVED`; from 16 digits a few steps do
 _ARRIVED = 1e-20  # relative size of a step of Newton's method, after which the next changes nothing in floating point
 
 

@@ -19,7 +19,7 @@ from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 
 _DECADES, _PER_DECADE, _EVEN = 2, 10, 61  # values at which roots are counted; of a bounded domain evenly spaced ones
 _HALVINGS = 14  # of what lies between two values: to 1e-5 of them
-_NEWTON = 30
+_NEWTON = 30  # most steps of Newton's method; from a bracket of 1e-5 a few do
 _STEP = 1e-7  # relative, of differences: the root of rounding
 _LAST = 1e-12  # relative step at which Newton's method has ended
 

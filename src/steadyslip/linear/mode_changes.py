@@ -18,7 +18,7 @@ from steadyslip.model.numeric.machine_point import MachinePoint
 
 _STEP = 0.01  # relative, of differences of the matrices; nothing if these are linear in the parameter
 _STENCIL = np.array([-1, 9, -45, 45, -9, 1]) / 60  # central differences of sixth order: 1e-12 of smooth matrices
-_PLACES = np.array([-3, -2, -1, 1, 2, 3])
+_PLACES = np.array([-3, -2, -1, 1, 2, 3])  # of the stencil, in steps
 ADDED = ("spring", "damper", "mass")
 SLIDING, TURNING = ("N/m", "N s/m", "kg"), ("N m/rad", "N m s/rad", "kg m^2")
 

@@ -26,7 +26,7 @@ from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish, highest, 
 from steadyslip.linear.polynomials import even_odd, product
 from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly, roots
 
-INFINITE = 2**62
+INFINITE = 2**62  # a count of roots, larger than any other
 _HALVINGS = 60  # largest number of bisections of a real part: more than the 53 bits of a double
 _BATCH = 40  # rigs with several delays counted at a time; chosen by trial: memory against speed
 _MOST_PERIODS = 5000  # crossing delays are listed up to so many periods of the fastest; by trial: length of the list

@@ -17,7 +17,7 @@ JUDDERS = {
     "backward": "; backward strokes {backward}, the last {back} within {during}",
 }
 """Parts of the sentence, with holes that Python and the page fill."""
-DIGITS = 3
+DIGITS = 3  # significant, of quantities in sentences
 
 
 def sentence(events: Sequence[AnyEvent], slips: Sequence[AnySlip], area: float | None = None) -> str:

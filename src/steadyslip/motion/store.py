@@ -25,7 +25,7 @@ from steadyslip.motion.status import WORDS
 from steadyslip.motion.targets import targets
 
 RUN = FileKind("run", 3, 2**29, "simulate again and save the run anew")
-MOST_EVENTS = 10**6
+MOST_EVENTS = 10**6  # bound of memory: some 100 bytes each
 _EVENT_UNITS = {
     "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
 }  # fmt: skip

@@ -17,7 +17,11 @@ Equations = Callable[[Array], tuple[Array, Array]]
 MOST_ITERATIONS = 10  # of Newton's method for one point
 ASIDE = 10.0  # factor of `reach` by which intermediate Newton iterates may be farther away
 NEARLY = 1e-5  # Newton step below which one larger step may follow
-GROW, FASTER, SHRINK = 1.4, 2.0, 0.4
+GROW, FASTER, SHRINK = (
+    1.4,
+    2.0,
+    0.4,
+)  # factors of the step after quick, straight and failed ones; chosen by trial
 
 
 class Failure(ArithmeticError):

@@ -28,7 +28,7 @@ EXPLAINED = {
     "the motion; try a larger rtol (in Python), or fewer short periods",
 }
 BEYOND = "beyond the steady value"
-MEGA = 1e6
+MEGA = 1e6  # of the prefix M
 MOST_ROWS = 9  # periods listed in the text
 MOST_TOLD = 4  # resonances listed in the text
 

@@ -11,12 +11,12 @@ from steadyslip.core.entries import LabelledNumbers, Names, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Settings, option, parameter, setting
 
-STARTS = 48
+STARTS = 48  # points that a search starts from: six batches of the eight sets that run side by side
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")
-MOST_STARTS = 10**6
-MOST_EFFORT = 1e6
-MOST_TREND = 6
-MOST_STATES = 100
+MOST_STARTS = 10**6  # bound of memory: starts are drawn together, some 100 bytes each
+MOST_EFFORT = 1e6  # bound against mistaken numbers: a fit of a second would take days
+MOST_TREND = 6  # order: a longer polynomial would bend as slips do and take their place
+MOST_STATES = 100  # bound against mistaken numbers: records tell two or three states
 _effort = Domain(0, MOST_EFFORT, False, True, "a number above 0, up to a million")
 _width = Domain(0, math.inf, False, False, "a finite number above 0, in units of what is fitted")
 
@@ -74,7 +74,7 @@ class FitSettings(Settings):
 
 
 STRESS = "normal stress"
-DRAWS = (100, 10**6)
+DRAWS = (100, 10**6)  # least: 95 % intervals end among the outer few draws; most: bound of memory
 _scale = Domain(0, 100, False, True, "a number above 0, up to 100")
 
 

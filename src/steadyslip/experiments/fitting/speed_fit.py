@@ -245,7 +245,7 @@ class SpeedFindings(ReadOnly):
         return self.main[name]
 
 
-FEWEST_ROWS = 5
+FEWEST_ROWS = 5  # a loop goes one way and back; two rows each and one where it turns
 LEAST_RISE = 1e-3  # of the displacements, as a share of the largest step: smaller ones say nothing on stiffness
 
 

@@ -20,7 +20,7 @@ BRISTLES, BRISTLE_DAMPING, SLIP = "bristle stiffness", "bristle damping", "slip 
 DEFLECTION = (1e-6, 1e-5, 1e-4)
 """Least, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals give way by
 1 to 50 um (Armstrong-Helouvry 1991). Of joints, some 10 cm from their axis, ten times as many rad."""
-RAD_A_METRE = 10.0
+RAD_A_METRE = 10.0  # rad/m, of joints: see above
 STIFFNESS, MASS, SHAFT, INERTIA = (
     "20 N/um",
     100.0,

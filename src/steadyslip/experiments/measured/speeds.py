@@ -22,7 +22,7 @@ from steadyslip.experiments.measured.formats.table import Table
 from steadyslip.experiments.measured.formats.text import read_text
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
-FEWEST_ROWS = 3
+FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
 _UNITS = {
     "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg"),
     "displacement": ("m", "rad"), "direction": ("1",),

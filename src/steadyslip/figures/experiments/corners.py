@@ -19,7 +19,7 @@ from steadyslip.figures.style import axis_label, display_unit
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
 
-LEVELS = (0.68, 0.95)
+LEVELS = (0.68, 0.95)  # shares of the draws inside the contours, as of one and two standard deviations
 STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
 PILE_UP_SHARE = 0.02  # share of draws exactly at one end above which that end is a bound of the search (by trial)
 BINS = 48  # along each axis of the density of draws, finer than its smoothing (by trial)

@@ -28,7 +28,7 @@ MOST_RESPONSES = 2**28
 _ORDERS = {"m/N": 0, "m/s/N": 1, "m/s^2/N": 2}  # receptance, mobility and accelerance: derivatives of the displacement
 _RESPONSE, _COHERENCE = 4, 6  # types of functions in universal files
 _QUANTITIES = {8: "m", 11: "m/s", 12: "m/s^2"}  # types of data there: displacement, velocity, acceleration
-_AXES = {1: "x", 2: "y"}
+_AXES = {1: "x", 2: "y"}  # numbers of directions there
 _COLUMN = re.compile(r"(?P<out>\S+?\.[xy])/(?P<in>\S+?\.[xy]) +(?P<part>real|imag|coherence)(?: *\[(?P<unit>.+)\])?")
 _SMOOTHED = 21  # frequencies over which the spread of a few repeats is averaged
 

@@ -40,7 +40,7 @@ from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.follow import cycles
 
 Array = np.ndarray
-POINTS = 81
+POINTS = 81  # along each axis: an edge is placed within 1.2 % of the picture
 STEPS = 2e9  # integration steps for all motions of a basin
 
 

@@ -34,7 +34,7 @@ RETURNS, BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION, INTERRUPTED, UNDECIDED
 LATE, EXHAUSTED, SPENT, STUCK, UNSEEN = range(UNDECIDED, len(OUTCOMES))
 CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 """Outcomes that are not a return."""
-OPEN = -1
+OPEN = -1  # number of no outcome: not known yet
 
 USUAL = 3  # state variables of a slider, the unit of the work of a step
 STIFF = "rodas4"  # method for stiff motions, and for those for which the explicit method needs too many steps

@@ -22,7 +22,7 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.taylor import EPS, Index, arrangements, system
 from steadyslip.nonlinear.onset.coefficient import even_scales
 
-DIGITS = 50
+DIGITS = 50  # three times those of floating point: products of three numbers keep all of theirs
 SETTLED = mpmath.mpf("1e-30")
 """Step of Newton's method, as a share of what it corrects, after which it ends: the next would be far smaller still."""
 STEPS = 40

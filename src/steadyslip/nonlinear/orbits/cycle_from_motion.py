@@ -22,7 +22,9 @@ from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowRunner
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
 Array = np.ndarray
-PRIMES = np.array([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31])
+PRIMES = np.array(
+    [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31]
+)  # how often a cycle may be counted round; others are products
 STEEPER = 3.0  # factor by which another passage must be steeper to become the start of the cycle; chosen by trial
 SAME = 1e-4  # distance, as a share of the cycle's size, within which a state counts as returned
 

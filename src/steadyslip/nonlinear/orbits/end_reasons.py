@@ -20,7 +20,7 @@ from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, BranchPoin
 WINDINGS = 6  # folds, each closer to the next, after which a branch counts as winding round one value
 STANDING = 12  # cycles alike within 5 %, at one parameter value but for rounding, after which the branch stands still
 RETRACED = 4  # consecutive cycles between known neighbours after which the branch has turned back
-TOO_UNSTABLE = 1e8
+TOO_UNSTABLE = 1e8  # growth in a period: half the digits of floating point are lost in one
 SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
 LARGE = 1e6  # peak velocity, in units of the drive's, beyond which a cycle grows without bound
 ENDS = {

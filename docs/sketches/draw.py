@@ -16,6 +16,7 @@ from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
 
 from steadyslip import analyze, figures, read_rig
 from steadyslip.core.palette import BLACK, BLUE, GREEN, VERMILION
+from steadyslip.linear import mode_chart
 from steadyslip.reproduce import paper_rig
 from steadyslip.units import GPa, deg
 
@@ -390,6 +391,9 @@ def draw(folder: Path, kind: str = "svg") -> list[Path]:
             written.append(path)
         axes = figures.machine_verdict(analyze(read_rig(rig.with_stem("telescope"))))
         written.append(folder / f"machine-verdict.{kind}")
+        axes[0].figure.savefig(written[-1], facecolor="white", dpi=110, metadata=metadata)
+        axes = mode_chart(read_rig(rig.with_stem("brake-pad")), "mu_ref").plot()
+        written.append(folder / f"mode-chart.{kind}")
         axes[0].figure.savefig(written[-1], facecolor="white", dpi=110, metadata=metadata)
     return written
 

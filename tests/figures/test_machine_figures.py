@@ -156,3 +156,34 @@ def test_along_the_drive_steady_sliding_is_as_fast_as_each_value_says():
         factor = onset.get_xdata()[0] / branch.onset.value
         assert line.get_ydata() / unit == pytest.approx(line.get_xdata() / factor)
         assert onset.get_xdata()[0] in line.get_xdata()
+
+
+def test_mode_charts_draw_frequencies_and_dampings_of_the_result():
+    from steadyslip.linear import mode_chart
+
+    found = mode_chart(ss.read_rig("examples/machines/brake-pad.toml"), "links.caliper.stiffness")
+    upper, lower = found.plot()
+    for ax, table in ((upper, found.frequencies), (lower, found.damping_ratios)):
+        lines = {line.get_label(): line for line in ax.get_lines()}
+        for title, column in zip(found.titles, table.T, strict=True):
+            np.testing.assert_allclose(lines[title].get_ydata(), column)
+            np.testing.assert_allclose(lines[title].get_xdata(), found.values / 1e6)
+        assert lines["_edge"].get_xdata()[0] == pytest.approx(11.0483, rel=1e-5)
+        assert lines["_own"].get_xdata()[0] == 6.0
+        assert np.array_equal(np.isfinite(lines["_grows"].get_ydata()), found.damping_ratios[:, 0] < 0)
+    assert upper.get_ylabel() == "frequency (Hz)"
+    assert lower.get_xlabel().endswith("(MN/m)")
+    with pytest.raises(ss.ParameterError, match="two, for frequencies and damping ratios"):
+        found.plot(ax=[upper])
+
+
+def test_wide_charts_of_many_modes_are_logarithmic_and_leave_the_others_grey():
+    from steadyslip.linear import mode_chart
+    from structures_at_random import reed
+
+    upper, lower = mode_chart(reed(), "steady_normal_stress", (10.0, 1e4)).plot()
+    assert (upper.get_xscale(), upper.get_yscale(), lower.get_yscale()) == ("log", "log", "linear")
+    assert len(upper.get_legend().get_texts()) == 8
+    assert sum(line.get_label() == "_other" for line in upper.get_lines()) == 18
+    styles = [(line.get_color(), line.get_linestyle()) for line in upper.get_lines() if line.get_label()[0] != "_"]
+    assert len(set(styles)) == 8

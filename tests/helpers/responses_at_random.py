@@ -25,7 +25,10 @@ def response_of(mass, damping, stiffness, places, names, omega, noise=0.0, chanc
     found = np.linalg.solve(
         dynamic, np.broadcast_to(np.eye(len(mass))[:, places], (len(omega), len(mass), len(places)))
     )
-    found = found[:, places]
+    return _with_noise(omega, found[:, places], names, noise, chance)
+
+
+def _with_noise(omega, found, names, noise, chance):
     error = noise * np.abs(found)
     if noise:
         found = found + error * noisy(chance, found.shape)
@@ -51,11 +54,7 @@ def reed_response(omega, noise=0.0, chance=None):
     squares, shapes = la.eigh(stiffness, mass)
     rows = shapes[[len(mass) - 3, len(mass) - 2]]
     den = 1 / (squares - omega[:, None] ** 2 + 1j * omega[:, None] * (1 + 2e-6 * squares))
-    found = np.einsum("ia,pa,ja->pij", rows, den, rows)
-    error = noise * np.abs(found)
-    if noise:
-        found = found + error * noisy(chance, found.shape)
-    return ResponseData(omega, found, error, ("tip.x", "tip.y"))
+    return _with_noise(omega, np.einsum("ia,pa,ja->pij", rows, den, rows), ("tip.x", "tip.y"), noise, chance)
 
 
 def measured(machine, numbers, omega, noise=0.0, chance=None):

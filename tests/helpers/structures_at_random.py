@@ -13,6 +13,42 @@ import scipy.linalg as la
 import steadyslip as ss
 from steadyslip.machine import Machine, Pull, StructureBody, StructureData, StructurePoint, Surface
 
+REED = """
+[bodies.reed]
+kind = "structure"
+{body}
+[bodies.reed.points.{point}]
+{place}
+angle = "60 deg"
+[contacts.tip]
+body = "drive"
+against = "reed.{point}"
+[contacts.tip.friction]
+law = "rate-state"
+a = 0.010
+b = 0.016
+d_c = "20 um"
+mu_ref = 0.45
+v_ref = "50 mm/s"
+[contacts.tip.friction.normal_memory]
+law = "linker-dieterich"
+alpha = 0.3
+[contacts.tip.contact]
+law = "compliant"
+normal_stiffness = "5 MN/m"
+steady_normal_stress = "100 N"
+[drive]
+control = "steady"
+velocity = "50 mm/s"
+"""
+
+
+def reed_file(folder, body, point, place=""):
+    """A file of the machine of `reed`, with keys of the body, and of its point where it touches."""
+    path = folder / "machine.toml"
+    path.write_text(REED.format(body=body, point=point, place=place), encoding="utf-8")
+    return path
+
 
 def reed_matrices(elements=20, length=0.12, width=0.02, height=0.003, modulus=210e9, density=7850.0):
     """M, C and K of a clamped reed of frame elements; of each node x along the reed, y across, and the rotation."""

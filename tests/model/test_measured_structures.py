@@ -11,7 +11,7 @@ from responses_at_random import compared, noisy, reed_band, reed_response
 from steadyslip.linear import UndecidedWarning
 from steadyslip.machine import Machine, Pull, ResponseData, StructureBody, StructurePoint, Surface
 from steadyslip.model.numeric.measured import measured_machine
-from structures_at_random import reed
+from structures_at_random import reed, reed_file
 
 LOAD = "contacts.tip.contact.steady_normal_stress"
 
@@ -177,34 +177,11 @@ def test_names_are_points_with_directions(exact):
 
 # --- files ------------------------------------------------------------------------------------------
 
-FILE = """
-[bodies.reed]
-kind = "structure"
-response = "{name}"
-{more}
-[bodies.reed.points.{point}]
-angle = "60 deg"
-[contacts.tip]
-body = "drive"
-against = "reed.{point}"
-[contacts.tip.friction]
-law = "coulomb"
-mu_coulomb = 0.45
-[contacts.tip.contact]
-law = "compliant"
-normal_stiffness = "5 MN/m"
-steady_normal_stress = "100 N"
-[drive]
-control = "steady"
-velocity = "50 mm/s"
-"""
 POWER = {"m/N": 0, "m/s/N": 1, "m/s^2/N": 2}
 
 
 def read(folder, name, point="tip", more=""):
-    path = folder / "machine.toml"
-    path.write_text(FILE.format(name=name, point=point, more=more), encoding="utf-8")
-    return ss.read_rig(path).bodies["reed"].response
+    return ss.read_rig(reed_file(folder, f'response = "{name}"\n{more}', point)).bodies["reed"].response
 
 
 def small(repeats=1):

@@ -18,7 +18,7 @@ from steadyslip.machine import (
     Surface,
     reduced,
 )
-from structures_at_random import compared, random_structure, reed, reed_matrices
+from structures_at_random import compared, random_structure, reed, reed_file, reed_matrices
 
 ROCK = ss.laws.RateState(
     a=0.010, b=0.016, d_c=20e-6, mu_ref=0.45, v_ref=0.05, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
@@ -194,41 +194,11 @@ def test_reduction_of_the_reed_is_off_by_what_theory_says(modes, root, rate):
 
 # --- files ------------------------------------------------------------------------------------------
 
-FILE = """
-[bodies.reed]
-kind = "structure"
-{key} = "{name}"
-[bodies.reed.points.tip]
-{place}
-angle = "60 deg"
-[contacts.tip]
-body = "drive"
-against = "reed.tip"
-[contacts.tip.friction]
-law = "rate-state"
-a = 0.010
-b = 0.016
-d_c = "20 um"
-mu_ref = 0.45
-v_ref = "50 mm/s"
-[contacts.tip.friction.normal_memory]
-law = "linker-dieterich"
-alpha = 0.3
-[contacts.tip.contact]
-law = "compliant"
-normal_stiffness = "5 MN/m"
-steady_normal_stress = "100 N"
-[drive]
-control = "steady"
-velocity = "50 mm/s"
-"""
 PLACE = "x = 58\ny = 59"
 
 
 def written(folder, name, place=PLACE, key="matrices"):
-    path = folder / "machine.toml"
-    path.write_text(FILE.format(name=name, place=place, key=key), encoding="utf-8")
-    return path
+    return reed_file(folder, f'{key} = "{name}"', "tip", place)
 
 
 def test_matrices_are_read_from_numpy_matlab_and_matrix_market(tmp_path):

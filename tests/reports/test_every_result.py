@@ -30,6 +30,7 @@ QUICK = {
     "Difference": lambda: made("RigComparison").differences[0],
     "Cures": lambda: ss.cure(RIG), "Window": lambda: made("Cures").windows[0],
     "MachineAnalysis": lambda: ss.analyze(two_mass()), "Modes": lambda: ss.modes(two_mass(kp=2.0)),
+    "ModeChart": lambda: ss.linear.mode_chart(two_mass(kp=2.0), "drive.kp"),
     "ModeChange": lambda: made("Modes").changes[0], "Origin": lambda: made("Modes").origin,
     "SteadyMachine": lambda: made("MachineAnalysis").steady,
     "Mode": lambda: made("Modes").mode, "SteadyContact": lambda: made("SteadyMachine").contacts["guide"],

@@ -159,14 +159,27 @@ def modes(
         int | None,
         typer.Option(help="number of the oscillation to look at closely; the one that grows fastest unless given"),
     ] = None,
+    along: Annotated[
+        str | None, typer.Option(help="chart frequencies and damping ratios of all modes over this parameter instead")
+    ] = None,
+    between: Annotated[
+        tuple[str, str] | None, typer.Option(metavar="LOW HIGH", help="range of it, such as '1 mm/s' '1 m/s'")
+    ] = None,
     output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Frequencies, dampings and shapes of a machine's modes; what feeds the one that grows, and what to change."""
+    from steadyslip.core.errors import ParameterError, Problem
     from steadyslip.files.output import check_output
     from steadyslip.files.specifications import read_rig
+    from steadyslip.linear.mode_chart import mode_chart
     from steadyslip.linear.mode_table import ENDINGS, modes as run, write_modes
 
     check_output(output or (), ENDINGS)
-    found = run(read_rig(rig, changes or ()), mode)
+    if along and mode is not None:
+        raise ParameterError([Problem("mode", f"got {mode}; a chart along {along} has all modes: leave out --mode")])
+    if between and not along:
+        raise ParameterError([Problem("between", "got a range but no parameter; name it with --along")])
+    machine = read_rig(rig, changes or ())
+    found = mode_chart(machine, along, between) if along else run(machine, mode)
     output_result(found, output or (), as_json, partial(write_modes, source=rig))

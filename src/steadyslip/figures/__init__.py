@@ -25,11 +25,12 @@ from steadyslip.figures.machine_verdict import eigenvalue_plane, machine_verdict
 from steadyslip.figures.machines import machine_sketch
 from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
+from steadyslip.figures.mode_chart import mode_chart
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 from steadyslip.figures.style import journal, save_with_footer
 from steadyslip.figures.tolerance_bars import tolerances
-from steadyslip.linear import Modes
+from steadyslip.linear import ModeChart, Modes
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
@@ -54,6 +55,7 @@ __all__ = [
     "machine_sketch",
     "machine_verdict",
     "map_figure",
+    "mode_chart",
     "mode_shape",
     "phase_plane",
     "population",
@@ -82,6 +84,7 @@ register_figures(
     MachineAnalysis, verdict=machine_verdict, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane
 )
 register_figures(Modes, mode=mode_shape)
+register_figures(ModeChart, chart=mode_chart)
 register_figures(Machine, sketch=machine_sketch)
 register_figures(History, history=history, phase=phase_plane)
 register_figures(CycleBranch, branch=cycle_branch)

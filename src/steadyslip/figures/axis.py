@@ -13,7 +13,7 @@ from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.roles import Parameter
 from steadyslip.figures.style import axis_label, display_unit, parameter_label
-from steadyslip.linear import boundary
+from steadyslip.linear.boundary import boundary
 from steadyslip.machine.slider import Slider
 
 _RANGE_FACTOR = 20.0  # default range of a positive parameter: lowest of value and edge / 20 to highest x 20 (by trial)

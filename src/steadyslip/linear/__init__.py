@@ -10,6 +10,7 @@ from steadyslip.linear import paper
 from steadyslip.linear.boundary import Margin, boundary, margins
 from steadyslip.linear.formula import formula
 from steadyslip.linear.mode_changes import ModeChange
+from steadyslip.linear.mode_chart import ModeChart, mode_chart
 from steadyslip.linear.mode_origin import Origin
 from steadyslip.linear.mode_table import Modes, modes
 from steadyslip.linear.modes import Mode
@@ -30,6 +31,7 @@ __all__ = [
     "Margin",
     "Mode",
     "ModeChange",
+    "ModeChart",
     "Modes",
     "Origin",
     "Response",
@@ -40,6 +42,7 @@ __all__ = [
     "formula",
     "growth_rate",
     "margins",
+    "mode_chart",
     "modes",
     "paper",
     "safety_factor",

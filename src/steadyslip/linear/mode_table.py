@@ -204,14 +204,16 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
         raise ParameterError([Problem("number", f"got {number}; allowed: 1 to {count}, the oscillations by frequency")])
     numeric = _numeric_point(rig)
     changes = () if numeric is None else changes_of(numeric, chosen.eigenvalue)
-    return Modes(rig, found, chosen, growth_origin(rig, chosen), changes)
+    return Modes(rig, found, chosen, growth_origin(rig, chosen.eigenvalue, chosen.number), changes)
 
 
-def growth_origin(rig: Machine, mode: Mode) -> Origin | None:
-    """Why a mode grows; None if it does not oscillate or grow, with a delay, and where numbers find no steady state."""
-    grows = mode.number and mode.eigenvalue.real > ON_THE_EDGE * abs(mode.eigenvalue)
-    point = _numeric_point(rig) if grows else None
-    return None if point is None else origin_of(point, mode.eigenvalue, mode.number)
+def growth_origin(rig: Machine, s: complex, number: int) -> Origin | None:
+    """Why the mode with the eigenvalue `s` (1/s) and a `Mode.number` grows.
+
+    None if it does not oscillate or grow, with a delay, and where numbers find no steady state.
+    """
+    point = _numeric_point(rig) if number and s.real > ON_THE_EDGE * abs(s) else None
+    return None if point is None else origin_of(point, s, number)
 
 
 def _numeric_point(rig: Machine) -> MachinePoint | None:
@@ -220,8 +222,8 @@ def _numeric_point(rig: Machine) -> MachinePoint | None:
     return point if point is not None and not point.balance.problem and point.balance.exists else None
 
 
-def write_modes(found: Modes, path: Path, source: Path | None = None) -> None:
-    """Write columns, a document with the hash of its `source`, or a figure, by the ending of the name.
+def write_modes(found: Any, path: Path, source: Path | None = None) -> None:
+    """Write modes or their chart: columns, a document with the hash of its `source`, or a figure, by the ending.
 
     Raises
     ------

@@ -228,7 +228,7 @@ def _analyze_response(machine: Machine, kicks: Sequence[str]) -> MachineAnalysis
 
 def _origin(machine: Machine, mode: Mode | None) -> tuple[Origin | None, tuple[Check, ...]]:
     """Why the leading mode grows, and its check; None where that fails, and of a mode that does not grow."""
-    found = None if mode is None else growth_origin(machine, mode)
+    found = None if mode is None else growth_origin(machine, mode.eigenvalue, mode.number)
     if found is None or mode is None:
         return None, ()
     off = abs(sum(found.feeds.values()) - mode.eigenvalue.real) / abs(mode.eigenvalue)

@@ -252,3 +252,8 @@ def test_every_end_has_its_status(capsys, monkeypatch):
     monkeypatch.setenv("STEADYSLIP_DEBUG", "1")
     with pytest.raises(KeyError):
         ends(KeyError("over"))
+
+
+def test_a_changed_value_is_told_in_its_own_unit():
+    shown = run("analyze", "examples/slow-axis.toml", "--set", "velocity=1.2 m/h").stdout
+    assert shown.splitlines()[0].endswith("steady sliding at 1.2 m/h")

@@ -58,7 +58,7 @@ def test_a_sketch_says_what_the_drive_does():
         assert piece in late
     pulled = "\n".join(text for text, _ in boxes(figures.machine_sketch(MACHINES["two-guides"])))
     assert "20 µm/s" in pulled
-    assert "400 kN/m" in pulled
+    assert "0.4 N/µm" in pulled
     rotary = "\n".join(text for text, _ in boxes(figures.machine_sketch(MACHINES["telescope"])))
     for piece in ("900 kg m²", "MN m/rad", "gear 0.002", "20 kN at 600 mm", "rad/s"):
         assert piece in rotary
@@ -172,7 +172,7 @@ def test_mode_charts_draw_frequencies_and_dampings_of_the_result():
         assert lines["_own"].get_xdata()[0] == 6.0
         assert np.array_equal(np.isfinite(lines["_grows"].get_ydata()), found.damping_ratios[:, 0] < 0)
     assert upper.get_ylabel() == "frequency (Hz)"
-    assert lower.get_xlabel().endswith("(MN/m)")
+    assert lower.get_xlabel().endswith("(N/µm)")
     with pytest.raises(ss.ParameterError, match="two, for frequencies and damping ratios"):
         found.plot(ax=[upper])
 

@@ -12,13 +12,29 @@ import typer
 def _set_units(context: typer.Context, rig: Path) -> Path:
     """Set the output units to those used in the rig file."""
     from steadyslip.core.errors import ParameterError
-    from steadyslip.core.format import display_units
+    from steadyslip.files.specifications.deviations import taken_out
     from steadyslip.files.specifications.read import text_of
-    from steadyslip.files.specifications.template import units_of
+    from steadyslip.files.specifications.toml import NotToml, tables_of
 
-    with suppress(ParameterError):  # problems of the file are reported when the rig is read
-        context.with_resource(display_units(units_of(text_of(rig))))
+    with suppress(ParameterError, NotToml):  # problems of the file are reported when the rig is read
+        tables = tables_of(text_of(rig))
+        taken_out(tables)
+        _print_in(context, tables)
     return rig
+
+
+def _add_units(context: typer.Context, changes: list[str] | None) -> list[str] | None:
+    """Add the units of changed values to the output units."""
+    if changes:
+        _print_in(context, [change.partition("=")[2].strip(" \"'") for change in changes])
+    return changes
+
+
+def _print_in(context: typer.Context, values: Any) -> None:
+    from steadyslip.core.quantities import units_in
+    from steadyslip.core.written import display_units
+
+    context.with_resource(display_units(sorted(units_in(values))))
 
 
 RigFile = Annotated[
@@ -27,7 +43,12 @@ RigFile = Annotated[
 OtherRigFile = Annotated[Path, typer.Argument(metavar="OTHER", help="rig file to compare it with")]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="change a value, such as contact.angle='10 deg'; repeatable",
+        callback=_add_units,
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, in SI units")]
 Until = Annotated[str | None, typer.Option(help="end of the run, such as '200 s'; that of the file unless given")]

@@ -4,40 +4,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
-from types import MappingProxyType
+from collections.abc import Mapping
+from functools import lru_cache
 
 from steadyslip import units
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
+from steadyslip.core.written import display_names
 
-_own: ContextVar[Mapping[Dimension, tuple[str, ...]]] = ContextVar("own units", default=MappingProxyType({}))
 
-
-@contextmanager
-def display_units(names: Iterable[str]) -> Iterator[None]:
-    """Context in which quantities are formatted in the user's units, such as rpm, bar, mm^2 or N/um.
-
-    Of several units of a dimension the one is used whose number is closest to 10. Units that differ from the default
-    by a leading prefix alone, such as kN or um/s, have no effect, since a suitable prefix is chosen in any case.
-
-    >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
-    ...     format_quantity(10.0, "rad/s"), format_quantity(2e4, "N"), format_quantity(2e5, "Pa")
-    ...     format_quantity(2e7, "Pa"), format_quantity(12e6, "N/m")
-    ('95.49 rpm', '20 kN', '2 bar')
-    ('20 MPa', '12 N/um')
-    """
+@lru_cache(maxsize=256)
+def _own(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
+    """Units of a context by dimension, where one of them differs from the default by more than a leading prefix."""
     found: dict[Dimension, set[str]] = {}
     for name in names:
         found.setdefault(unit(name)[1], set()).add(name)
-    own = {kind: tuple(sorted(several)) for kind, several in found.items() if any(map(_is_own, several))}
-    before = _own.set(own)
-    try:
-        yield
-    finally:
-        _own.reset(before)
+    for several in found.values():
+        if named := {name for name in several if " at " in name}:
+            several &= named
+    return {kind: tuple(sorted(several)) for kind, several in found.items() if any(map(_is_own, several))}
 
 
 def _is_own(name: str) -> bool:
@@ -78,7 +63,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
-    names = _own.get().get(unit(si_unit)[1], ())
+    names = _own(display_names()).get(unit(si_unit)[1], ())
     own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
     if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < _LONGEST):

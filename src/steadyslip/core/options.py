@@ -16,6 +16,7 @@ from steadyslip.core.domains import Domain, below_one, steps, tolerance
 from steadyslip.core.entries import Names, Option, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem, one
 from steadyslip.core.roles import Role, fault
+from steadyslip.core.written import in_written_units
 
 LARGEST = 1.7e308  # just below the largest float; Python integers may be larger
 MOST = 1e150  # its square is finite
@@ -169,6 +170,8 @@ def role_of(name: str, annotation: str) -> Role | None:
 def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Decorator that checks the arguments of a function before it is called; default values always pass.
 
+    What the function tells about a rig is in the units of the rig's file.
+
     `roles` are needed where `role_of` cannot tell the role, such as the range of a number. Each of a variable number
     of arguments (``*links``) is checked, and named in errors by its place: ``argument 2``.
 
@@ -178,7 +181,8 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
         From the decorated function, if a value is not allowed.
     """
 
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+    def decorate(asked: Callable[P, R]) -> Callable[P, R]:
+        function = in_written_units(asked)
         parameters = inspect.signature(function).parameters
         defaults = {name: item.default for name, item in parameters.items()}
         known = {

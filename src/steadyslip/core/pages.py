@@ -5,10 +5,11 @@ Results must not import the reports above them, so the reports register their fu
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar, Self
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.written import display_names, in_written_units
 
 Maker = Callable[..., str]
 _sources: list[Callable[[], object]] = []
@@ -25,11 +26,13 @@ def register_pages(*, brief: Maker, whole: Maker) -> None:
     _makers.update(brief=brief, whole=whole)
 
 
+@in_written_units
 def brief(result: Any) -> str:
     """HTML fragment of a result, for notebooks."""
     return _made("brief")(result)
 
 
+@in_written_units
 def whole(result: Any, **options: Any) -> str:
     """HTML document of a result."""
     return _made("whole")(result, **options)
@@ -45,7 +48,24 @@ def _made(kind: str) -> Maker:
 
 
 class Displayed:
-    """Base of objects that notebooks display as HTML."""
+    """Base of objects that print themselves in the units of their rig's file, and that notebooks display as HTML."""
+
+    written_in: ClassVar[tuple[str, ...]] = ()
+    """Units of the file that the rig was read from, in which it and its results are told; no part of their value."""
+
+    def __new__(cls, *_: Any, **__: Any) -> Self:
+        made = super().__new__(cls)
+        return made.told_in(sorted(display_names())) if display_names() else made
+
+    def told_in(self, names: Iterable[str]) -> Self:
+        """The object itself, which is told in these units from now on."""
+        object.__setattr__(self, "written_in", tuple(dict.fromkeys(names)))
+        return self
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if text := cls.__dict__.get("__str__"):
+            cls.__str__ = in_written_units(text)  # type: ignore[method-assign]
 
     def _repr_html_(self) -> str:
         return brief(self)

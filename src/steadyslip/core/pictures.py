@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, unknown_name
+from steadyslip.core.written import in_written_units
 
 _figures: dict[type, dict[str, Callable[..., Any]]] = {}
 _sources: list[Callable[[], object]] = []
@@ -34,11 +35,13 @@ def saved_by(save: Callable[[Any, str, Any], object]) -> None:
     _savers[:] = [save]
 
 
+@in_written_units
 def save(axes: Any, path: str, result: Any) -> None:
     """Save the figure of Axes, or of an array of them, with what it shows: the rig of the result, version and date."""
     _savers[-1](axes, path, result)
 
 
+@in_written_units
 def draw(result: Any, kind: str | None = None, **options: Any) -> Any:
     """Draw a result and return what its drawing function returns, usually the Axes.
 

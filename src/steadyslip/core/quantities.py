@@ -191,6 +191,25 @@ _EXAMPLES = {
 }
 
 
+def units_in(values: Any) -> set[str]:
+    """Units of the quantities among texts, also inside lists and tables."""
+    found, left = set(), [values]
+    while left:
+        one = left.pop()
+        if isinstance(one, (dict, list, tuple, set)):
+            left += one.values() if isinstance(one, dict) else one
+        elif isinstance(one, str) and len(one) <= MOST_TEXT and (match := _NUMBER.match(one.strip())):
+            found.add(one.strip()[match.end() :].strip())
+    return {name for name in found if name and _is_unit(name)}
+
+
+def _is_unit(name: str) -> bool:
+    try:
+        return bool(unit(name))
+    except QuantityError:
+        return False
+
+
 def example(expected: str) -> str:
     """A quoted example of a quantity with this unit, for messages."""
     if expected == "1":

@@ -5,11 +5,13 @@ The only part of the package that imports matplotlib. What ``result.plot()`` dra
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 from matplotlib.axes import Axes
 
 from steadyslip.core.pictures import register_figures, saved_by
+from steadyslip.core.written import in_written_units
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction, Profile, Record
 from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
@@ -78,6 +80,9 @@ def _locus(found: Analysis, ax: Axes | None = None, **options: Any) -> Axes:
     return root_locus(found.rig, ax, **options)
 
 
+for _name in __all__:
+    if isinstance(_drawn := globals()[_name], FunctionType):  # not the tuple ANGLES
+        globals()[_name] = in_written_units(_drawn)
 saved_by(save_with_footer)
 register_figures(Analysis, locus=_locus)
 register_figures(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
+from steadyslip.core.quantities import units_in
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
 from steadyslip.laws.contact import ContactLaw
@@ -202,7 +203,8 @@ class Rig(FrozenRecord, Keeper):
                 problems += error.problems
         if problems:
             raise ParameterError(problems)
-        return replaced(self, full)
+        texts = {one for one in changes.values() if isinstance(one, str)}
+        return replaced(self, full).told_in((*self.written_in, *units_in(texts)))
 
 
 @question

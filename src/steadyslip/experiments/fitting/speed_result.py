@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.dimensions import unit
-from steadyslip.core.format import display_units, format_quantity, format_with_error
+from steadyslip.core.format import format_quantity, format_with_error
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.core.version import stamped
+from steadyslip.core.written import display_units
 from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedEstimate, SpeedFindings
 from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, UNTOLD
 from steadyslip.files.specifications.layout import UNKNOWN

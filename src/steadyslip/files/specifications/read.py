@@ -21,7 +21,7 @@ from steadyslip.core.errors import (
     unknown_name,
 )
 from steadyslip.core.options import checked
-from steadyslip.core.quantities import parse
+from steadyslip.core.quantities import parse, units_in
 from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance
@@ -263,6 +263,7 @@ def read_tables(
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
     if rig is not None:
+        rig.told_in(sorted(units_in(tables)))
         faults += wrong_ends(rig, tolerances)
     wrong = {one.name for one in faults}  # told once, as a tolerance
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 from steadyslip.core.areas import is_per_area, total_unit
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, QuantityError
 from steadyslip.core.records import Address, with_values
-from steadyslip.core.tolerances import split_tolerance
 from steadyslip.files.specifications.read import rig_from_text
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.machine.machine import Machine
@@ -157,18 +155,6 @@ def rig_template(text: str, rig: Slider | Machine, names: Sequence[str]) -> RigT
     omitted = _omitted(own, [name for name in names if name not in found])
     template = RigTemplate(_pieces(text, found, {table for table, _ in omitted.values()}), sources, omitted)
     return template if _is_read_back(template, own, names) else RigTemplate((), sources, {})
-
-
-def units_of(text: str) -> set[str]:
-    """All units in the text of a file."""
-    found = {slot.unit for slot in _slots(text) if slot.unit}
-    for match in _VALUE.finditer(text):
-        with suppress(QuantityError):  # no tolerance, or no unit
-            parts = split_tolerance((match["value"] or "").strip("\"'"))
-            quantity = parts and _QUANTITY.fullmatch(parts[0])
-            if quantity and quantity[2] and unit(quantity[2]):
-                found.add(quantity[2])
-    return found
 
 
 def _slots(text: str) -> list[Slot]:

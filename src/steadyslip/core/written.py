@@ -1,0 +1,62 @@
+"""Context of the units in which text and figures tell quantities: those in which the user wrote the rig's file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+_names: ContextVar[frozenset[str]] = ContextVar("names of units", default=frozenset())
+
+
+def display_names() -> frozenset[str]:
+    """Names of the units of the context."""
+    return _names.get()
+
+
+@contextmanager
+def display_units(names: Iterable[str]) -> Iterator[None]:
+    """Context in which quantities are formatted in the user's units, such as rpm, bar, mm^2 or N/um.
+
+    They are added to those of the context around. Of several units of a dimension the one is used whose number is
+    closest to 10. Units that differ from the default by a leading prefix alone, such as kN or um/s, have no effect,
+    since a suitable prefix is chosen in any case. Friction per load is told at the loads that are named, if any are.
+
+    >>> from steadyslip.core.format import format_quantity
+    >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
+    ...     format_quantity(10.0, "rad/s"), format_quantity(2e4, "N"), format_quantity(2e5, "Pa")
+    ...     format_quantity(2e7, "Pa"), format_quantity(12e6, "N/m")
+    ('95.49 rpm', '20 kN', '2 bar')
+    ('20 MPa', '12 N/um')
+    """
+    before = _names.set(_names.get().union(names))
+    try:
+        yield
+    finally:
+        _names.reset(before)
+
+
+def in_written_units(make: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorator of a function that makes text or figures: quantities are in the units of the file that was read.
+
+    That is the file of the rig which is among the arguments, or which one of them is the result of.
+    """
+
+    @wraps(make)
+    def made(*args: _P.args, **named: _P.kwargs) -> _T:
+        written = [name for one in (*args, *named.values()) for name in _written_in(one)]
+        if _names.get().issuperset(written):
+            return make(*args, **named)
+        with display_units(written):
+            return make(*args, **named)
+
+    return made
+
+
+def _written_in(one: Any) -> tuple[str, ...]:
+    """Units in which a rig, or the rig of a result, was written; none for anything else."""
+    return getattr(one, "written_in", ()) or getattr(getattr(one, "rig", None), "written_in", ())

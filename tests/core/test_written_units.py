@@ -1,0 +1,73 @@
+"""Rigs, their results and figures are told in the units of the file that the rig was read from."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from steadyslip.core.format import format_quantity
+
+AXIS = """
+[friction]
+law = "lugre"
+mu_coulomb = 0.11
+mu_static = 0.19
+v_stribeck = "8 ± 10 % mm/min"
+bristle_stiffness = "400 N/um at 3.2 kN"
+[contact]
+law = "constant"
+preload = "3.2 kN"
+[slider]
+area = "200 cm^2"
+stiffness = "12 N/um"
+mass = "240 kg"
+damping = "5 N s/mm"
+[drive]
+velocity = "0.5 mm/min"
+"""
+
+
+@pytest.fixture(scope="module")
+def axis():
+    return ss.rig_from_text(AXIS)
+
+
+def plain(rig):
+    """The same rig in SI, as if built in Python."""
+    return ss.Slider(**{name: getattr(rig, name) for name in ("friction", "contact", "drive", "stiffness", "mass",
+                                                              "damping", "area")})  # fmt: skip
+
+
+def test_texts_of_results_keep_the_units_of_the_file(axis):
+    told = str(ss.analyze(axis))
+    for word in ("at 0.5 mm/min", "stiffness 12 N/um is", "N s/mm", "400 N/um at 3.2 kN"):
+        assert word in told
+    assert "mm/min" in str(ss.steady_state(axis))
+    assert "N/um" in str(ss.boundary(axis, "stiffness")[0])
+    assert "mm/min" in str(ss.simulate(axis, until=0.1))
+    assert "mm/min" not in str(ss.analyze(plain(axis)))
+
+
+def test_units_are_no_part_of_the_value_and_leak_nowhere(axis):
+    assert axis == plain(axis)
+    assert hash(axis) == hash(plain(axis))
+    str(ss.analyze(axis))
+    assert format_quantity(axis.drive.velocity, "m/s") == "8.333 um/s"
+    assert pickle.loads(pickle.dumps(axis)).written_in == axis.written_in
+
+
+def test_a_changed_rig_keeps_them_and_gains_those_of_its_values(axis):
+    changed = axis.with_values({"velocity": "60 mm/h"})
+    assert "at 60 mm/h" in str(ss.steady_state(changed))
+    assert "N/um" in str(ss.boundary(changed, "stiffness")[0])
+
+
+def test_figures_and_fragments_have_them(axis):
+    run = ss.simulate(axis, until=0.1)
+    for axes in (run.plot(), ss.figures.history(run)):
+        assert "velocity (mm/min)" in [one.get_ylabel() for one in np.ravel(axes)]
+    chart = ss.figures.stability_chart(axis, "velocity", "stiffness")
+    assert "(mm/min)" in chart.get_xlabel()
+    assert "(N/µm)" in chart.get_ylabel()
+    assert "mm/min" in ss.analyze(axis)._repr_html_()

@@ -338,7 +338,7 @@ def _slip_table(result: History) -> Iterator[str]:
 @parts_of.register
 def _branch(result: CycleBranch) -> Parts:
     along, unit, area = result.along, result.unit, result.rig.printed_area(result.along)
-    stress, drop = result.rig.result_unit("Pa"), result.rig.result_name("stress drop")
+    stress, drop = result.rig.result_unit("Pa"), result.rig.result_name("stress swing")
     first, _, rest = str(result).partition("\n")
     rows = [
         (format_quantity(one.value, unit, area=area), format_quantity(one.period, "s"),

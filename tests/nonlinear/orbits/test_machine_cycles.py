@@ -110,7 +110,7 @@ def test_names_and_an_idle_body_change_nothing():
 def test_tables_and_words_are_in_forces(tmp_path):
     found = branch()
     text, data = str(found), found.to_dict()
-    assert "force drop   up to" in text
+    assert "force swing  up to" in text
     assert "at guide" in text
     assert "Pa" not in text
     one = data["cycles"][-1]

@@ -280,8 +280,8 @@ class CycleBranch(Displayed):
 
     @property
     def _drop(self) -> str:
-        """Label of the stress drop (or force drop of a machine)."""
-        return stress_name(self.rig.result_name("stress drop"), self.rig.area)
+        """Label of `stress_drop` (`force_drop` of a machine), apart from the drop in which an event of a run ends."""
+        return stress_name(self.rig.result_name("stress swing"), self.rig.area)
 
     @property
     def interrupted(self) -> bool:

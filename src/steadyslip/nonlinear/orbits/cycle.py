@@ -72,7 +72,8 @@ class Cycle(Displayed):
     amplitude : float
         Half of ln(peak velocity/lowest velocity); infinite where the block stops or turns round.
     stress_drop : float
-        Highest less lowest spring stress, Pa.
+        Highest less lowest spring stress, Pa, its swing; the `stress_drop` of a `SlipEvent` ends where the block first
+        rests, and is smaller where ringing goes lower.
     lowest_normal_stress, highest_normal_stress : float
         Pa.
     multipliers : tuple of complex

@@ -201,8 +201,8 @@ def unlikely_speed(what: str, speed: float, friction: FrictionLaw) -> tuple[str,
         return ()
     name, scale = max(own.items(), key=lambda item: item[1])
     return (
-        f"{what} {format_quantity(speed, 'm/s')}, {speed / scale:.2g} times {name} of its friction, "
-        f"{format_quantity(scale, 'm/s')}; a velocity without a unit is read in m/s",
+        f"{what} {speed:.4g} m/s? That is {speed / scale:.2g} times {name} of its friction, "
+        f"{format_quantity(scale, 'm/s')}; a number without a unit is read in m/s",
     )
 
 

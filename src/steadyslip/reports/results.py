@@ -269,7 +269,7 @@ def _analysis(result: Analysis) -> Parts:
 @parts_of.register
 def _history(result: History) -> Parts:
     rig = result.rig
-    caption = CONTACT_PHASE_PLANE if isinstance(rig, Machine) else PHASE_PLANE
+    caption = CONTACT_PHASE_PLANE if rig.contacts else PHASE_PLANE
     plane = figure(figure_html(lambda: figures.phase_plane(result), "phase plane", 5.5), caption)
     body = [
         *rig_section(rig),

@@ -13,7 +13,8 @@ from steadyslip.files.specifications.layout import selector
 from steadyslip.files.specifications.read import protocol_of, text_of
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import Table
-from steadyslip.machine.rig import Rig
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Piece, Protocol
 
 
@@ -60,7 +61,7 @@ def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = 
 
 
 @checked()
-def piece_from_text(text: str, area: float | None = None, machine: Rig | None = None) -> Piece:
+def piece_from_text(text: str, area: float | None = None, machine: Slider | Machine | None = None) -> Piece:
     """Read one piece of a protocol from a line of text.
 
     Parameters
@@ -70,7 +71,7 @@ def piece_from_text(text: str, area: float | None = None, machine: Rig | None = 
     area : float, optional
         Contact area of the rig, m^2; with it stresses are given as forces, as in a rig file.
     machine : Machine, optional
-        Machine that the piece acts on: takes forces, and angles where its load point turns.
+        Machine that the piece acts on: takes forces, and angles where its load point turns. A slider changes nothing.
 
     Raises
     ------

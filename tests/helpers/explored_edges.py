@@ -192,7 +192,7 @@ def read_in_browser(visit):
     """First line, reason and list of nearest edges (name, text) of a page that is open."""
     rows = visit.page.locator(".edges li")
     listed = rows.evaluate_all("all => all.map((one) => [one.firstChild.dataset.name, one.textContent])")
-    return visit.sentence(), visit.page.locator(".verdict p").first.inner_text(), dict(listed)
+    return visit.sentence(), visit.reason(), dict(listed)
 
 
 def pressed(page, chance, browser, file):

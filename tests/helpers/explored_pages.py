@@ -57,7 +57,10 @@ class Visit:
         assert not self.complaints, self.complaints
 
     def sentence(self):
-        return self.page.inner_text("h1")
+        return self.page.inner_text("h1").replace("\u00a0", " ")
+
+    def reason(self):
+        return self.page.locator(".verdict p").first.inner_text().replace("\u00a0", " ")
 
     def field(self, name):
         return self.page.locator(f'input[type=text][data-name="{name}"]')

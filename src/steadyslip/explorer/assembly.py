@@ -141,13 +141,14 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
         still = str(refused)
     modules = [_read_web(f"{name}.js") for name in MODULES]
     library = [_read_web(f"{name}.js") for name in WORKER_MODULES]
-    modules.insert(0, javascript.runtime())
+    modules.insert(0, javascript.runtime(text, *modules))
     script = shorten_declared(
         minify(javascript.as_script(*modules)),
         javascript.declared_names(*modules),
         {*ENTRIES, *javascript.runtime_names()},
     )
-    worker = minify(javascript.as_script(javascript.runtime(), *library)) + _minified(driven, DRIVER)
+    needed = javascript.runtime(machine, driven, *library)
+    worker = minify(javascript.as_script(needed, *library)) + _minified(driven, DRIVER)
     known = _data(rig, title, branch, facts, file) | {
         "motion": moving,
         "still": still,

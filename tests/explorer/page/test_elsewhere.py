@@ -37,12 +37,12 @@ def test_firefox_shows_the_same(file, moved, tmp_path_factory):
     try:
         firefox.ask("WebDriver:Navigate", url=moved["explorer"].as_uri())
         sentence, told, notice, foot, curves = firefox.run(COMPLETE)
-        assert sentence == "Unstable: steady sliding at 1 µm/s"
+        assert sentence == "Unstable: steady sliding at 1\u00a0µm/s"
         assert "slip events, the last two" in told
         assert notice == ""
         assert "agrees with 4 answers of Python" in foot
         assert curves >= 2
-        assert firefox.run(MOVE) == ["Stable: steady sliding at 1 µm/s", True]
+        assert firefox.run(MOVE) == ["Stable: steady sliding at 1\u00a0µm/s", True]
         width = "return document.documentElement.scrollWidth <= innerWidth"
         for size in (500, 1366):  # narrower windows it has not
             firefox.ask("WebDriver:SetWindowRect", width=size, height=900)

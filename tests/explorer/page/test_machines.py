@@ -25,7 +25,7 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
     analysis = ss.analyze(machine)
     with Visit(browser, path) as visit:
         assert visit.sentence() == "Unstable: steady sliding at 20 µm/s"
-        reason = visit.page.locator(".verdict p").first.inner_text()
+        reason = visit.reason()
         assert reason.lower() == f"{analysis.reason}.".lower()
         assert analysis.mode.words() in visit.page.locator(".mode").inner_text()
         first = analysis.margins[0].parameter
@@ -73,7 +73,7 @@ def test_a_page_says_why_there_is_no_steady_sliding_as_analyze_does(browser, pag
         for name, value in changes.items():
             visit.type(name, value)
         assert visit.sentence() == "No steady sliding at 20 µm/s"
-        said = visit.page.locator(".verdict p").first.inner_text().replace("−", "-").lower()
+        said = visit.reason().replace("−", "-").lower()
         assert said == f"{found.reason}.".lower()
 
 
@@ -95,4 +95,4 @@ def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
         visit.page.get_by_role("button", name="undo").click()
         visit.type("bodies.pad.press", "-1 N")
         edges.filter(has_text="pad press").filter(has_text="slides steadily, but unstable").wait_for()
-        assert visit.page.locator(".verdict p").first.inner_text().startswith("Lift-off at contact disc.")
+        assert visit.reason().startswith("Lift-off at contact disc.")

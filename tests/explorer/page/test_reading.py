@@ -98,8 +98,8 @@ def test_two_pages_live_in_one_document(browser, file, tmp_path):
     )
     with Visit(browser, tmp_path / "two.html") as visit:
         assert visit.page.locator("h1").all_inner_texts() == [
-            "Unstable: steady sliding at 1 µm/s",
-            "Stable: steady sliding at 1 µm/s",
+            "Unstable: steady sliding at 1\u00a0µm/s",
+            "Stable: steady sliding at 1\u00a0µm/s",
         ]
         ids = visit.page.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
         assert len(ids) == len(set(ids)) > 2
@@ -135,3 +135,18 @@ def test_hostile_words_of_a_law_are_text(browser, tmp_path):
             assert HOSTILE_WORDS in visit.page.locator("body").inner_text().replace("\n", " ")
             assert visit.page.locator("img[src=x]").count() == 0
             assert visit.page.locator(".steadyslip h1").count() == 1
+
+
+def test_numbers_stay_with_their_units_and_letters_with_their_subscripts(browser, file):
+    """In sentences that wrap on a phone, and under the axes of the chart."""
+    with Visit(browser, file, "#~across=friction.d_c") as visit:
+        visit.page.set_viewport_size({"width": 390, "height": 844})
+        assert re.search(r"\d\u00a0µm/s", visit.page.inner_text("h1"))
+        assert not re.search(r"\d [a-zA-Zµ]+(/m|Pa|/s)\b", visit.page.locator(".verdict p").first.inner_text())
+        label = visit.page.locator(".map text.label").first
+        assert (label.text_content(), label.locator("tspan").first.text_content()) == ("slip distance dc (µm)", "c")
+        assert "_" not in visit.page.locator(".edges").first.inner_text()
+        tools = visit.page.locator(".tools").bounding_box()
+        assert tools["height"] < 50  # one row, which scrolls
+        visit.page.locator(".tabs").get_by_role("button", name="motion").click()
+        assert visit.page.locator(".verdict").bounding_box()["height"] <= 90

@@ -71,7 +71,7 @@ def test_an_edge_in_the_list_goes_there(browser, file):
     with Visit(browser, file) as visit:
         visit.page.get_by_role("button", name=re.compile("^stiffness k →")).click()
         assert visit.sentence().startswith("Stable")
-        assert "is 1.001 times the critical" in visit.page.inner_text(".verdict p"), "not 1 times, as on the edge"
+        assert "is 1.001 times the critical" in visit.reason(), "not 1 times, as on the edge"
 
 
 def test_an_edge_outside_the_range_of_a_slider_takes_the_slider_there(browser, file):
@@ -156,7 +156,7 @@ def test_files_and_links_carry_every_digit(browser, file, tmp_path):
         while not visit.page.evaluate("location.hash.includes('contact.angle')"):
             assert time.time() < end
         link = visit.page.evaluate("location.hash")
-        critical = visit.page.inner_text(".verdict p")
+        critical = visit.reason()
         table = visit.saved("values and edges")
         picture = visit.saved("as a drawing")
         pixels = visit.saved("as a picture", "latin-1")
@@ -168,7 +168,7 @@ def test_files_and_links_carry_every_digit(browser, file, tmp_path):
     assert "var(" not in picture
     assert pixels.startswith("\x89PNG")
     with Visit(browser, file, link) as visit:
-        assert visit.page.inner_text(".verdict p") == critical
+        assert visit.reason() == critical
         (tmp_path / "rig2.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
     assert ss.read_rig(tmp_path / "rig2.toml") == again
 
@@ -322,7 +322,7 @@ def test_units_and_comments_of_the_file_stay(browser, tmp_path):
     with Visit(browser, tmp_path / "rig.html") as visit:
         assert visit.sentence() == "Unstable: steady sliding at 3.6 mm/h"
         assert visit.field("slider.stiffness").input_value() == "9 N/µm"
-        assert "N/µm" in visit.page.inner_text(".verdict p")
+        assert "N/µm" in visit.reason()
         assert visit.saved("save as a rig file") == text
         visit.type("slider.stiffness", "12.3")
         visit.type("drive.velocity", "7.2")

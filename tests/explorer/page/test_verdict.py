@@ -14,7 +14,7 @@ def test_the_page_says_what_python_says_and_asks_for_nothing(browser, file):
     analysis = ss.analyze(INCLINED)
     with Visit(browser, file) as visit:
         assert visit.sentence() == "Unstable: steady sliding at 1 µm/s"
-        text = visit.page.inner_text(".verdict p")
+        text = visit.reason()
         assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
         assert f"{9e9 / analysis.critical_stiffness:.3g} times" in text
         assert "agrees with 4 answers of Python" in visit.page.inner_text("footer")
@@ -30,11 +30,11 @@ def test_the_page_says_what_python_says_and_asks_for_nothing(browser, file):
 
 def explained(visit):
     """What a reader who had never seen the page did not understand is said on it."""
-    assert "At the critical stiffness a small disturbance oscillates" in visit.page.inner_text(".verdict p")
+    assert "At the critical stiffness a small disturbance oscillates" in visit.reason()
     bar = visit.page.locator(".bar").inner_text()
     for words in ("stiffness now 9 GPa/m", "stable from", "10 GPa/m", "100 GPa/m"):
         assert words in bar
-    assert "Theta: state of friction" in visit.page.inner_text(".facts dl")
+    assert "Θ: state of friction" in visit.page.inner_text(".facts dl")
     key = visit.page.locator(".map .key").inner_text()
     assert "no steady sliding" in key, "the track of mu_ref has that"
     assert "no such rig" not in key, "nothing on the page has that"
@@ -112,7 +112,7 @@ def test_the_bar_of_a_gain_is_that_of_the_gain(browser, tmp_path):
     ss.explore(own).save(tmp_path / "rig.html")
     (edge,) = [one.value for one in ss.boundary(own, "drive.kp")]
     with Visit(browser, tmp_path / "rig.html") as visit:
-        assert "The gain kp, 900 GPa/m, is 108 times the critical 8.357 GPa/m" in visit.page.inner_text(".verdict p")
+        assert "The gain kp, 900 GPa/m, is 108 times the critical 8.357 GPa/m" in visit.reason()
         bar = visit.page.locator(".bar")
         assert "now 900 GPa/m" in bar.inner_text()
         assert bar.get_attribute("aria-label") == f"stable values of drive kp: above {edge / 1e9:.4g} GPa/m"

@@ -1,5 +1,5 @@
 // Banner: the verdict, its reason, and a bar with the stable values of one parameter.
-import { make, put, svg, tell } from "./dom.js";
+import { make, put, svg, tell, unbroken } from "./dom.js";
 import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
 import { digits, shown, told, unitFor } from "./quantities.js";
@@ -46,8 +46,8 @@ export class Banner {
   show(answer) {
     const { phrases } = this.data;
     this.box.dataset.kind = kindOf(answer);
-    tell(this.sentence, headline(answer, this.speed(answer), this.data));
-    if (!phrases || !this.page.tracks) tell(this.reason, phrases ? this.told(answer) : reason(answer, this.data) + besides(answer, this.data));
+    tell(this.sentence, unbroken(headline(answer, this.speed(answer), this.data)));
+    if (!phrases || !this.page.tracks) tell(this.reason, unbroken(phrases ? this.told(answer) : reason(answer, this.data) + besides(answer, this.data)));
     this.showBar(answer);
   }
 
@@ -63,7 +63,7 @@ export class Banner {
 
   /** Update what depends on edges: the reason for the verdict on a machine, and the bar. @param {any} answer @param {any} [first] */
   follow(answer, first) {
-    if (this.data.phrases) tell(this.reason, this.told(answer, first));
+    if (this.data.phrases) tell(this.reason, unbroken(this.told(answer, first)));
     this.choice.selectedIndex = this.page.rig.bar;
     this.showBar(answer);
   }

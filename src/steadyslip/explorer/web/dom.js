@@ -41,6 +41,9 @@ export function putAt(element, places) {
   if (!display) for (const [name, at] of all) element.setAttribute(name, at.toFixed(1));
 }
 
+/** Sentence in which no line ends between a number and its unit. @param {string} text */
+export const unbroken = (text) => text.replace(/(\d) (?=[^\s\d(])/g, "$1\u00a0");
+
 /** Set the text of an element only if it changes. @param {any} element @param {string} text */
 export function tell(element, text) {
   if (element.textContent !== text) element.textContent = text;

@@ -1,5 +1,6 @@
 // Tables of steady sliding and eigenvalues, root locus, and list of nearest edges.
 import { make, put, svg, tell } from "./dom.js";
+import { lettered } from "./controls.js";
 import { BESIDE } from "./edges.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Locus } from "./locus.js";
@@ -59,7 +60,7 @@ export class Facts {
     this.sliding.hidden = this.swings.hidden = absent;
     tell(this.shape, answer.mode ? `In the leading mode ${words(answer.mode, rig.data.facts.shape)}.` : "");
     const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/_/g, " "), answer.observed[name], unit, meaning])];
-    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [named(name, area && unit === "Pa" ? "N" : unit) + (meaning && `: ${meaning}`), quantity(value, unit, area)]),
+    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(named(name, area && unit === "Pa" ? "N" : unit) + (meaning && `: ${meaning}`)).replace(/Theta/g, "Θ").replace(/theta/g, "θ"), quantity(value, unit, area)]),
       () => [make("dt", {}), make("dd", {})], 2);
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
@@ -76,7 +77,7 @@ export class Facts {
   showEdges() {
     const { page } = this;
     const rows = (edges) => edges.map((edge) => {
-      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", textContent: `${one.title} → ${told(one, edge.at).replace(/ /g, "\u00a0")}`, "data-name": one.name });
+      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", "data-name": one.name }, ...lettered(one), ` → ${told(one, edge.at).replace(/ /g, "\u00a0")}`);
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.put(page.with(edge.i, edge.landing));
       });

@@ -1,7 +1,7 @@
 // Stability chart over two parameters with the point of the rig.
 import { CLASSES, regions } from "./chart.js";
 import { make, put, putAt, svg } from "./dom.js";
-import { axis } from "./plot.js";
+import { axis, frame } from "./plot.js";
 import { told } from "./quantities.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
@@ -106,6 +106,6 @@ export class Chart {
     this.point = svg("circle", { r: 8, class: "point" });
     this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
     this.canvas.replaceChildren(inner,
-      axis(box, x, ranges[i], parameters[i], parameters[i].title, false), axis(box, y, ranges[j], parameters[j], parameters[j].title, true), this.point);
+      axis(box, x, ranges[i], parameters[i], parameters[i].title, false), axis(box, y, ranges[j], parameters[j], parameters[j].title, true), frame(box), this.point);
   }
 }

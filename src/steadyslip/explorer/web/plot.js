@@ -53,7 +53,8 @@ export function axis(box, scale, [low, high], one, label, upright) {
   while (whole().length * LETTER > length + MARGIN && own.includes(".")) own = own.slice(own.indexOf(".") + 1); // a long name loses its first parts
   const text = whole();
   const where = upright ? { transform: `translate(13 ${box.top + box.height / 2}) rotate(-90)` } : { x: box.left + box.width / 2, y: box.top + box.height + 34 };
-  group.append(svg("text", { ...where, "text-anchor": "middle", class: "label" }, text));
+  const [, base = text, below, rest] = /^(.*?)_(\w+)(.*)$/.exec(text) ?? []; // a letter's subscript stands below the line
+  group.append(svg("text", { ...where, "text-anchor": "middle", class: "label" }, base, ...(below ? [svg("tspan", { dy: 4, "font-size": "80%" }, below), svg("tspan", { dy: -4 }, rest)] : [])));
   return group;
 }
 
@@ -82,7 +83,7 @@ export function spanning([low, high], label) {
 /** @returns {Scale} */
 export const straight = (a, b) => ({ at: (t) => a + t * (b - a), of: (v) => (v - a) / (b - a) });
 
-const frame = (box) => svg("rect", { x: box.left, y: box.top, width: box.width, height: box.height, class: "frame" });
+export const frame = (box) => svg("rect", { x: box.left, y: box.top, width: box.width, height: box.height, class: "frame" });
 
 /** SVG path of a series over rising times; of many points only the lowest and highest of each pixel column. */
 export function pathOver(box, times, values, along, up) {

@@ -69,7 +69,7 @@ function ofSlider({ onEdge, eigenvalues, stiffness, gain, held, intervals, criti
 export function besides({ critical, illPosed, frequency, gain, stiffness, share }, data) {
   if (critical === null || illPosed) return "";
   const by = gain && !stiffness ? "gain" : "stiffness", along = data.axial >= 0 ? ` Along the axis the critical stiffness is ${told(asStiffness(data), (critical + gain) / share)}.` : "";
-  return along + (frequency ? ` At the critical ${by} a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / frequency, "s").replace(" ", "\u00a0")}.` : "");
+  return along + (frequency ? ` At the critical ${by} a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / frequency, "s")}.` : "");
 }
 
 /** Reason for the verdict on a machine: growth or decay, and the nearest edge. */

@@ -22,9 +22,22 @@ _EXPORTED = re.compile(r"(?:^export (?:const|function)|,) (\w+)(?= =|\()", re.M)
 _OWN = {"abs", "sqrt"}
 
 
-def runtime() -> str:
-    """Text of the module with the elementary functions."""
-    return files("steadyslip.kernels.printers").joinpath("runtime.js").read_text(encoding="utf-8")
+def runtime(*code: str) -> str:
+    """Text of the module with the elementary functions; of some code only what that needs of it."""
+    whole = files("steadyslip.kernels.printers").joinpath("runtime.js").read_text(encoding="utf-8")
+    if not code:
+        return whole
+    blocks = re.findall(r"^(?:/\*\*[^/]*?\*/\n)?(?:export |const |function )(?:.*\n)(?:[ }].*\n)*", whole, re.M)
+    names = {block: {*declared_names(block), *_EXPORTED.findall(block)} for block in blocks}
+    needed = "\n".join(code)
+    kept: set[str] = set()
+    while more := {
+        block for block in blocks if block not in kept
+        and any(re.search(rf"(?<![\w.\"]){name}\b", needed) for name in names[block])
+    }:  # fmt: skip
+        kept |= more
+        needed = "".join(more)
+    return "".join(block for block in blocks if block in kept)
 
 
 def runtime_names() -> set[str]:

@@ -162,7 +162,9 @@ def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian()
 
 def test_draws_bring_data_likelihood_and_predictions_to_arviz():
     arviz = pytest.importorskip("arviz")
-    fit = ss.fit(ss.lab_rig(), [lab.record(lab.rig(), lab.STEP, seed, count=200) for seed in (1, 2)])
+    fit = ss.fit(
+        ss.lab_rig(), [lab.record(lab.rig(), lab.STEP, seed, count=200) for seed in (1, 2)], errors="independent"
+    )
     draws = ss.experiments.normal_draws(fit, 400)
     handed = draws.to_arviz()
     record = fit.plan.records[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -29,6 +30,7 @@ from steadyslip.experiments.fitting.search import (
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.valleys import along_valleys
 from steadyslip.experiments.loading.loading import shifted
+from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe, white
@@ -167,6 +169,13 @@ def search_fit(
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
     if plan.loss == "linear" or plan.width is not None:
         found = find_minimum(plan, starts, allowed, progress)
+        if plan.loss == "linear" and options.get("weights") is None:
+            kept = _without_outliers(plan, found)
+            if any(map(operator.is_not, kept, plan.records)):
+                return search_fit(
+                    rig, kept, free, errors=errors, starts=starts, effort=effort, threads=threads, progress=progress,
+                    **options,
+                )  # fmt: skip
     else:  # outliers shift the first fit and widen its scatter; the width shrinks as their weight does
         found = find_minimum(replace(plan, loss="linear"), starts, allowed, progress)
         last = np.inf
@@ -177,6 +186,14 @@ def search_fit(
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
     return fit_with_errors(plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+
+
+def _without_outliers(plan: Plan, found: SearchResult) -> tuple[Record, ...]:
+    """Records without single samples that are far off the fit: they shift it by many of its errors."""
+    residuals, one = _weighted_residuals(found), found.comparison
+    return tuple(
+        without_outliers(record, residuals[where]) for record, where in zip(plan.records, one.slices, strict=True)
+    )
 
 
 def _weighted_residuals(found: SearchResult) -> Array:

@@ -19,7 +19,7 @@ from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
-from steadyslip.experiments.measured.clipped import CLIPPED, WILD
+from steadyslip.experiments.measured.clipped import CLIPPED, OFF_FIT, WILD
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
@@ -27,8 +27,6 @@ from steadyslip.model.sliding import steady_state
 WIDTH = 100  # characters of a line of text
 MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
 END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
-OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
-MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 LEAST_CHANCE = 1e-99  # probabilities below it are not told apart
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
@@ -115,12 +113,12 @@ def _chance(p: float) -> str:
 
 
 def _left_out(fit: FitNumbers) -> list[str]:
-    """Warnings on samples left out because their channel was full or they are wild."""
+    """Warnings on samples left out because their channel was full or they are far off others."""
     return [
         f"{record.source}: {note}; give weights to keep them"
         for record in fit.plan.records
         for note in record.notes
-        if CLIPPED in note or WILD in note
+        if any(why in note for why in (CLIPPED, WILD, OFF_FIT))
     ]
 
 
@@ -134,7 +132,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _left_out(fit) + _outliers(fit) + _ends_off_model(fit)
+    found += list(fit.at_bounds) + _left_out(fit) + _ends_off_model(fit)
     found += _vague_jumps(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
     found += loading_warnings(fit)
     if other := of_another(fit.version):
@@ -149,26 +147,6 @@ def _cut_off(fit: FitNumbers) -> str:
         f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
         "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
     )
-
-
-def _outliers(fit: FitNumbers) -> list[str]:
-    """Warnings on records in which a few outliers contribute half of the sum of squares."""
-    found = []
-    for i, record in enumerate(fit.plan.records if fit.plan.loss == "linear" else ()):
-        squares = fit.part(fit.residuals, i) ** 2
-        order = np.argsort(-squares)
-        gone = np.cumsum(squares[order])
-        half = int(np.searchsorted(gone, 0.5 * gone[-1])) + 1
-        rest = (gone[-1] - gone[half - 1]) / len(squares)
-        if half <= max(MAX_OUTLIERS * len(squares), 1) and squares[order[half - 1]] > OUTLIER_SIZE**2 * rest:
-            far = np.sort(order[:half])
-            where = f"{record.time[far[0]]:.7g} s" + (f" to {record.time[far[-1]]:.7g} s" if len(far) > 1 else "")
-            what = "1 sample of friction is" if len(far) == 1 else f"{len(far)} samples of friction are"
-            found.append(
-                f"{record.source}: {what} so far off all others that half of the misfit and more is there ({where}); "
-                "if it is a fault of the sensor, mend or cut it, or let outliers weigh less (loss = 'cauchy')"
-            )
-    return found
 
 
 def _ends_off_model(fit: FitNumbers) -> list[str]:

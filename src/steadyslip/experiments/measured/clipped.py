@@ -18,10 +18,13 @@ CLIPPED = "at a limit of the channel"
 BESIDE = 2  # samples on each side with which a sample is compared
 WILD_SIZE, WILD_RANGE = 20.0, 4.0
 """Least distance of a wild sample from the median of those beside it: in standard deviations of the noise, as
-`words.OUTLIER_SIZE`, and in ranges of those beside it, which a peak of friction raises too."""
+`OUTLIER_SIZE`, and in ranges of those beside it, which a peak of friction raises too."""
 AFTER = 4  # samples after a change of the loading in which friction may have a peak of one sample
 LARGEST_DIRECT = 0.05  # of such a peak, per e-fold of rate: twice the largest direct effect of rocks
 WILD = "far off the samples beside"
+OFF_FIT = "so far off the fit that half of its misfit and more was there"
+OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
+MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
 
 
 def without_clipped(record: Record) -> Record:
@@ -30,11 +33,7 @@ def without_clipped(record: Record) -> Record:
     for values in (record.friction, record.shear):
         if values is not None:
             full |= clipped(values) | clipped(-values)
-    if not np.any(full):
-        return record
-    first, last = record.time[full][[0, -1]]
-    note = f"{np.sum(full)} samples from {first:.7g} to {last:.7g} s left out, friction is {CLIPPED}"
-    return replace(record.taken(~full, note), commanded=record.loading)
+    return _without(record, full, CLIPPED)
 
 
 def without_wild(record: Record) -> Record:
@@ -54,11 +53,29 @@ def without_wild(record: Record) -> Record:
             out[near] &= (share < 0) | (share > LARGEST_DIRECT)
         else:
             out[near] = False
+    return _without(record, out, WILD)
+
+
+def without_outliers(record: Record, residuals: Array) -> Record:
+    """Record without the few samples, if there are such, that contribute half of the squares of residuals (n,)."""
+    squares = residuals**2
+    order = np.argsort(-squares)
+    gone = np.cumsum(squares[order])
+    half = int(np.searchsorted(gone, 0.5 * gone[-1])) + 1
+    rest = (gone[-1] - gone[half - 1]) / len(squares)
+    out = np.zeros(len(record), dtype=bool)
+    if half <= max(MAX_OUTLIERS * len(squares), 1) and squares[order[half - 1]] > OUTLIER_SIZE**2 * rest:
+        out[order[:half]] = True
+    return _without(record, out, OFF_FIT)
+
+
+def _without(record: Record, out: Array, why: str) -> Record:
+    """Record without samples of friction, with a note; the loading stays as all of them show it."""
     if not np.any(out):
         return record
     first, last = record.time[out][[0, -1]]
     where = f"from {first:.7g} to {last:.7g} s" if last > first else f"at {first:.7g} s"
-    note = f"{np.sum(out)} of the samples {where} left out, friction is {WILD}"
+    note = f"{np.sum(out)} of the samples {where} left out, friction is {why}"
     return replace(record.taken(~out, note), commanded=record.loading)
 
 

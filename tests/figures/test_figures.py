@@ -1,6 +1,7 @@
 """Figures, read back from their Axes: curves, regions, markers, labels, on ordinary and on odd rigs."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import matplotlib
@@ -424,3 +425,31 @@ def test_no_text_overlaps_another_or_leaves_the_figure(draw):
         assert not first.overlaps(second)
     width, height = canvas.get_width_height()
     assert all(b.x0 >= 0 and b.y0 >= 0 and b.x1 <= width and b.y1 <= height for b in boxes)
+
+
+def test_contours_reach_the_edges_of_the_chart_and_the_critical_line():
+    """k/k_cr has the lines k = level k_cr, down to where k_cr is zero; each label is on its own."""
+    rig = ss.read_rig("examples/inclined-spring.toml")
+    ax = ss.figures.stability_chart(rig, "friction.b", "stiffness", points=61)
+    (lines,) = [one for one in ax.collections if hasattr(one, "allsegs")]
+    low, high = ax.get_ylim()
+    for level, pieces in zip(1 / lines.levels, lines.allsegs, strict=True):
+        b, k = np.concatenate(pieces).T
+        assert k.min() == pytest.approx(low, rel=0.3)
+        exact = level * ss.critical_stiffness(rig, {"friction.b": b}) / 1e9
+        far = (exact > 3 * low * level) & (k < 0.9 * high) & (b > 0.017)
+        assert far.any()
+        assert np.abs(np.log(k / exact))[far].max() < 0.02
+    written = [text for text in ax.texts if re.fullmatch(r"[\d.]+", text.get_text())]
+    assert sorted(float(text.get_text()) for text in written) == pytest.approx(sorted(1 / lines.levels))
+    heights = [np.log(text.get_position()[1] / low) / np.log(high / low) for text in written]
+    assert min(heights) > 0.1  # where lines are apart
+
+
+def test_a_legend_is_no_wider_than_its_axes():
+    run = ss.simulate(ss.read_rig("examples/stick-slip.toml"), ss.protocol.VelocityStep(at=1.0, to=2e-6), until=60.0)
+    with ss.figures.journal():
+        axes = ss.figures.history(run)[0]
+    axes.figure.draw_without_rendering()
+    assert axes.get_window_extent().width > 0.7 * axes.figure.bbox.width
+    assert axes.get_legend().get_window_extent().x1 <= axes.figure.bbox.x1

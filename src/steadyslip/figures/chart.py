@@ -29,6 +29,7 @@ _LETTER, _LINE = (
     0.0105,
     0.045,
 )  # half a letter's width and a line's height with its halo, share of the axes of a new figure
+_ROOM = 24.0  # pixels between a label of a contour and the next line (by trial)
 _SAMPLES = 12  # points at which the reason for no steady sliding is computed: time against missing a reason (by trial)
 
 
@@ -146,19 +147,35 @@ def draw_contours(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) 
     a, b = np.meshgrid(share, share)
     vary = {x.name: x.at(a), y.name: y.at(b)}
     nearest = (share * (len(grid) - 1)).round().astype(int)
-    slides = grid[np.ix_(nearest, nearest)] != ABSENT
+    here = grid[np.ix_(nearest, nearest)]
     values = None
     with suppress(NotAvailable, ParameterError), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of delays too long to be judged: there are no contours there
         values = safety_factor(rig, vary)
     if values is None or not np.isfinite(values).any():
         return
-    values = np.where(slides & np.isfinite(values), values, np.nan)
-    shown = [level for level in SAFETY_LEVELS if level != 1 and np.nanmin(values) < level < np.nanmax(values)]
+    with np.errstate(divide="ignore"):  # k_cr/k goes to zero where k_cr does, and lines of it end there
+        inverse = np.where(np.isfinite(values) & (here != ABSENT), 1 / values, np.where(here == STABLE, 0.0, np.nan))
+    inverse[~np.isfinite(inverse)] = np.nan
+    shown = [1 / level for level in SAFETY_LEVELS[::-1] if level != 1]
+    shown = [level for level in shown if np.nanmin(inverse) < level < np.nanmax(inverse)]
     if shown:
-        lines = ax.contour(x.shown(x.at(share)), y.shown(y.at(share)), values, levels=shown, **CONTOURS)
-        ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}")
+        lines = ax.contour(x.shown(x.at(share)), y.shown(y.at(share)), inverse, levels=shown, **CONTOURS)
+        longest = [max(pieces, key=len) for pieces in lines.allsegs if pieces]
+        places = [_apart(ax, one, [other for other in longest if other is not one]) for one in longest]
+        ax.clabel(lines, fontsize="small", fmt=lambda level: f"{1 / level:g}", manual=places)
         ax.plot([], [], color=CONTOURS["colors"], linewidth=CONTOURS["linewidths"], label="k/k$_{cr}$")
+
+
+def _apart(ax: Axes, line: Any, others: Sequence[Any]) -> tuple[float, float]:
+    """Vertex of a line with `_ROOM` between it and other lines, the nearest to its middle; else where there is most."""
+    seen = ax.transData.transform(line)
+    inside = np.all(np.abs(ax.transAxes.inverted().transform(seen) - 0.5) < 0.45, axis=1)
+    beside = [ax.transData.transform(one) for one in others]
+    gaps = [np.linalg.norm(seen[:, None] - one[None], axis=-1).min(axis=1) for one in beside]
+    gap = np.min([np.full(len(seen), _ROOM), *gaps], axis=0)
+    best = np.argmax(np.where(inside, gap, -1.0) - np.abs(np.linspace(-0.5, 0.5, len(seen))))
+    return float(line[best, 0]), float(line[best, 1])
 
 
 def write_inside(ax: Axes, region: Any, words: str, place: Place) -> bool:

@@ -183,19 +183,22 @@ def add_legend_above(
 ) -> None:
     """Add a legend above the axes, where it covers no data; `height` leaves room for the power of ten of the y axis.
 
-    Labels that begin as one in `without` are left out.
+    It has at most so many columns as fit. Labels that begin as one in `without` are left out.
     """
     handles, labels = ax.get_legend_handles_labels()
     kept = [(one, label) for one, label in zip(handles, labels, strict=True) if not label.startswith(tuple(without))]
-    ax.legend(
-        *zip(*kept, strict=True),
-        loc="lower left",
-        bbox_to_anchor=(0, height),
-        ncols=columns,
-        frameon=False,
-        borderaxespad=0.2,
-        **options,
-    )
+    for many in range(columns, 0, -1):  # as many columns as are no wider than the axes
+        legend = ax.legend(
+            *zip(*kept, strict=True),
+            loc="lower left",
+            bbox_to_anchor=(0, height),
+            ncols=many,
+            frameon=False,
+            borderaxespad=0.2,
+            **options,
+        )
+        if legend.get_window_extent().width <= ax.get_window_extent().width:
+            break
 
 
 def add_arrowheads(ax: Axes, x: Any, y: Any, color: str) -> None:

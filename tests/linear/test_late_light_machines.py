@@ -80,3 +80,39 @@ def test_a_late_pull_on_a_motor_without_mass_that_only_a_spring_holds_is_ill_pos
     damped = motor(kd=0.0)
     assert ss.stability(damped) == "stable"
     assert ss.growth_rate(damped, small) == pytest.approx(np.full(3, ss.growth_rate(damped)), rel=1e-3)
+
+
+def light(link):
+    """Such a machine that 10 N s/m of oil and `link` damp at once, and a gain of 500 N s/m a millisecond late."""
+    found = motor(500.0, 10.0, 1e6, 1e-3)
+    return found.with_values({"links.l1.damping": link, "bodies.table.mass": 5.0, "drive.kp": 1e5})
+
+
+def test_eigenvalues_among_infinitely_many_are_missed_in_words():
+    """Roots of a chain tend to Re s = ln(late / at once) / delay; where others lie right of it, these are told."""
+    for link, told in ((499.0, 0), (700.0, 2)):
+        rig = light(link)
+        line = np.log(500.0 / (link + 10.0)) / 1e-3
+        with pytest.warns(ss.linear.UndecidedWarning, match="infinitely many nearly alike"):
+            found = ss.eigenvalues(rig)
+        assert np.sum(~np.isnan(found)) == told
+        if told:
+            assert np.min(found.real[:told]) > line
+        else:
+            assert ss.growth_rate(rig) == pytest.approx(line, rel=1e-6)
+            with pytest.raises(ss.NotAvailable, match="no mode is told apart"):
+                ss.modes(rig)
+
+
+def test_what_grows_without_limit_has_no_frequency_on_a_map():
+    found = map_of(light(310.0), "drive.kd", [100.0, 520.0])
+    assert np.isfinite(found[0]).all()
+    assert np.isnan(found[1]).all()
+
+
+def map_of(rig, name, values):
+    """Frequency and damping ratio along a parameter, (n, 2), as a map computes them."""
+    from steadyslip.maps.plan.measures import Measure
+
+    made = Measure.registry["frequency"]().arrays(rig, ss.Protocol(until=1.0), {name: np.array(values)})
+    return np.stack([made["frequency"], made["damping_ratio"]], axis=-1)

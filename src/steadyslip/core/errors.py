@@ -142,7 +142,7 @@ class IllPosedWarning(UserWarning):
 
 
 class UndecidedWarning(UserWarning):
-    """In a part of the range that was asked for, edges of stability are not known."""
+    """Part of the answer is not known: edges in a part of a range, eigenvalues among infinitely many."""
 
 
 class NotKeptWarning(UserWarning):

@@ -12,12 +12,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.files.netcdf import File, FileVariable, FormatError, read
+from steadyslip.files.output import check_output
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
 Array = np.ndarray
@@ -57,8 +59,9 @@ def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: 
     Raises
     ------
     NotAvailable
-        If the file cannot be written, or the dataset is too large.
+        If the name does not end in ``.nc``, the file cannot be written, or the dataset is too large.
     """
+    check_output([Path(path)], [".nc"])
     if (size := sum(one.nbytes for one in (dataset, *parts))) > kind.most:
         told = f"it has {size / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name}"
         raise NotAvailable(f"cannot write {str(path)!r}: {told} may have; keep fewer samples")

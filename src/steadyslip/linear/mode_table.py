@@ -198,6 +198,11 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
             raise explain_absence(rig, point)
         roots = spectrum(point)
         found = tuple(mode_of(rig, point, complex(s)) for s in roots if np.isfinite(s) and s.imag >= 0)
+    if not found:
+        raise NotAvailable(
+            "no mode is told apart: with a delay on a body without mass there are infinitely many nearly alike, or "
+            "infinitely many that grow; analyze says which, and growth_rate how fast"
+        )
     chosen = next((one for one in found if number in (None, one.number)), None)
     if chosen is None:
         count = sum(one.number > 0 for one in found)

@@ -113,6 +113,20 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
     return np.asarray(_ill_posed(point, c[..., 0, :]) | (counts(point) == with_delays.INFINITE))
 
 
+def among_many(point: OperatingPoint, found: ComplexArray) -> NDArray[np.bool_]:
+    """True where some of the eigenvalues `found` (..., n) are NaN as they are not told from infinitely many, (...).
+
+    A delayed highest derivative (a body without mass under a late controller) makes these; for ill-posed rigs False.
+    """
+    if not point.model.delays:
+        return np.zeros(point.shape, dtype=bool)
+    c, _ = quasipolynomial(point)
+    powers = np.arange(c.shape[-1])
+    top = np.max(np.where(np.any(c != 0, axis=-2), powers, 0), axis=-1)
+    late = np.any(np.take_along_axis(c, top[..., None, None], axis=-1)[..., 1:, 0] != 0, axis=-1)
+    return np.asarray(late & np.any(np.isnan(found), axis=-1) & point.exists & ~is_ill_posed(point))
+
+
 def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
     """Dotted names of the delays that make a single rig ill-posed; empty if it is well posed, or ill-posed anyway.
 

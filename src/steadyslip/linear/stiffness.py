@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from steadyslip.core.errors import IllPosedWarning, InternalError
+from steadyslip.core.errors import IllPosedWarning, InternalError, UndecidedWarning
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
@@ -26,7 +26,7 @@ from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.linear.roots import Array, ComplexArray, quietly
-from steadyslip.linear.spectrum import growth, is_ill_posed, spectrum, unstable_roots
+from steadyslip.linear.spectrum import among_many, growth, is_ill_posed, spectrum, unstable_roots
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -145,7 +145,8 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
         1/s, sorted by falling real part; NaN where steady sliding does not exist or numbers leave the range of
         floating point (see `stability`), and for the root that a rig lacks when its mass is zero. With a delay, which
         makes infinitely many, the rightmost, as many as there are without it; NaN, with an `IllPosedWarning`, where
-        infinitely many grow: on a body without mass, what acts late outweighs what acts at once.
+        infinitely many grow (on a body without mass, what acts late outweighs what acts at once), and, with an
+        `UndecidedWarning`, for those that are not told from infinitely many that lie nearly alike.
 
     Examples
     --------
@@ -165,6 +166,13 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
         if point.single:
             unstable_roots(point)  # refused where it cannot be counted
         _warn_of_delays(int(np.count_nonzero(lost & is_ill_posed(point) & point.exists)), point.size)
+    if count := int(np.count_nonzero(among_many(point, found))):
+        which = f"of {count} of {point.size} rigs some" if point.size > 1 else "some"
+        message = (
+            f"{which} eigenvalues are not known (NaN): on a body without mass that follows velocity late there are "
+            "infinitely many nearly alike, from which they are not told; growth_rate gives the rate of the rightmost"
+        )
+        warnings.warn(message, UndecidedWarning, stacklevel=4)
     return point.wrap(found, "eigenvalues", "1/s", ("mode",))
 
 
@@ -176,7 +184,7 @@ def _warn_of_delays(count: int, size: int) -> None:
             f"{which} no rightmost eigenvalue (NaN): on a body without mass, what follows velocity late outweighs what "
             "follows it at once, so that infinitely many grow; give that body a mass, or damping that acts at once"
         )
-        warnings.warn(message, IllPosedWarning, stacklevel=4)
+        warnings.warn(message, IllPosedWarning, stacklevel=5)
 
 
 @checked()

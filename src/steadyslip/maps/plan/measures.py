@@ -22,7 +22,7 @@ from steadyslip.core.errors import ParameterError, Problem, SteadyslipError, unk
 from steadyslip.core.records import FrozenRecord, option, parameter, setting
 from steadyslip.linear import growth_rate
 from steadyslip.linear.response import has_closed_form
-from steadyslip.linear.spectrum import spectrum
+from steadyslip.linear.spectrum import is_ill_posed, spectrum
 from steadyslip.linear.status import WORDS as STATUS, status
 from steadyslip.linear.stiffness import in_chunks
 from steadyslip.machine.machine import Machine
@@ -125,7 +125,7 @@ class GrowthRate(Measure, name="growth_rate"):
 
 
 class Frequency(Measure, name="frequency"):
-    """Frequency and damping ratio of the leading mode; 0 and ±1 where it does not oscillate."""
+    """Frequency and damping ratio of the leading mode; 0 and ±1 where it does not oscillate, NaN where ill-posed."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (
@@ -144,6 +144,7 @@ def _leading(point: OperatingPoint) -> Any:
     with np.errstate(all="ignore"):
         first = np.argmax(np.where(np.isnan(found.real), -np.inf, found.real), axis=-1)
         s = np.take_along_axis(found, first[..., None], axis=-1)[..., 0]
+        s = np.where(is_ill_posed(point), complex(np.nan, np.nan), s)  # what grows without limit has no frequency
         return np.stack([np.abs(s.imag) / (2 * np.pi), -s.real / np.abs(s)], axis=-1)
 
 

@@ -25,6 +25,18 @@ def test_the_cycle_of_theory_14():
     assert found.sentence == "HUNTS ±65.65 mm about the target every 24.01 s"
 
 
+def test_an_axis_that_slides_ever_slower_to_its_target_settles():
+    """Coulomb friction is constant in sliding: with real roots the last stroke only creeps, and sticks nowhere."""
+    held = {**THEORY, "kp": 9.0, "ki": 1.0}
+    slowest = -np.roots([1.0, held["kd"] + held["viscous"], held["kp"], held["ki"]]).max()
+    assert np.isreal(slowest)
+    found = ss.hunt(axis(**held))
+    assert found.hunts is False
+    assert max(found.highest, -found.lowest) <= 1e-9 * np.abs(found.error).max()
+    last = found.time > 0.9 * found.time[-1]
+    assert -np.polyfit(found.time[last], np.log(np.abs(found.error[last])), 1)[0] == pytest.approx(slowest, rel=1e-5)
+
+
 @pytest.mark.campaign
 def test_the_bristle_cycle_of_theory_14():
     """To the digits printed. A stroke starts where the speed passes v_stribeck, 1 mm/s; theory's first gap, 5 mm/s.

@@ -61,7 +61,7 @@ class Motion:
         self.plant, self.segments = plant, segments
         self.state = np.zeros(plant.width)
         self.state[-1] = 1.0
-        self.time, self.trace, self.steps, self.fastest = 0.0, Trace(), 0, 0.0
+        self.time, self.trace, self.steps, self.fastest, self.farthest = 0.0, Trace(), 0, 0.0, 0.0
         self.mode = HeldMode((0,) * len(plant.contacts))
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
         self.acceleration = 0.0
@@ -210,10 +210,14 @@ class Motion:
             last.highest = max(last.highest, -_least(-values[0]))
             last.fastest = max(last.fastest, -_least(-np.abs(values[1])))
             self.fastest = max(self.fastest, last.fastest)
+            self.farthest = max(self.farthest, last.highest, -last.lowest)
 
     @property
     def at_rest(self) -> bool:
-        """True if nothing moves any more and the controller's integral is constant."""
+        """True if nothing moves any more and the controller's integral is constant.
+
+        Sliding that ever slower approaches the target counts as rest where the error is `STILL` of the largest.
+        """
         plant, n = self.plant, self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
             return False
@@ -223,8 +227,10 @@ class Motion:
         if self.sampled is not None:
             return self.sampled.constant and not any(self.mode.contacts)
         rates = self._piece().matrix @ self.state
-        creeps = any(self.mode.contacts) and bool(np.any(np.abs(rates[n : 2 * n]) > pace * self._piece().fastest))
-        return not (rates[2 * n] or creeps)
+        if not any(self.mode.contacts):
+            return not rates[2 * n]
+        creeps = np.any(np.abs(rates[n : 2 * n]) > pace * self._piece().fastest)
+        return not (creeps or abs(rates[2 * n]) > STILL * self.farthest)
 
 
 def _side(name: str, value: float, bound: float) -> Switch:

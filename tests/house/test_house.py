@@ -1,7 +1,8 @@
-"""The house: a name means one thing, and only laws know laws; what may import what is said in pyproject.toml."""
+"""The house: a name means one thing, only laws know laws, and the changelog is short; imports are in pyproject.toml."""
 
 import ast
 import dataclasses
+import re
 from collections import defaultdict
 from functools import cache
 from pathlib import Path
@@ -10,6 +11,7 @@ import steadyslip
 import steadyslip as ss
 
 SOURCE = Path(steadyslip.__file__).parent
+ROOT = Path(__file__).parents[2]
 
 
 @cache
@@ -115,3 +117,16 @@ def test_no_generator_that_is_kept_reads_the_variable_of_a_loop():
             if names := read & bound_around(node, above):
                 found.append(f"{path}:{node.lineno} reads {', '.join(names)} late; make it a list")
     assert not found
+
+
+def test_the_changelog_is_short_and_names_what_there_is():
+    """At most 10 kB, so that it is read; a name in it that code and documentation do not know is false."""
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert len(text.encode()) <= 10_000, "merge lines, or leave details to the documentation"
+    known = set()
+    for folder, kind in (("src", "*.py"), ("docs", "*.md"), ("examples", "*.toml")):
+        for path in (ROOT / folder).rglob(kind):
+            known.update(re.findall(r"[\w-]+", path.read_text(encoding="utf-8")))
+            known.update(re.findall(r"\w+", path.read_text(encoding="utf-8")))
+    named = {word for code in re.findall(r"`([^`]+)`", text) for word in re.findall(r"[A-Za-z_][\w-]*", code)}
+    assert named <= known

@@ -103,19 +103,6 @@ def test_one_version_is_written_everywhere():
     assert {change[1], re.search(r'version: "(.*)"', recipe)[1], archive["version"]} == {RELEASE}
 
 
-def test_the_changelog_is_short_and_names_what_there_is():
-    """At most 10 kB, so that it is read; a name in it that code and documentation do not know is false."""
-    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    assert len(text.encode()) <= 10_000, "merge lines, or leave details to the documentation"
-    known = set()
-    for folder, kind in (("src", "*.py"), ("docs", "*.md"), ("examples", "*.toml")):
-        for path in (ROOT / folder).rglob(kind):
-            known.update(re.findall(r"[\w-]+", path.read_text(encoding="utf-8")))
-            known.update(re.findall(r"\w+", path.read_text(encoding="utf-8")))
-    named = {word for code in re.findall(r"`([^`]+)`", text) for word in re.findall(r"[A-Za-z_][\w-]*", code)}
-    assert named <= known
-
-
 def test_the_conda_recipe_asks_for_what_the_package_needs():
     about = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     recipe = (ROOT / "packaging/conda/recipe.yaml").read_text(encoding="utf-8")

@@ -446,6 +446,27 @@ def test_contours_reach_the_edges_of_the_chart_and_the_critical_line():
     assert min(heights) > 0.1  # where lines are apart
 
 
+def test_contours_beside_a_gain_that_is_enough_alone_are_left_out():
+    """No stiffness is critical there, which does not mean that the critical gain is zero."""
+    rig = ss.read_rig("examples/slow-axis.toml")
+    ax = ss.figures.stability_chart(rig, "friction.b", "drive.kp", points=61)
+    (lines,) = [one for one in ax.collections if hasattr(one, "allsegs")]
+    for level, pieces in zip(1 / lines.levels, lines.allsegs, strict=True):
+        b, kp = np.concatenate(pieces).T
+        known, edge = _edge_over(rig.with_values({"drive.kp": 1e3}), np.linspace(0.012, 0.024, 30))
+        inner = (b > known[0]) & (kp < 0.9 * ax.get_ylim()[1])
+        assert level < 1
+        assert np.abs(np.log(kp / (level * np.interp(b, known, edge))))[inner].max() < 0.05
+
+
+def _edge_over(rig, values):
+    """Values of b, and the critical gain (N/µm) at each: what is critical beside the gain, and the gain."""
+    analyses = [ss.analyze(rig.with_values({"friction.b": float(one)})) for one in values]
+    known = [(b, one.critical_stiffness) for b, one in zip(values, analyses, strict=True)]
+    own = rig.value("drive.kp")
+    return np.array([(b, (k + own) * rig.area / 1e6) for b, k in known if k is not None]).T
+
+
 def test_a_legend_is_no_wider_than_its_axes():
     run = ss.simulate(ss.read_rig("examples/stick-slip.toml"), ss.protocol.VelocityStep(at=1.0, to=2e-6), until=60.0)
     with ss.figures.journal():

@@ -155,7 +155,9 @@ def draw_contours(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) 
     if values is None or not np.isfinite(values).any():
         return
     with np.errstate(divide="ignore"):  # k_cr/k goes to zero where k_cr does, and lines of it end there
-        inverse = np.where(np.isfinite(values) & (here != ABSENT), 1 / values, np.where(here == STABLE, 0.0, np.nan))
+        inverse = np.where(np.isfinite(values) & (here != ABSENT), 1 / values, np.nan)
+    if not float(rig.drive.proportional()):  # beside a gain that is enough alone no stiffness is critical either
+        inverse[np.isnan(values) & (here == STABLE)] = 0.0
     inverse[~np.isfinite(inverse)] = np.nan
     shown = [1 / level for level in SAFETY_LEVELS[::-1] if level != 1]
     shown = [level for level in shown if np.nanmin(inverse) < level < np.nanmax(inverse)]

@@ -212,7 +212,6 @@ def test_what_a_delay_does_not_offer_is_said(kind):
     for ask in (
         lambda: ss.simulate(slider, until=1.0),
         lambda: ss.simulate_many(slider, {"mass": [1e4, 2e4]}, until=1.0),
-        lambda: ss.hopf(slider),
         lambda: ss.threshold(slider),
         lambda: ss.cycles(slider, along="stiffness"),
         lambda: ss.state_space(slider),

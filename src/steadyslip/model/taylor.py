@@ -15,11 +15,11 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
+from steadyslip.model.range import delays_of
 
 Index = tuple[int, ...]
 """Indices (equation, variable, ...) of a derivative, variables in rising order."""
@@ -48,6 +48,9 @@ class System:
         These derivatives in steady sliding, in the same order.
     function : ArrayFunction
         Array function of the expressions.
+    late : tuple of (int, int, int)
+        For each late unknown, which follows another one a delay later: its row (and own place), the place of what it
+        follows, and which of the delays of the model that is.
     """
 
     model: Model
@@ -56,6 +59,7 @@ class System:
     entries: tuple[tuple[Index, ...], ...]
     expressions: tuple[sp.Expr, ...]
     function: ArrayFunction
+    late: tuple[tuple[int, int, int], ...]
 
     def place(self, symbol: sp.Symbol) -> int:
         """Index of an unknown."""
@@ -66,21 +70,21 @@ class System:
 def system(model: Model) -> System:
     """Differentiate a Model three times at steady sliding.
 
-    Raises
-    ------
-    NotAvailable
-        If there are delays.
+    A late value is an unknown of its own: whatever is not linear in it stays an ordinary derivative.
     """
-    if model.delays:
-        raise NotAvailable("the kind of an onset is not offered with a delay")
     variables = [item.symbol for item in model.variables]
     balances = {contact.unknown: contact.balance for contact in model.contacts}
     for one in model.coordinates:
         if one.balance is not None:
             balances[one.acceleration if one.inertial else one.velocity] = one.balance
-    unknowns = [*variables, *balances, *model.definitions]
+    unknowns = [*variables, *balances, *model.definitions, *model.late]
     equations = [*model.rates, *balances.values()]
     equations += [definition - symbol for symbol, definition in model.definitions.items()]
+    equations += [-symbol for symbol in model.late]  # to which comes what it follows, late
+    late = tuple(
+        (unknowns.index(symbol), unknowns.index(base), model.delays.index(delay))
+        for symbol, (base, delay) in model.late.items()
+    )
     inputs = {model.inputs[name]: model.steady[model.inputs[name]] for name in model.inputs if name != "time"}
     entries: tuple[list[Index], ...] = ([], [], [])
     expressions: tuple[list[sp.Expr], ...] = ([], [], [])
@@ -100,7 +104,7 @@ def system(model: Model) -> System:
                     entries[order - 1].append((row, *index))
                     expressions[order - 1].append(value)
     flat = tuple(e for part in expressions for e in part)
-    return System(model, tuple(unknowns), len(variables), tuple(map(tuple, entries)), flat, model.function(flat))
+    return System(model, tuple(unknowns), len(variables), tuple(map(tuple, entries)), flat, model.function(flat), late)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +118,8 @@ class Taylor:
     second, third : list of Entry
     mass : ndarray (n,)
         Ones for equations with a time derivative, zeros for the others.
+    delays : ndarray (m, d)
+        Delays of the model, s.
     """
 
     system: System
@@ -122,6 +128,16 @@ class Taylor:
     second: list[Entry]
     third: list[Entry]
     mass: Array
+    delays: Array
+
+    def followed(self, s: Array) -> tuple[Array, Array]:
+        """What late unknowns add to the gradient at places s (m,), exp(−s delay), and its slope with s: (m, n, n)."""
+        found = np.zeros((2, len(s), len(self.mass), len(self.mass)), dtype=complex)
+        for row, column, which in self.system.late:
+            delay = self.delays[:, which]
+            found[0, :, row, column] = np.exp(-s * delay)
+            found[1, :, row, column] = -delay * found[0, :, row, column]
+        return found[0], found[1]
 
     def sizes(self) -> Taylor:
         """Copy with absolute values of the second and third derivatives, for bounds."""
@@ -175,4 +191,5 @@ def taylor(point: OperatingPoint) -> Taylor:
     mass = np.zeros(n)
     mass[: found.dynamic] = 1.0
     values, errors = gradient
-    return Taylor(found, values, errors, entries[first : first + second], entries[first + second :], mass)
+    delays = np.broadcast_to(delays_of(point), (shape[1], len(point.model.delays)))
+    return Taylor(found, values, errors, entries[first : first + second], entries[first + second :], mass, delays)

@@ -1,7 +1,9 @@
 """Compute the cubic coefficient c1 of an oscillatory edge, with a bound of its rounding error.
 
 First Lyapunov coefficient by projection on the critical eigenvectors (Kuznetsov, Elements of Applied Bifurcation
-Theory, eq. 5.62), for the Model as a differential-algebraic system M Y' = F(Y).
+Theory, eq. 5.62), for the Model as a differential-algebraic system M Y' = F(Y). With delays the projection is that
+on the centre manifold of the delay equation (Hale and Verduyn Lunel 1993): late values are unknowns of their own, with
+rows exp(−s delay) in the characteristic matrix D(s) = s M − F', and D'(iω) takes the place of M in the normalisation.
 """
 
 from __future__ import annotations
@@ -87,11 +89,16 @@ def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> 
     gradient, unsure = (np.broadcast_to(e, (len(omega), n, n)) for e in (expansion.gradient, expansion.gradient_error))
     mass = np.diag(expansion.mass)
     oscillating = omega[:, None, None] * mass
-    rows, columns = even_scales(np.abs(gradient) + oscillating)
+    late = [expansion.followed(1j * turns * omega) for turns in (1, 0, 2)]
+    rows, columns = even_scales(np.abs(gradient) + oscillating + np.abs(late[1][0]))
     linear = [
-        _Scaled(rows, columns, gradient - 1j * turns * oscillating, unsure + EPS * turns * oscillating)
-        for turns in (1, 0, 2)
-    ]
+        _Scaled(
+            rows, columns, gradient + follows - 1j * turns * oscillating,
+            unsure + EPS * turns * (oscillating + omega[:, None, None] * np.abs(slope)),
+        )
+        for turns, (follows, slope) in zip((1, 0, 2), late, strict=True)
+    ]  # fmt: skip
+    weight = mass - late[0][1]
     critical, still, twice = linear
     (q, q_error), (p, p_error) = critical.null_vectors()
     place, model = expansion.system.place, expansion.system.model
@@ -102,8 +109,8 @@ def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> 
     size = (0.5 / relative[each, most])[:, None]
     q, q_error = q * size, q_error * np.abs(size)
     share = np.abs(q_error / q)[each, np.asarray(v)[most]]  # of the amplitude to which all refer
-    product = np.sum(p.conj() * (q @ mass), axis=1)[:, None]
-    lost = np.abs(p) @ mass * q_error + p_error @ mass * np.abs(q)
+    product = np.sum(p.conj() * _times(weight, q), axis=1)[:, None]
+    lost = np.abs(p) * _times(np.abs(weight), q_error) + p_error * _times(np.abs(weight), np.abs(q))
     share = 2 * share + np.sum(lost, axis=1) / np.abs(product[:, 0])
     p, p_error = p / product.conj(), p_error / np.abs(product)
 

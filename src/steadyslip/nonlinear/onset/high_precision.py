@@ -61,8 +61,11 @@ def coefficient(
     Returns
     -------
     tuple or None
-        Twice 0 where c1 vanishes in exact arithmetic; None where the edge is not a simple one, or beyond numbers.
+        Twice 0 where c1 vanishes in exact arithmetic; None where the edge is not a simple one, beyond numbers, and
+        with a delay.
     """
+    if point.model.delays:
+        return None
     try:
         with mpmath.workdps(DIGITS), np.errstate(all="ignore"):
             rig = _Rig(point, along, omega, contact, vector)

@@ -32,7 +32,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.posed import spare_powers
-from steadyslip.model.range import characteristic, require_range
+from steadyslip.model.range import quasipolynomial, require_range
 from steadyslip.nonlinear.onset.coefficient import Cubic, coefficients
 from steadyslip.nonlinear.onset.high_precision import coefficient as in_digits
 
@@ -194,7 +194,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
     Raises
     ------
     NotAvailable
-        If stability has no oscillatory edge in that parameter; says which edges there are. With a delay.
+        If stability has no oscillatory edge in that parameter; says which edges there are.
     UnknownNameError, ParameterError
         If the parameter is unknown.
 
@@ -252,16 +252,23 @@ def _points_at(rig: Slider | Machine, name: str, at: Any, branch: int) -> Operat
 
 
 def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int) -> float:
-    """Re(dλ/dp) from the characteristic polynomial: central differences of its coefficients, Richardson's rule."""
+    """Re(dλ/dp) from the characteristic function: central differences along the parameter, Richardson's rule."""
     size = abs(edge.value) or 1e-3
     steps = np.array([1e-3, -1e-3, 5e-4, -5e-4]) * size
-    c = characteristic(_points_at(rig, name, edge.value + steps, branch))
-    slope = (4 * (c[2] - c[3]) / (2 * steps[2]) - (c[0] - c[1]) / (2 * steps[0])) / 3
-    middle = characteristic(_points_at(rig, name, [edge.value], branch))[0]
     s = 1j * edge.angular_frequency
-    powers = s ** np.arange(len(middle))
-    down = np.arange(1, len(middle)) * middle[1:] @ powers[:-1]
-    return float((-(slope @ powers) / down).real)
+    at, _ = _characteristic(_points_at(rig, name, edge.value + steps, branch), s)
+    slope = (4 * (at[2] - at[3]) / (2 * steps[2]) - (at[0] - at[1]) / (2 * steps[0])) / 3
+    _, down = _characteristic(_points_at(rig, name, [edge.value], branch), s)
+    return float((-slope / down[0]).real)
+
+
+def _characteristic(point: OperatingPoint, s: complex) -> tuple[Array, Array]:
+    """Characteristic function of rigs at a place s (1/s), and its slope with s: (m,)."""
+    c, delays = quasipolynomial(point)
+    n = np.arange(c.shape[-1])
+    late = np.exp(-s * delays)
+    terms, slopes = c @ s**n, (c[..., 1:] * n[1:]) @ s ** n[:-1]
+    return np.sum(terms * late, axis=-1), np.sum((slopes - delays * terms) * late, axis=-1)
 
 
 def onsets(point: OperatingPoint, omega: Array, along: str) -> tuple[Cubic, Array]:

@@ -111,7 +111,7 @@ def precision(
     Examples
     --------
     >>> values = {"a": 0.012, "b": 0.015, "d_c": "10 um", "mu_ref": 0.6, "stiffness": "30 GPa/m"}
-    >>> rig = ss.lab_rig("slip").with_values(values)
+    >>> rig = ss.lab_rig("slip", velocity="1 um/s").with_values(values)
     >>> step = ss.protocol.VelocityStep(at="20 s", to="10 um/s")
     >>> print(ss.experiments.precision(rig, step, until=100))
     4000 samples with noise 0.0002 in friction would give
@@ -227,7 +227,7 @@ def best_protocol(
     Examples
     --------
     >>> values = {"a": 0.012, "b": 0.015, "d_c": "10 um", "mu_ref": 0.6, "stiffness": "30 GPa/m"}
-    >>> rig = ss.lab_rig("slip").with_values(values)
+    >>> rig = ss.lab_rig("slip", velocity="1 um/s").with_values(values)
     >>> protocols = {
     ...     speed: ss.Protocol(pieces=(ss.protocol.VelocityStep(at=20, to=speed),), until=100)
     ...     for speed in ("2 um/s", "10 um/s")

@@ -123,7 +123,7 @@ def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> values = {"a": 0.012, "b": 0.015, "d_c": "10 um", "mu_ref": 0.6, "stiffness": "30 GPa/m"}
-    >>> rig = ss.lab_rig("slip").with_values(values)
+    >>> rig = ss.lab_rig("slip", velocity="1 um/s").with_values(values)
     >>> step = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=20, to="2 um/s"),), until=100)
     >>> ranking = ss.experiments.best_protocol(rig, {"a step": step}, "friction.d_c")
     >>> axes = ss.figures.ranking(ranking)

@@ -36,12 +36,17 @@ NAMES = ("to_csv", "save", "write_rig", "to_netcdf", "to_parquet", "explore", "f
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_pipe_is_never_replaced(writers, name, tmp_path):
-    pipe = tmp_path / "pipe.png"
+    pipe = tmp_path / ("pipe.nc" if name == "save" else "pipe.png")
     os.mkfifo(pipe)
     with pytest.raises(ss.NotAvailable, match="it is a device or a pipe; give the name of a file"):
         writers[name](pipe)
     assert stat.S_ISFIFO(pipe.stat().st_mode)
-    assert os.listdir(tmp_path) == ["pipe.png"]
+    assert os.listdir(tmp_path) == [pipe.name]
+
+
+def test_a_saved_run_is_named_as_the_netcdf_that_it_is(history, tmp_path):
+    with pytest.raises(ss.NotAvailable, match=r"run.csv.*allowed endings are .nc"):
+        history.save(tmp_path / "run.csv")
 
 
 @pytest.mark.parametrize("name", ["/dev/stdout", "/dev/null", "/dev/fd/1", "/proc/self/fd/1"])

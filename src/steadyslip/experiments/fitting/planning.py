@@ -99,7 +99,7 @@ def _driven_as_recorded(rig: Slider, records: Sequence[Record]) -> Slider:
     rate = next((rate for record in records if (rate := record.initial_rate or 0.0) > 0), None)
     if rate is None:
         message = (
-            f"missing, and {records[0].source} does not show it; give the rate before the first step: "
+            "missing, and no record shows it; give the rate before the first step: "
             "lab_rig(velocity='1 um/s'), or velocity = '1 um/s' in [drive] of a file"
         )
         raise ParameterError([Problem("drive.velocity", message)])

@@ -191,7 +191,7 @@ def mode_chart(rig: Slider | Machine, name: str, between: Sequence[Any] | None =
     >>> machine = ss.read_rig("examples/machines/brake-pad.toml")
     >>> found = ss.linear.mode_chart(machine, "links.caliper.stiffness")
     >>> print(found.edges[0])
-    links.caliper.stiffness = 11.0483 MN/m: oscillatory, period 1.374 ms, stable above
+    links.caliper.stiffness = 11.0483 N/um: oscillatory, period 1.374 ms, stable above
     >>> found.plot()[0].figure.savefig("modes.svg")
     """
     if isinstance(rig, Slider):

@@ -173,3 +173,18 @@ def test_sheets_are_answered_in_their_own_units():
     told = {name: str(ss.analyze(ss.rig_from_text(text))).splitlines()[0] for name, text in SHEETS.items()}
     assert told["feed axis"] == "STABLE: steady sliding at 5 mm/min"
     assert told["brake"] == "UNSTABLE: steady sliding at 2 km/h"
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_the_edge_of_the_first_line_is_that_of_the_first_row(name):
+    """Of the servo joint it was one at .0024 of the value (-99.8 %), which the table told last."""
+    found = ss.analyze(ss.rig_from_text(SHEETS[name]))
+    with_edge = [margin for margin in found.margins if margin.edge is not None]
+    remote = [margin.remote for margin in with_edge if margin.value]
+    assert remote == sorted(remote)
+    text = str(found)
+    rows = text.partition("Nearest edge in each parameter")[2].splitlines()[1:]
+    first = next(row.split()[0] for row in rows if " -> " in row)
+    assert with_edge[0].parameter.endswith(first)
+    if "nearest edge is that of" in " ".join(text.split()):
+        assert f"nearest edge is that of {first}" in " ".join(text.split())

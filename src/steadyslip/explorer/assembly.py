@@ -30,6 +30,7 @@ from steadyslip.explorer.motion import DRIVER, driver, motion_part
 from steadyslip.explorer.own_file import display_unit, own_file
 from steadyslip.explorer.sketch import sketch
 from steadyslip.kernels.printers import javascript
+from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.search import Search
 from steadyslip.linear.status import STABLE, UNSTABLE, status
@@ -44,7 +45,7 @@ from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import page_reasons
-from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES, REMOTE
+from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",

@@ -31,6 +31,7 @@ from steadyslip.model.range import require_digits, require_range
 _TOO_MANY = "roots under the delays are too many there to be counted; shorten the delays"
 _ERRORS = "the response is too short, too coarse or too uncertain there; analyze says which"
 _TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
+REMOTE = 100  # edges further than this factor from a value come after all others: nobody changes a rig as much
 _TIED = 6  # digits to which distances are compared, no closer than 1e-6: pages know edges to twelve
 
 
@@ -63,6 +64,13 @@ class Margin(Displayed):
     absolute: float
     relative: float
     searched: tuple[float, float]
+
+    @property
+    def remote(self) -> bool:
+        """True if the nearest edge is more than a factor `REMOTE` from the value; never for angles and zero values."""
+        if self.edge is None or self.unit == "rad" or not self.value or not self.edge.value:
+            return False
+        return not 1 / REMOTE < abs(self.edge.value / self.value) < REMOTE
 
 
 @checked(between=LOW_AND_HIGH)
@@ -226,17 +234,17 @@ def _margin(name: str, unit: str, value: float, edges: tuple[Boundary, ...], sea
     return Margin(name, unit, value, edge, edges, gap, gap / abs(value) if value else float("nan"), searched)
 
 
-def _urgency(margin: Margin) -> float:
-    """Sorting key: relative distance; angles count by radians, zeros come last among those with an edge.
+def _urgency(margin: Margin) -> tuple[bool, float]:
+    """Sorting key: relative distance, remote ones last; angles count by radians, zeros after others that have an edge.
 
     Distances that differ by rounding only are equal: parameters then stay in the order of the rig.
     """
     if margin.edge is None:
-        return np.inf
+        return True, np.inf
     if not margin.value and margin.unit != "rad":
-        return 1e300
+        return True, 1e300
     distance = abs(margin.absolute if margin.unit == "rad" else margin.relative)
-    return float(f"{distance:.{_TIED}g}") if distance > 10.0**-_TIED else 0.0
+    return margin.remote, float(f"{distance:.{_TIED}g}") if distance > 10.0**-_TIED else 0.0
 
 
 def _role(rig: Rig, full: str) -> Parameter:

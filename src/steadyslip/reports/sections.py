@@ -32,7 +32,6 @@ from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.judder import STEP, motion_after
-from steadyslip.verdict.words import REMOTE
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
 _ROWS = 4  # changes that are recommended, nearest first
@@ -74,8 +73,7 @@ def _cures(margin: Margin) -> bool:
     edge = margin.edge
     if edge is None or not edge.value:
         return False
-    far = margin.unit != "rad" and margin.value and not 1 / REMOTE < abs(edge.value / margin.value) < REMOTE
-    return not far and edge.stable == ("above" if edge.value > margin.value else "below")
+    return not margin.remote and edge.stable == ("above" if edge.value > margin.value else "below")
 
 
 def _change(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str] | None:

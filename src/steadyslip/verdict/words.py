@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from steadyslip.core.checks import UNDECIDED, in_words
 from steadyslip.core.format import format_quantity
 from steadyslip.core.records import parameters
+from steadyslip.linear.boundary import REMOTE
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.reasons import NEXT_TO_IT, in_stiffness
 from steadyslip.verdict.support import gain_words, support_stiffness
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings, Verdict
 
 # Chosen by trial: length of the text against completeness.
-REMOTE = 100  # edges further than this factor from a value are listed apart
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text
@@ -336,7 +336,7 @@ def margin_table(analysis: Verdict) -> list[str]:
     rows = [(name, value, f"-> {edge}", change, words) for name, value, edge, change, words in rows]
     widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
     table = ["  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows]
-    remote = [_is_remote(one) for one in analysis.margins if one.edge is not None]
+    remote = [one.remote for one in analysis.margins if one.edge is not None]
     lines += [line for line, far in zip(table, remote, strict=True) if not far]
     if any(remote):
         lines += [f"  further off than a factor of {REMOTE}:"]
@@ -346,14 +346,6 @@ def margin_table(analysis: Verdict) -> list[str]:
             f"no edge within range: {', '.join(without)}", 98, initial_indent="  ", subsequent_indent="    "
         )
     return lines
-
-
-def _is_remote(margin: Margin) -> bool:
-    """True if the nearest edge is more than a factor `REMOTE` from the value; never for angles and zero values."""
-    edge = margin.edge
-    if edge is None or margin.unit == "rad" or not margin.value or not edge.value:
-        return False
-    return not 1 / REMOTE < abs(edge.value / margin.value) < REMOTE
 
 
 def _margin_row(analysis: Verdict, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:

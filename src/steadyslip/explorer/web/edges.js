@@ -7,7 +7,7 @@ export const BESIDE = 1e-3; // distance from an edge of the value set by "go the
 const TIED = 6; // digits to which distances are compared, as in steadyslip/linear/boundary.py
 
 /**
- * Nearest edge of every parameter, nearest first: value, status behind it, far or not, and two values close to it:
+ * Nearest edge of every parameter, nearest first and far ones last: value, status behind it, far or not, and two values close to it:
  * `landing` on its stable side (or the side with steady sliding, if none is stable), and `behind` on its other side.
  * @param {import("./page.js").Page} page
  */
@@ -30,7 +30,7 @@ export function edgesOf(page) {
     });
     if (best) found.push(best);
   });
-  return found.sort((a, b) => a.distance - b.distance || 0);
+  return found.sort((a, b) => Number(a.far) - Number(b.far) || a.distance - b.distance || 0);
 }
 
 /** Value close to an edge, on the side given by the sign of `room` (its distance to the next edge), with few digits. */

@@ -30,6 +30,7 @@ from javascript import Script
 from machines import at_random
 from rigs_of_theory import CONTACTS, LAWS, V0, rig
 from steadyslip.core.format import typeset
+from steadyslip.core.written import display_units
 from steadyslip.explorer.assembly import _data
 from steadyslip.explorer.equations import linear_part
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
@@ -123,7 +124,14 @@ def same_text(mine, theirs):
 
 def other_edges(page, values):
     """Differences of the page from Python at some values, in words, and its list of nearest edges."""
-    own, told, wrong = page.own(values), page(values), []
+    own = page.own(values)
+    with display_units(own.written_in):
+        return _other_edges(page, values, own)
+
+
+def _other_edges(page, values, own):
+    """The same, told in the units of the rig's file."""
+    told, wrong = page(values), []
     found = ss.analyze(own)
     if is_undecided(found):
         return wrong, told["edges"]

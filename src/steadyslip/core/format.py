@@ -14,7 +14,7 @@ from steadyslip.core.written import display_names
 
 
 @lru_cache(maxsize=256)
-def _own(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
+def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     """Units of a context by dimension, where one of them differs from the default by more than a leading prefix."""
     found: dict[Dimension, set[str]] = {}
     for name in names:
@@ -63,7 +63,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
-    names = _own(display_names()).get(unit(si_unit)[1], ())
+    names = own_units(display_names()).get(unit(si_unit)[1], ())
     own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
     if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < _LONGEST):

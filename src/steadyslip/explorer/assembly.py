@@ -12,9 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from steadyslip.core.areas import outside
+from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.format import own_units
 from steadyslip.core.palette import DARK, FORCED, LIGHT
 from steadyslip.core.records import Address
+from steadyslip.core.written import display_names
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.minify import (
@@ -200,9 +204,29 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
         "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints]},
         "remote": REMOTE,
+        "written": _written_units(rig),
         "beyond": BEYOND | EDGE_WORDS,
         "judders": JUDDERS,
         "checks": _checks(rig, names, branch),
+    }
+
+
+_TOLD_BESIDES = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N m", "Pa/m", "N/m", "N m/rad"})
+"""SI units of what a page tells beside parameters: motion, times, rates, stresses, forces, stiffnesses."""
+
+
+def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
+    """Units of the rig's file that differ from SI units, name and size, by SI unit of what a page tells.
+
+    Those of friction per load, which a page tells of single parameters only, are left out.
+    """
+    own = own_units(display_names().union(rig.written_in))
+    told = {outside(one.role.unit, rig.area_of(name))[1] for name, one in rig.parameters().items()}
+    units = {si: own.get(unit(si)[1], ()) for si in sorted(told | _TOLD_BESIDES) if si != "1"}
+    return {
+        si: [(name, unit(name)[0]) for name in names]
+        for si, names in units.items()
+        if names and not any(" at " in name for name in names)
     }
 
 

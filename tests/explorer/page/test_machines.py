@@ -34,7 +34,7 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
         visit.page.get_by_label("parameter of the bar").select_option("drive.kp")
         bar = visit.page.locator(".bar").get_attribute("aria-label")
         assert "drive kp" in bar
-        assert "above 436.2 kN/m" in bar
+        assert "above 0.4362 N/µm" in bar
         visit.page.get_by_label("parameter of the bar").select_option("contacts.mesh.friction.a")
         assert "above 0.02108" in visit.page.locator(".bar").get_attribute("aria-label")
         visit.type("drive.kp", "1 N/um")

@@ -87,9 +87,17 @@ export function digits(value, many = 4) {
   return text.replace("-", "−").replace(/e([+-−]?)(\d+)/, (_, sign, power) => `e${sign === "+" ? "" : "−"}${power}`);
 }
 
+/** Units in which the file of the rig was written, [name, size], by SI unit. @type {Record<string, [string, number][]>} */
+const written = {};
+
+/** Tell quantities in these units. @param {Record<string, [string, number][]>} [units] */
+export const tellIn = (units) => Object.assign(written, units);
+
 /** Factor and name of the most readable unit for a value. @param {number} value @param {string} si @returns {[number, string]} */
 export function display(value, si) {
   if (si === "1") return [1, ""];
+  const from10 = ([, size]) => Math.abs(Math.log10(Math.abs(value) / size) - 1), mine = written[si]?.reduce((a, b) => (from10(b) < from10(a) ? b : a));
+  if (mine && (!value || !SCALED.test(si) || (Math.abs(value / mine[1]) >= 1e-3 && Math.abs(value / mine[1]) < 1e5))) return [mine[1], mine[0]];
   if (si === "rad") return [Math.PI / 180, "deg"];
   if (si === "m/rad") return [display(value * 2 * Math.PI, "m/rev")[0] / (2 * Math.PI), display(value * 2 * Math.PI, "m/rev")[1]];
   const first = SCALED.exec(si), size = Math.abs(value);

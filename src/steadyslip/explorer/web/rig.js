@@ -1,6 +1,6 @@
 // Rig of a page: values and their domains, status, checks against Python, links and rig files.
 import { Linear, UNKNOWN } from "./linear.js";
-import { exactly } from "./quantities.js";
+import { exactly, tellIn } from "./quantities.js";
 
 /**
  * @typedef {{name: string, group: string, title: string, letter: string, unit: string, factor: number, value: number, natural: number, doc: string,
@@ -8,7 +8,7 @@ import { exactly } from "./quantities.js";
  *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its SI size and the text of the value in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
- *   stiffness: string | null, remote: number, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string}} Data
+ *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
@@ -19,6 +19,7 @@ export class Rig {
   /** @param {Data} data @param {any} programs */
   constructor(data, programs) {
     this.data = data;
+    tellIn(data.written);
     for (const one of data.parameters) Object.assign(one, { ...USUAL, ...one });
     this.linear = new Linear(programs, data.facts);
     this.values = data.parameters.map((one) => one.value);

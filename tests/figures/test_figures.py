@@ -7,6 +7,7 @@ from dataclasses import replace
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.contour import ContourSet
 from matplotlib.path import Path
 
 import steadyslip as ss
@@ -431,10 +432,10 @@ def test_contours_reach_the_edges_of_the_chart_and_the_critical_line():
     """k/k_cr has the lines k = level k_cr, down to where k_cr is zero; each label is on its own."""
     rig = ss.read_rig("examples/inclined-spring.toml")
     ax = ss.figures.stability_chart(rig, "friction.b", "stiffness", points=61)
-    (lines,) = [one for one in ax.collections if hasattr(one, "allsegs")]
+    (lines,) = [one for one in ax.collections if isinstance(one, ContourSet)]
     low, high = ax.get_ylim()
-    for level, pieces in zip(1 / lines.levels, lines.allsegs, strict=True):
-        b, k = np.concatenate(pieces).T
+    for level, path in zip(1 / lines.levels, lines.get_paths(), strict=True):
+        b, k = np.concatenate(path.to_polygons(closed_only=False)).T
         assert k.min() == pytest.approx(low, rel=0.3)
         exact = level * ss.critical_stiffness(rig, {"friction.b": b}) / 1e9
         far = (exact > 3 * low * level) & (k < 0.9 * high) & (b > 0.017)
@@ -450,9 +451,9 @@ def test_contours_beside_a_gain_that_is_enough_alone_are_left_out():
     """No stiffness is critical there, which does not mean that the critical gain is zero."""
     rig = ss.read_rig("examples/slow-axis.toml")
     ax = ss.figures.stability_chart(rig, "friction.b", "drive.kp", points=61)
-    (lines,) = [one for one in ax.collections if hasattr(one, "allsegs")]
-    for level, pieces in zip(1 / lines.levels, lines.allsegs, strict=True):
-        b, kp = np.concatenate(pieces).T
+    (lines,) = [one for one in ax.collections if isinstance(one, ContourSet)]
+    for level, path in zip(1 / lines.levels, lines.get_paths(), strict=True):
+        b, kp = np.concatenate(path.to_polygons(closed_only=False)).T
         known, edge = _edge_over(rig.with_values({"drive.kp": 1e3}), np.linspace(0.012, 0.024, 30))
         inner = (b > known[0]) & (kp < 0.9 * ax.get_ylim()[1])
         assert level < 1

@@ -163,7 +163,8 @@ def draw_contours(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) 
     shown = [level for level in shown if np.nanmin(inverse) < level < np.nanmax(inverse)]
     if shown:
         lines = ax.contour(x.shown(x.at(share)), y.shown(y.at(share)), inverse, levels=shown, **CONTOURS)
-        longest = [max(pieces, key=len) for pieces in lines.allsegs if pieces]
+        pieces = [list(map(np.asarray, path.to_polygons(closed_only=False))) for path in lines.get_paths()]
+        longest = [max(several, key=len) for several in pieces if several]
         places = [_apart(ax, one, [other for other in longest if other is not one]) for one in longest]
         ax.clabel(lines, fontsize="small", fmt=lambda level: f"{1 / level:g}", manual=places)
         ax.plot([], [], color=CONTOURS["colors"], linewidth=CONTOURS["linewidths"], label="k/k$_{cr}$")

@@ -175,7 +175,7 @@ class Search:
 
     def natural_size(self) -> float:
         """Typical size of the parameter by dimensional analysis, from σss, v0 and the slip distance v0/r."""
-        total = self.rig.result_unit("Pa") == "N" and self.rig.area_of(self.name) is None
+        total = self.rig.in_forces and self.rig.area_of(self.name) is None
         return natural_size(self.role.unit, total, self.own.sigmas, self.own.drive, _decay_rate(self.own), self.value)
 
     # -- status of sliding along the parameter

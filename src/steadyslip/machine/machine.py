@@ -51,6 +51,8 @@ class Machine(Rig):
 
     area: ClassVar[None] = None
     """Area of a slider, by which its stresses are shown as forces; results of a machine are forces already."""
+    in_forces: ClassVar[bool] = True
+
     words: ClassVar[Mapping[str, str]] = {
         "rig": "machine", "block": "body", "place": "bodies.{}", "damping": "a dashpot to the ground",
         "mass": "the body that slips there a mass (or a damped link to the ground)",

@@ -52,6 +52,9 @@ class Rig(FrozenRecord, Keeper):
     default_along: ClassVar[str | None] = None
     """Parameter along which edges and cycles are sought unless another is named; None if none stands out."""
 
+    in_forces: ClassVar[bool] = False
+    """True if loads and frictions of rigs of this class are told as forces, not as stresses."""
+
     words: ClassVar[Mapping[str, str]] = {}
     """Words of messages about a rig of this class: `rig`, `block`, `place` of a coordinate by its name, and what limits
     its speed, `damping` and `mass`."""

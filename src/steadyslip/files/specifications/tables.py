@@ -91,7 +91,7 @@ class TableReader:
         """Context for what acts on a rig: on a machine in forces, and in angles where its load point turns."""
         outer = self.in_totals, self.turning, self.acted_on
         if rig is not None:
-            self.in_totals, self.turning, self.acted_on = rig.result_unit("Pa") == "N", rig.drive.turns, rig
+            self.in_totals, self.turning, self.acted_on = rig.in_forces, rig.drive.turns, rig
         yield
         self.in_totals, self.turning, self.acted_on = outer
 

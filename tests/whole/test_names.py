@@ -61,7 +61,7 @@ def test_two_observables_of_one_name_are_refused():
 
 @pytest.mark.parametrize("name", ["memory", "strength", "name", "law", "registry"])
 def test_fields_that_would_hide_what_laws_have_are_refused(name):
-    with pytest.raises(TypeError, match=f"a field cannot be called '{name}'"):
+    with pytest.raises(TypeError, match=f"a parameter cannot be called '{name}'"):
         type(
             "Odd",
             (ss.laws.FrictionLaw,),

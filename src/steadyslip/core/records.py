@@ -285,10 +285,11 @@ def _check_fields(cls: type[FrozenRecord]) -> None:
     for name in own:
         if name not in known and any(name in vars(base) for base in cls.__mro__[1:]):
             raise TypeError(
-                f"{cls.__name__}: a field cannot be called {name!r}, as something else is that records have"
+                f"{cls.__name__}: a parameter cannot be called {name!r}: {cls.__mro__[1].__name__} already has a "
+                "method or attribute of that name; give it another"
             )
         if name == cls.chosen_by[0]:
-            raise TypeError(f"{cls.__name__}: a field cannot be called {name!r}, the key that names a law in files")
+            raise TypeError(f"{cls.__name__}: a parameter cannot be called {name!r}, the key that names a law in files")
 
 
 class Settings(FrozenRecord):

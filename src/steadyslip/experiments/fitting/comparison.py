@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -71,12 +72,14 @@ class RecordPart:
         return Forward(own.rig, own.names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort)
 
 
-class Comparison:
-    """All records of a fit with their models.
+class DataComparison:
+    """Data and a model of them, of which a subclass tells values and derivatives.
 
     Parameters
     ----------
-    parts : sequence of RecordPart
+    data, weights : sequence of ndarray
+        Data, and one over the standard deviation of each sample up to a common factor, for every series whose noise is
+        its own.
     space : Space
         Unknowns of the fit.
     loss : str
@@ -85,17 +88,22 @@ class Comparison:
         Residual from which outliers have less weight.
     """
 
-    def __init__(self, parts: tuple[RecordPart, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
-        self.parts, self.space, self.loss, self.width = parts, space, loss, width
-        ends = np.cumsum([0, *(len(part.data) for part in parts)])
+    def __init__(
+        self, data: Sequence[Array], weights: Sequence[Array], space: Space, loss: str = "linear", width: float = 1.0
+    ) -> None:
+        self.space, self.loss, self.width = space, loss, width
+        ends = np.cumsum([0, *map(len, data)])
         self.slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         self.size = int(ends[-1])
-        self.data = np.concatenate([part.data for part in parts])
-        self.weights = np.concatenate([part.weights for part in parts])
+        self.data, self.weights = np.concatenate(data), np.concatenate(weights)
         self._recent: deque[tuple[bytes, Array, Array]] = deque(maxlen=CACHED_POINTS)
 
+    def _run(self, coordinates: Array) -> tuple[Array, Array]:
+        """Model (m, n) and derivatives (m, p, n), computed."""
+        raise NotImplementedError
+
     def model(self, coordinates: Array) -> tuple[Array, Array]:
-        """Model friction (m, n) and derivatives (m, p, n) at coordinates (m, p), not weighted; read-only arrays.
+        """Model (m, n) and derivatives (m, p, n) at coordinates (m, p), not weighted; read-only arrays.
 
         The results of points that were run alone are cached: errors at a minimum that was just checked cost no run.
         Those of several are not, since a motion that is completed among others may fail alone.
@@ -107,24 +115,6 @@ class Comparison:
         predicted, jacobian = (read_only(array) for array in self._run(coordinates))
         if len(coordinates) == 1 and self.size <= MAX_CACHED_SAMPLES:
             self._recent.append((coordinates.tobytes(), predicted[0], jacobian[0]))
-        return predicted, jacobian
-
-    def _run(self, coordinates: Array) -> tuple[Array, Array]:
-        count = len(coordinates)
-        values, slopes = self.space.values(coordinates), self.space.slopes(coordinates)
-        predicted = np.zeros((count, self.size))
-        jacobian = np.zeros((count, len(self.space), self.size))
-        for part, where in zip(self.parts, self.slices, strict=True):
-            places = list(part.rig_indices)
-            begin = list(part.begin_indices)
-            found = part.forward.run(part.table(values), values[:, places], slopes[:, places], values[:, begin])
-            predicted[:, where] = found[:, 0]
-            jacobian[:, places, where] = found[:, 1 : 1 + len(places)]
-            for k, place in enumerate((*part.time_indices, *begin), start=1 + len(places)):
-                jacobian[:, place, where] = found[:, k] * slopes[:, place, None]
-            for row, place in zip(part.trend, part.trend_indices, strict=True):
-                predicted[:, where] += values[:, place, None] * row
-                jacobian[:, place, where] = slopes[:, place, None] * row
         return predicted, jacobian
 
     def residuals(self, coordinates: Array, data: Array | None = None) -> tuple[Array, Array]:
@@ -144,6 +134,39 @@ class Comparison:
             r, slope = scaled_by_loss(self.loss, r, self.width)
             jacobian = jacobian * slope[:, None, :]
         return r, jacobian
+
+
+class Comparison(DataComparison):
+    """All records of a fit of a slider with their models.
+
+    Parameters
+    ----------
+    parts : sequence of RecordPart
+    space, loss, width
+        As of `DataComparison`.
+    """
+
+    def __init__(self, parts: tuple[RecordPart, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
+        self.parts = parts
+        super().__init__([part.data for part in parts], [part.weights for part in parts], space, loss, width)
+
+    def _run(self, coordinates: Array) -> tuple[Array, Array]:
+        count = len(coordinates)
+        values, slopes = self.space.values(coordinates), self.space.slopes(coordinates)
+        predicted = np.zeros((count, self.size))
+        jacobian = np.zeros((count, len(self.space), self.size))
+        for part, where in zip(self.parts, self.slices, strict=True):
+            places = list(part.rig_indices)
+            begin = list(part.begin_indices)
+            found = part.forward.run(part.table(values), values[:, places], slopes[:, places], values[:, begin])
+            predicted[:, where] = found[:, 0]
+            jacobian[:, places, where] = found[:, 1 : 1 + len(places)]
+            for k, place in enumerate((*part.time_indices, *begin), start=1 + len(places)):
+                jacobian[:, place, where] = found[:, k] * slopes[:, place, None]
+            for row, place in zip(part.trend, part.trend_indices, strict=True):
+                predicted[:, where] += values[:, place, None] * row
+                jacobian[:, place, where] = slopes[:, place, None] * row
+        return predicted, jacobian
 
     def misfit(self, coordinates: Array) -> Array:
         """Sums of squares (m,) of the residuals scaled by the loss, computed without derivatives."""

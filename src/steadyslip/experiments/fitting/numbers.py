@@ -1,143 +1,43 @@
-"""Numbers of a fit: estimates, what follows from them (critical stiffness), errors, residuals, and the plan."""
+"""Numbers of a fit of a slider: what follows from the estimates (critical stiffness), and short refits beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
-from steadyslip.core.format import format_quantity
-from steadyslip.core.names import resolve
-from steadyslip.core.options import checked, finite
-from steadyslip.core.results import ReadOnly, read_only
-from steadyslip.experiments.fitting.comparison import Comparison, scaled_by_loss
+from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values
-from steadyslip.experiments.fitting.estimates import Combination, Estimate
+from steadyslip.experiments.fitting.estimates import Estimate
+from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
 from steadyslip.experiments.fitting.remedies import Remedy, remedies
-from steadyslip.experiments.fitting.search import SearchSummary
-from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, Whiteness, whiteness
+from steadyslip.experiments.fitting.unknowns import Unknown
+from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 
 
 @dataclass(frozen=True, eq=False)
-class FitNumbers(ReadOnly):
-    """Rig fitted to records.
-
-    Attributes
-    ----------
-    plan : Plan
-        Rig, records and options of the fit.
-    coordinates : ndarray (p,)
-        Coordinates of the least sum of squares, in ``plan.space()``.
-    ssq : float
-        Sum of squared residuals, weighted and scaled by the loss.
-    search : SearchSummary
-    noise : tuple of Noise
-        Autocorrelation of the residuals of every record.
-    covariance : ndarray (p, p)
-        Covariance of the coordinates; infinite where a parameter is not determined.
-    unidentified : tuple of Combination
-        Combinations of parameters that the records do not determine.
-    bounds : tuple of two ndarray (p,)
-        Lower and upper bounds of the search, in coordinates.
-    version : str
-        Version of steadyslip that made the fit.
-    """
+class FitNumbers(Fitted):  # noqa: D101 -- its base has it
+    __doc__ = Fitted.__doc__
 
     plan: Plan
-    coordinates: Array = field(repr=False)
-    ssq: float
-    search: SearchSummary
-    noise: tuple[Noise, ...] = field(repr=False)
-    covariance: Array = field(repr=False)
-    unidentified: tuple[Combination, ...]
-    bounds: tuple[Array, Array] = field(repr=False)
-    version: str = field(repr=False)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Fields of the fit, for pickling; cached results are left out, as kernels cannot be copied."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
-
-    @cached_property
-    def space(self) -> Space:
-        return self.plan.space()
 
     @cached_property
     def comparison(self) -> Comparison:
         return self.plan.comparison()
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the fitted parameters."""
-        return tuple(one.name for one in self.space.unknowns)
-
-    @cached_property
-    def values(self) -> dict[str, float]:
-        """Fitted values, SI units."""
-        return {n: float(v) for n, v in zip(self.names, self.space.values(self.coordinates), strict=True)}
-
-    @cached_property
-    def errors(self) -> dict[str, float]:
-        """Standard deviations, SI units."""
-        deviation = np.sqrt(np.diag(self.covariance)) * self.space.slopes(self.coordinates)
-        return {name: float(error) for name, error in zip(self.names, deviation, strict=True)}
-
-    @checked(level=finite(0, 1))
-    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Confidence interval of a parameter in SI units; for a positive parameter symmetric in its logarithm.
-
-        Parameters
-        ----------
-        name : str
-        level : float
-            Probability, such as 0.95.
-        """
-        from scipy.stats import t
-
-        if not 0 < level < 1:
-            raise ParameterError([Problem("level", f"got {level!r}; allowed: a number between 0 and 1")])
-        i = self.index(name)
-        reach = float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1))) * float(np.sqrt(self.covariance[i, i]))
-        one = self.space.unknowns[i]
-        if not np.isfinite(reach):
-            return one.low, one.high
-        low, high = (float(one.value(self.coordinates[i] + sign * reach)) for sign in (-1, 1))
-        return max(low, one.low), min(high, one.high)
-
-    def index(self, name: str) -> int:
-        """Index of a parameter; leading parts of its name may be left out."""
-        try:
-            return self.names.index(resolve(name, dict.fromkeys(self.names)))
-        except UnknownNameError:
-            raise UnknownNameError("fitted parameter", name, self.names) from None
-
     def __getitem__(self, name: str) -> Estimate:
         """Estimate of a parameter, or of what follows from them (`derived`)."""
-        if (
-            name.partition("@")[0] in DERIVED
-            and (found := next((one for one in self.derived if one.name == name), None)) is not None
-        ):
-            return found
-        i = self.index(name)
-        full = self.names[i]
-        low, high = self.interval(full)
-        unit, area, error = self.space.unknowns[i].unit, self.plan.rig.area, self.errors[full]
-        together = [one.weights for one in self.unidentified if full in one.weights and not np.isfinite(error)]
-        along = tuple(dict.fromkeys(other for one in together for other in one if other != full))
-        return Estimate(full, self.values[full], error, unit, low, high, area, along)
-
-    @cached_property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """All fitted parameters with their errors."""
-        return tuple(self[name] for name in self.names)
+        if name.partition("@")[0] in DERIVED:
+            for one in self.derived:
+                if one.name == name:
+                    return one
+        return super().__getitem__(name)
 
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
@@ -165,12 +65,6 @@ class FitNumbers(ReadOnly):
         return with_ramps(self.plan, self.values, self._ends)
 
     @cached_property
-    def whiteness(self) -> Whiteness:
-        """Test of the residuals for structure: more than white noise and noise that decays exponentially."""
-        parts = range(len(self.plan.records))
-        return whiteness(self.part(self.scaled_residuals, i) for i in parts)
-
-    @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
         """Short fits with other laws, a lag or a trend, the best first; empty if residuals have no structure."""
         return remedies(self.plan, self.ssq, self.values) if self.whiteness.p < STRUCTURE else ()
@@ -185,88 +79,6 @@ class FitNumbers(ReadOnly):
         """Bounds of the search, in coordinates, by name of the unknown."""
         return dict(zip(self.names, zip(*self.bounds, strict=True), strict=True))
 
-    @cached_property
-    def at_bounds(self) -> tuple[str, ...]:
-        """Sentences on parameters that ended at a bound of the search."""
-        low, high = self.bounds
-        found = []
-        for i, one in enumerate(self.space.unknowns):
-            if one.parameter.startswith("jump.") or self._within_interval(one):  # bounded by samples on both sides
-                continue
-            for bound, word in ((low[i], "smallest"), (high[i], "largest")):
-                if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
-                    value = float(one.value(bound))
-                    end = (
-                        f"{value:.7g} s"
-                        if one.unit == "s"
-                        else format_quantity(value, one.unit, area=self.plan.rig.area)
-                    )
-                    text = f"{one.name} ended at the {word} value that was searched, {end}"
-                    found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
-        return tuple(found)
-
-    def _beyond_window(self, one: Unknown, when: str) -> str:
-        """Explanation for the time of a change that ended at a bound of its window; empty for other unknowns."""
-        if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
-            return ""
-        return (
-            f": friction would have the change {when} than the record's other columns allow; the model does not follow "
-            "friction around it (another law, two states, a ramp), or friction was not sampled at the same times"
-        )
-
-    def _within_interval(self, one: Unknown) -> bool:
-        """True if an unknown is the time of a step that lies between two neighbouring samples."""
-        time = self.plan.records[one.record or 0].time
-        return one.parameter.startswith("step.") and one.high - one.low < 1.01 * float(np.max(np.diff(time)))
-
-    @property
-    def samples(self) -> int:
-        return self.comparison.size
-
-    @property
-    def degrees(self) -> int:
-        """Degrees of freedom: samples less parameters."""
-        return self.samples - len(self.space)
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the residuals, in friction."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
-
-    @cached_property
-    def model(self) -> Array:
-        """Friction coefficient of the fitted model, trend included, at all samples (n,)."""
-        return np.asarray(read_only(self.comparison.model(self.coordinates[None])[0][0]))
-
-    @property
-    def residuals(self) -> Array:
-        """Residuals (n,): measured friction less that of the model."""
-        return np.asarray(read_only(self.comparison.data - self.model))
-
-    @property
-    def scaled_residuals(self) -> Array:
-        """Residuals (n,) weighted and scaled by the loss: what the sum of squares is of."""
-        r = self.residuals * self.comparison.weights
-        return r if self.plan.loss == "linear" else scaled_by_loss(self.plan.loss, r, self.comparison.width)[0]
-
-    def part(self, values: Array, record: int = 0) -> Array:
-        """Part of `values` (n,) at all samples that belongs to one record."""
-        return values[self.comparison.slices[record]]
-
-    @property
-    def correlated(self) -> bool:
-        """True if the errors allow for correlated residuals."""
-        return any(noise.correlated for noise in self.noise)
-
-    @cached_property
-    def correlation(self) -> Array:
-        """Correlation matrix (p, p) of the estimates; NaN where one is not determined."""
-        with np.errstate(all="ignore"):
-            size = np.sqrt(np.diag(self.covariance))
-            found: Array = self.covariance / np.outer(size, size)
-        found[~np.isfinite(found)] = np.nan
-        return np.asarray(read_only(found))
-
     def rig(self, record: int = 0) -> Slider:
         """Rig with the fitted values, and the initial velocity and normal stress of a record."""
         driven = self.comparison.parts[record].rig
@@ -277,23 +89,18 @@ class FitNumbers(ReadOnly):
         }
         return driven.with_values(own)
 
-    @property
-    def aic(self) -> float:
-        """Akaike's information criterion; of fits to the same records, the least is the best."""
-        return self.criteria(self.noise)[0]
+    def _beyond_window(self, one: Unknown, when: str) -> str:
+        """Explanation for the time of a change that ended at a bound of its window; empty for other unknowns."""
+        if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
+            return ""
+        return (
+            f": friction would have the change {when} than the record's other columns allow; the model does not follow "
+            "friction around it (another law, two states, a ramp), or friction was not sampled at the same times"
+        )
 
-    @property
-    def bic(self) -> float:
-        """Schwarz's (Bayesian) information criterion."""
-        return self.criteria(self.noise)[1]
-
-    def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:
-        """AIC and BIC with the number of independent samples that a noise model of each record gives."""
-        deviance = independent = 0.0
-        for i, one in enumerate(noise):
-            r = self.part(self.residuals * self.comparison.weights, i)
-            worth = len(r) / max(one.inflation, 1.0)
-            deviance += worth * float(np.log(np.mean(r**2)))
-            independent += worth
-        size = len(self.space)
-        return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))
+    def _between_samples(self, one: Unknown) -> bool:
+        """True if an unknown is the time of a jump or a step that lies between two neighbouring samples."""
+        if one.parameter.startswith("jump."):
+            return True
+        time = self.plan.records[one.record or 0].time
+        return one.parameter.startswith("step.") and one.high - one.low < 1.01 * float(np.max(np.diff(time)))

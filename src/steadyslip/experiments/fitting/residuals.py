@@ -8,7 +8,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.checks import Check, check
-from steadyslip.experiments.fitting.numbers import FitNumbers
+from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.numerics.noise import Noise
 
 SSQ_TOLERANCE = 1e-6  # relative difference of sums of squares; ten times the accuracy to which the search converges
@@ -16,12 +16,13 @@ PIECES, MIN_SAMPLES = 16, 4  # pieces of a record whose means are compared, and 
 MAX_EXCESS = 1.0  # relative excess of the scatter over the expected one; chance reaches it once in twenty million fits
 
 
-def residual_checks(fit: FitNumbers) -> tuple[Check, ...]:
+def residual_checks(fit: Fitted) -> tuple[Check, ...]:
     """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
     r = fit.scaled_residuals
     missed = abs(float(r @ r) - fit.ssq) / fit.ssq if fit.ssq else float(np.any(r))
     ended = fit.search.converged and not fit.search.cut
-    scatters = [one for i, noise in enumerate(fit.noise) for one in _excess_scatter(fit.part(r, i), noise)]
+    parts = zip(fit.noise, fit.comparison.slices, strict=True)
+    scatters = [one for noise, where in parts for one in _excess_scatter(r[where], noise)]
     found = [
         check("sum of squares", "residuals of the model at the estimates, added up", missed, SSQ_TOLERANCE),
         check("minimum", "what further steps of the search would gain", float(not ended), 0.0),

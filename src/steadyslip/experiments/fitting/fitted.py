@@ -1,0 +1,234 @@
+"""Result of a search for least squares: estimates with errors, residuals, criteria; of any rig and record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.format import format_quantity
+from steadyslip.core.names import resolve
+from steadyslip.core.options import checked, finite
+from steadyslip.core.results import ReadOnly, read_only
+from steadyslip.experiments.fitting.comparison import DataComparison, scaled_by_loss
+from steadyslip.experiments.fitting.estimates import Combination, Estimate
+from steadyslip.experiments.fitting.search import SearchSummary
+from steadyslip.experiments.fitting.unknowns import Space, Unknown
+from steadyslip.experiments.numerics.noise import Noise, Whiteness, whiteness
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted(ReadOnly):
+    """Rig fitted to records.
+
+    Attributes
+    ----------
+    plan : Plan
+        Rig, records and options of the fit.
+    coordinates : ndarray (p,)
+        Coordinates of the least sum of squares, in ``plan.space()``.
+    ssq : float
+        Sum of squared residuals, weighted and scaled by the loss.
+    search : SearchSummary
+    noise : tuple of Noise
+        Autocorrelation of the residuals of every record.
+    covariance : ndarray (p, p)
+        Covariance of the coordinates; infinite where a parameter is not determined.
+    unidentified : tuple of Combination
+        Combinations of parameters that the records do not determine.
+    bounds : tuple of two ndarray (p,)
+        Lower and upper bounds of the search, in coordinates.
+    version : str
+        Version of steadyslip that made the fit.
+    """
+
+    plan: Any
+    coordinates: Array = field(repr=False)
+    ssq: float
+    search: SearchSummary
+    noise: tuple[Noise, ...] = field(repr=False)
+    covariance: Array = field(repr=False)
+    unidentified: tuple[Combination, ...]
+    bounds: tuple[Array, Array] = field(repr=False)
+    version: str = field(repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Fields of the fit, for pickling; cached results are left out, as kernels cannot be copied."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    @cached_property
+    def space(self) -> Space:
+        found: Space = self.plan.space()
+        return found
+
+    @cached_property
+    def comparison(self) -> DataComparison:
+        found: DataComparison = self.plan.comparison()
+        return found
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the fitted parameters."""
+        return tuple(one.name for one in self.space.unknowns)
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Fitted values, SI units."""
+        return {n: float(v) for n, v in zip(self.names, self.space.values(self.coordinates), strict=True)}
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        """Standard deviations, SI units."""
+        deviation = np.sqrt(np.diag(self.covariance)) * self.space.slopes(self.coordinates)
+        return {name: float(error) for name, error in zip(self.names, deviation, strict=True)}
+
+    @checked(level=finite(0, 1))
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Confidence interval of a parameter in SI units; for a positive parameter symmetric in its logarithm.
+
+        Parameters
+        ----------
+        name : str
+        level : float
+            Probability, such as 0.95.
+        """
+        from scipy.stats import t
+
+        if not 0 < level < 1:
+            raise ParameterError([Problem("level", f"got {level!r}; allowed: a number between 0 and 1")])
+        i = self.index(name)
+        reach = float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1))) * float(np.sqrt(self.covariance[i, i]))
+        one = self.space.unknowns[i]
+        if not np.isfinite(reach):
+            return one.low, one.high
+        low, high = (float(one.value(self.coordinates[i] + sign * reach)) for sign in (-1, 1))
+        return max(low, one.low), min(high, one.high)
+
+    def index(self, name: str) -> int:
+        """Index of a parameter; leading parts of its name may be left out."""
+        try:
+            return self.names.index(resolve(name, dict.fromkeys(self.names)))
+        except UnknownNameError:
+            raise UnknownNameError("fitted parameter", name, self.names) from None
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Estimate of a parameter."""
+        i = self.index(name)
+        full = self.names[i]
+        low, high = self.interval(full)
+        unit, area, error = self.space.unknowns[i].unit, self.plan.rig.area, self.errors[full]
+        together = [one.weights for one in self.unidentified if full in one.weights and not np.isfinite(error)]
+        along = tuple(dict.fromkeys(other for one in together for other in one if other != full))
+        return Estimate(full, self.values[full], error, unit, low, high, area, along)
+
+    @cached_property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """All fitted parameters with their errors."""
+        return tuple(self[name] for name in self.names)
+
+    @cached_property
+    def whiteness(self) -> Whiteness:
+        """Test of the residuals for structure: more than white noise and noise that decays exponentially."""
+        return whiteness(self.scaled_residuals[where] for where in self.comparison.slices)
+
+    @property
+    def samples(self) -> int:
+        return self.comparison.size
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom: samples less parameters."""
+        return self.samples - len(self.space)
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals; in friction, of a slider."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @cached_property
+    def model(self) -> Array:
+        """What the records have, of the fitted model, trends included, at all samples (n,): friction of a slider."""
+        return np.asarray(read_only(self.comparison.model(self.coordinates[None])[0][0]))
+
+    @property
+    def residuals(self) -> Array:
+        """Residuals (n,): what was measured less what the model has."""
+        return np.asarray(read_only(self.comparison.data - self.model))
+
+    @property
+    def scaled_residuals(self) -> Array:
+        """Residuals (n,) weighted and scaled by the loss: what the sum of squares is of."""
+        r = self.residuals * self.comparison.weights
+        return r if self.plan.loss == "linear" else scaled_by_loss(self.plan.loss, r, self.comparison.width)[0]
+
+    def part(self, values: Array, record: int = 0) -> Array:
+        """Part of `values` (n,) at all samples that belongs to one record."""
+        return values[self.comparison.slices[record]]
+
+    @property
+    def correlated(self) -> bool:
+        """True if the errors allow for correlated residuals."""
+        return any(noise.correlated for noise in self.noise)
+
+    @cached_property
+    def correlation(self) -> Array:
+        """Correlation matrix (p, p) of the estimates; NaN where one is not determined."""
+        with np.errstate(all="ignore"):
+            size = np.sqrt(np.diag(self.covariance))
+            found: Array = self.covariance / np.outer(size, size)
+        found[~np.isfinite(found)] = np.nan
+        return np.asarray(read_only(found))
+
+    @property
+    def aic(self) -> float:
+        """Akaike's information criterion; of fits to the same records, the least is the best."""
+        return self.criteria(self.noise)[0]
+
+    @property
+    def bic(self) -> float:
+        """Schwarz's (Bayesian) information criterion."""
+        return self.criteria(self.noise)[1]
+
+    def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:
+        """AIC and BIC with the number of independent samples that a noise model of each record gives."""
+        deviance = independent = 0.0
+        for i, one in enumerate(noise):
+            r = self.part(self.residuals * self.comparison.weights, i)
+            worth = len(r) / max(one.inflation, 1.0)
+            deviance += worth * float(np.log(np.mean(r**2)))
+            independent += worth
+        size = len(self.space)
+        return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))
+
+    @cached_property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Sentences on parameters that ended at a bound of the search."""
+        low, high = self.bounds
+        found = []
+        for i, one in enumerate(self.space.unknowns):
+            if self._between_samples(one):  # bounded on both sides
+                continue
+            for bound, word in ((low[i], "smallest"), (high[i], "largest")):
+                if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
+                    value = float(one.value(bound))
+                    end = (
+                        f"{value:.7g} s"
+                        if one.unit == "s"
+                        else format_quantity(value, one.unit, area=self.plan.rig.area)
+                    )
+                    text = f"{one.name} ended at the {word} value that was searched, {end}"
+                    found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
+        return tuple(found)
+
+    def _between_samples(self, one: Unknown) -> bool:
+        """True for times that samples bound on both sides, so that an end there says nothing."""
+        return False
+
+    def _beyond_window(self, one: Unknown, when: str) -> str:
+        """Explanation of an end at a bound; empty for none."""
+        return ""

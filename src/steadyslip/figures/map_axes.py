@@ -32,7 +32,11 @@ from steadyslip.maps.view.map_result import MapResult
 
 Array = np.ndarray
 LOG_RATIO = 100.0  # highest over lowest value from which on a scale is logarithmic: two decades
-WORD_COLOURS = {"stable": STABLE, "unstable": UNSTABLE, "blow-up": BLOW_UP}  # of results that have their own colour
+WORD_COLOURS = {
+    "stable": STABLE, "settles": STABLE, "unstable": UNSTABLE, "hunts": UNSTABLE, "blow-up": BLOW_UP,
+    "runs away": BLOW_UP,
+}  # fmt: skip
+"""Of kinds that have their own colour."""
 KIND_COLOURS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
 
 

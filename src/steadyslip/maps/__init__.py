@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from steadyslip.maps.plan.axes import Grid, Samples
 from steadyslip.maps.plan.edges import Edge, LogMargin, OnsetKind, SafetyFactor, StableValues
+from steadyslip.maps.plan.held import Hunting
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.map_file import map_from_text, read_map
 from steadyslip.maps.plan.measures import Events, KickThreshold, Measure, measure
@@ -21,6 +22,7 @@ __all__ = [
     "Edge",
     "Events",
     "Grid",
+    "Hunting",
     "KickThreshold",
     "LogMargin",
     "Map",

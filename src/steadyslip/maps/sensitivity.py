@@ -179,6 +179,10 @@ def sensitivity(
     whole = isinstance(points, int) and not isinstance(points, bool)
     if not (whole and LEAST <= points <= MOST and points & (points - 1) == 0):
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, from {LEAST} to {MOST}")])
+    if rig.holds:
+        raise NotAvailable(
+            "shares of variance are of steady sliding, and the drive holds a place; compute a map instead"
+        )
     plan = Map(
         rig,
         compute=default_results(rig) if of is None else of,

@@ -23,7 +23,7 @@ from steadyslip.files.specifications.tables import TableReader
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan import edges  # noqa: F401 -- registers its measures
+from steadyslip.maps.plan import edges, held  # noqa: F401 -- register their measures
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
 from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
 from steadyslip.model.point import operating_point
@@ -51,9 +51,10 @@ class Map(Displayed):
         Parameters of the rig or protocol by dotted name with their values; each is a dimension.
     compute : sequence of str, Measure or function
         Measures by name (``status``, ``growth_rate``, ``frequency``, ``edge``, ``stable_values``, ``safety_factor``,
-        ``margin``, ``onset``, ``events``, ``threshold``; of sliders ``critical_stiffness``, ``stable_stiffness``), with
+        ``margin``, ``onset``, ``events``, ``threshold``; of sliders ``critical_stiffness``, ``stable_stiffness``; of
+        rigs that hold a place ``hunt`` alone), with
         options as records such as ``Events(until=200.0)`` or ``Edge(along="drive.kp")``, or functions of a rig; see
-        `measure`. By default the status, for sliders with the critical stiffness.
+        `measure`. By default the status, for sliders with the critical stiffness, or ``hunt``.
     samples : Samples, mapping of str to array_like, Fit or Draws, optional
         Parameters that vary together along the dimension ``sample``: from ranges, lists, or draws of a fit, in which
         case the rig gets the fit's friction as in `predict`.
@@ -92,7 +93,7 @@ class Map(Displayed):
         if not (self.axes or self.sampling or problems):
             problems.append(Problem("map.over", "missing; name at least one parameter and its values"))
         for one in self.compute:
-            for problem in one.problems(self.rig, self.protocol):
+            for problem in _unfit(one, self.rig) or one.problems(self.rig, self.protocol):
                 message = problem.message if problem.name else f"{one.name!r} {problem.message}"
                 problems.append(Problem(f"map.{one.name}.{problem.name}" if problem.name else "map.compute", message))
         if problems:
@@ -170,10 +171,19 @@ class Map(Displayed):
         axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
         corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
         try:
-            operating_point(self.rig, {a.name: ends for a, ends in zip(axes, corners, strict=True)})
+            self._build({a.name: ends for a, ends in zip(axes, corners, strict=True)})
         except ParameterError as error:
             return error.problems
         return ()
+
+    def _build(self, vary: Mapping[str, np.ndarray], scan: bool = False) -> None:
+        """Raise the errors of rigs with these values."""
+        if not self.rig.holds:
+            operating_point(self.rig, vary, scan=scan)
+            return
+        for values in zip(*(a.reshape(-1) for a in np.broadcast_arrays(*vary.values())), strict=True):
+            if not self.rig.with_values(dict(zip(vary, map(float, values), strict=True))).holds:
+                raise ParameterError([Problem("drive.velocity", "varies; the rig of this map holds a place, and is 0")])
 
     def known(self) -> dict[str, Address]:
         """All parameters that may vary, by full name."""
@@ -205,7 +215,7 @@ class Map(Displayed):
         if any(one.moves for one in self.compute) and role.adds_state:
             return ()  # cases with and without the state are simulated as separate groups
         try:
-            operating_point(self.rig, {name: np.asarray(values, dtype=float)}, scan=True)
+            self._build({name: np.asarray(values, dtype=float)}, scan=True)
         except ParameterError as error:
             return error.problems
         except SteadyslipError as error:
@@ -293,7 +303,19 @@ class Map(Displayed):
 
 def default_measures(rig: Rig) -> tuple[str, ...]:
     """Default measures for a rig."""
+    if rig.holds:
+        return ("hunt",)
     return ("status", "critical_stiffness" if rig.default_along else "growth_rate")
+
+
+def _unfit(one: AnyMeasure, rig: Rig) -> list[Problem]:
+    """Problem of a measure of steady sliding for a rig that holds a place, or the reverse, as a list."""
+    if one.held is None or one.held == rig.holds:
+        return []
+    if one.held:
+        return [Problem("", "is of a drive that holds a place: a controller at drive.velocity = 0")]
+    message = "is of steady sliding, and the drive holds a place (velocity = 0); compute 'hunt', or a function of a rig"
+    return [Problem("", message)]
 
 
 def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:

@@ -80,6 +80,8 @@ class Measure(FrozenRecord, family="measure"):
 
     moves: ClassVar[bool] = False
     """True if the protocol matters; otherwise its varying parameters are not passed to the measure."""
+    held: ClassVar[bool | None] = False
+    """True if it is of rigs that hold a place, False of those that slide steadily, None of both."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         """Declarations of the arrays, if the named parameters vary."""
@@ -276,6 +278,7 @@ class FunctionMeasure:
     takes_arrays: bool = False
     cost: float = 1e-3
     moves: ClassVar[bool] = False
+    held: ClassVar[bool | None] = None
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output(self.name, self.unit, self.name.replace("_", " ")),)

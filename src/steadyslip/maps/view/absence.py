@@ -19,6 +19,9 @@ _REASONS = {
     STABLE: "stable at every value",
     UNSTABLE: "stable at no value",
 }
+WITHOUT = dict.fromkeys(("hunt_amplitude", "hunt_period"), "does not hunt") | dict.fromkeys(
+    ("settling_time", "rest_error"), "does not settle"
+)
 _INFINITE = {"growth_rate": "ill-posed", "threshold": "no kick in the range fails"}
 
 
@@ -38,6 +41,8 @@ def without_number(found: MapResult, view: View, name: str, hatched: bool = Fals
         reasons += sorted(set(_reasons(found, view, missing)) - {""}) if name in _ABOUT_EDGES else []
     if len(missing) and not found.complete:
         reasons.append("not computed yet")
+    if len(missing) and name in WITHOUT:
+        reasons.append(WITHOUT[name])
     words = name.replace("_", " ")
     return f"no {words}" + (f" ({', '.join(reasons)})" if reasons else "")
 

@@ -99,13 +99,13 @@ def hunt(
         if motion.time >= last_change and motion.at_rest:
             at_rest = True
             break
-        if motion.steps > MOST_STEPS:
+        if motion.runs_away or motion.steps > MOST_STEPS:
             break
         if end is None and done is not None:
             own = [one for one in motion.trace.strokes if one.start > last_change]
             if len(own) >= MOST_STROKES or cycle_length(own, close):
                 break
-    return _result(rig, given, motion, at_rest, close, last_change)
+    return _result(rig, given, motion, at_rest, (close, rtol), last_change)
 
 
 def _target(protocol: Protocol, rig: Slider | Machine) -> Protocol:
@@ -154,19 +154,23 @@ def cycle_length(strokes: Sequence[Stroke], close: float) -> int:
 
 
 def _result(
-    rig: Slider | Machine, protocol: Protocol, motion: Motion, at_rest: bool, close: float, since: float
+    rig: Slider | Machine, protocol: Protocol, motion: Motion, at_rest: bool, errors: tuple[float, float],
+    since: float,
 ) -> Hunt:  # fmt: skip
     from steadyslip import __version__
 
+    close, rtol = errors
     table, strokes = motion.trace.table(), motion.trace.strokes
     own = [one for one in strokes if one.start >= since and np.isfinite(one.end)]
-    count = 0 if at_rest else cycle_length(own, close)
+    count = 0 if at_rest or motion.runs_away else cycle_length(own, close)
     period = own[-1].start - own[-1 - count].start if count else np.nan
-    hunts: bool | None = False if at_rest else True if count else _trend(own)
+    hunts: bool | None = False if at_rest else True if count or motion.runs_away else _trend(own)
     rested = max([since, *(one.end for one in strokes if np.isfinite(one.end))])
     settled = (motion.time if any(motion.mode.contacts) else rested) if at_rest else np.nan
     if at_rest:
         seen = -motion.watched[0:1] @ motion.state
+    elif motion.runs_away:
+        seen = motion.farthest * np.array([-1.0, 1.0])
     elif own:
         recent = own[-max(2, count) :] if count or hunts is False else own[-max(2, len(own) // 3) :]
         seen = -np.array([value for one in recent for value in (one.lowest, one.highest)])
@@ -178,9 +182,9 @@ def _result(
     force = "N m" if turns else rig.result_unit("Pa")
     return Hunt(
         rig=rig, protocol=protocol, hunts=hunts, lowest=float(seen.min()), highest=float(seen.max()),
-        period=float(period), repeats=bool(count), strokes=tuple(strokes), time=table[:, 0], error=table[:, 1],
-        velocity=table[:, 2], force=table[:, 3], exact=motion.exact, rtol=close, settled_at=float(settled),
-        unit="rad" if turns else "m", force_unit=force, version=__version__,
+        period=float(period), repeats=bool(count), runs_away=motion.runs_away, strokes=tuple(strokes), time=table[:, 0],
+        error=table[:, 1], velocity=table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol,
+        settled_at=float(settled), unit="rad" if turns else "m", force_unit=force, version=__version__,
     )  # fmt: skip
 
 

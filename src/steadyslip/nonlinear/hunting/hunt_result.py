@@ -29,6 +29,8 @@ class Hunt(ReadOnly):
         Target, as it was moved.
     hunts : bool or None
         True if strokes go on without becoming smaller, False if it settles; None if the motion ended before.
+    runs_away : bool
+        True if it goes ever farther from its target: the controller is unstable in sliding, or too weak for a load.
     lowest, highest : float
         Extremes of the measured place over the target (m or rad), in the last cycle, or from the last rest on.
     period : float
@@ -40,8 +42,9 @@ class Hunt(ReadOnly):
     time, error, velocity, force : ndarray
         The motion: s; m or rad; m/s or rad/s; N, N m or Pa.
     exact : bool
-        True if every piece is solved exactly, else to the error `rtol` per step.
+        True if every piece is solved exactly.
     rtol : float
+        Error per step allowed with bristles.
     settled_at : float
         Time from which on it rests (s); NaN if it does not.
     unit, force_unit : str
@@ -55,6 +58,7 @@ class Hunt(ReadOnly):
     highest: float
     period: float
     repeats: bool
+    runs_away: bool
     strokes: tuple[Stroke, ...]
     time: Array
     error: Array
@@ -82,6 +86,8 @@ class Hunt(ReadOnly):
         """Answer in a line, such as "HUNTS ±63.9 mm about the target every 24.4 s"."""
         far = max(abs(self.lowest), abs(self.highest))
         size = format_quantity(far, self.unit)
+        if self.runs_away:
+            return f"RUNS AWAY: {size} from the target after {format_quantity(self._end, 's')}, and ever farther"
         if self.hunts:
             if abs(self.highest + self.lowest) > SYMMETRIC * far:
                 low, high = (format_quantity(value, self.unit) for value in (self.lowest, self.highest))
@@ -124,6 +130,7 @@ class Hunt(ReadOnly):
             "sentence": self.sentence,
             "lowest": self.lowest,
             "highest": self.highest,
+            "runs_away": self.runs_away,
             "period": _finite(self.period),
             "repeats": self.repeats,
             "settled_at": _finite(self.settled_at),

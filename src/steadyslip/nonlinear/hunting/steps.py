@@ -89,8 +89,11 @@ class BristleSteps:
             self.length = 1.0 / float(np.max(np.abs(np.linalg.eigvals(jacobian))))
         length = min(self.length, most)
         while True:
-            found, error = self._tried(piece, state, length, jacobian, rate)
-            size = float(np.sqrt(np.mean((error / (self.rtol * self.scale)) ** 2)))
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # in a step that is much too long: its size is not finite
+                found, error = self._tried(piece, state, length, jacobian, rate)
+                size = float(np.sqrt(np.mean((error / (self.rtol * self.scale)) ** 2)))
             factor = min(5.0, max(0.2, 0.9 * size ** (-1.0 / (self.order + 1)))) if size > 0 else 5.0
             if size <= 1.0:
                 if length < most or factor < 1.0:  # a step cut short says nothing of longer ones

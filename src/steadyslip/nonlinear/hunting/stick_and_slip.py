@@ -17,6 +17,7 @@ from steadyslip.protocol.segments import Segments
 BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
 STILL = 1e-9  # of the fastest speed so far, below which what is at rest moves no more
 AT_ONCE = 100  # switches without time passing that are no sequence of switches any more
+AWAY = 1e4  # error over what friction, load or target account for, beyond which friction is negligible
 KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
 
 
@@ -62,6 +63,9 @@ class Motion:
         self.state = np.zeros(plant.width)
         self.state[-1] = 1.0
         self.time, self.trace, self.steps, self.fastest, self.farthest = 0.0, Trace(), 0, 0.0, 0.0
+        gain = plant.gains[0][0]
+        loads = float(np.abs(plant.force).sum()) + sum(map(friction_at_rest, plant.contacts))
+        self.expected = loads / gain if gain else 0.0
         self.mode = HeldMode((0,) * len(plant.contacts))
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
         self.acceleration = 0.0
@@ -85,6 +89,7 @@ class Motion:
         n = self.plant.size
         for end, jump, velocity, slope in spans:
             self.state[2 * n + 1] += jump
+            self.expected = max(self.expected, abs(self.state[2 * n + 1]))
             self.state[2 * n + 2] = velocity
             self.acceleration = float(slope)
             self._placed()
@@ -211,6 +216,11 @@ class Motion:
             last.fastest = max(last.fastest, -_least(-np.abs(values[1])))
             self.fastest = max(self.fastest, last.fastest)
             self.farthest = max(self.farthest, last.highest, -last.lowest)
+
+    @property
+    def runs_away(self) -> bool:
+        """True if the error has become so large that nothing ends its growth."""
+        return bool(0 < AWAY * max(self.expected, abs(self.state[2 * self.plant.size + 1])) < self.farthest)
 
     @property
     def at_rest(self) -> bool:

@@ -103,9 +103,7 @@ def log_evidence(experiments: list[ExperimentEstimate], covariance: Array) -> tu
     count, size = covariance.shape[:2]
     width = size * len(experiments[0].design)
     precision, pull, rest = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count)
-    for many in {len(one.indices) for one in experiments} - {
-        0
-    }:  # experiments that determine equally many coordinates, together
+    for many in {len(one.indices) for one in experiments} - {0}:  # those that determine equally many, together
         alike = [one for one in experiments if len(one.indices) == many]
         seen = np.array([one.indices for one in alike])
         slopes = np.array([one.slopes(size) for one in alike])

@@ -117,7 +117,7 @@ def test_without_steady_sliding_there_are_ranges_only():
     off = ss.analyze(MACHINES["brake-pad"].with_values({"bodies.pad.press": -1.0}))
     assert off.stable is None
     for kind in ("mode", "eigenvalues"):
-        with pytest.raises(ss.NotAvailable, match="this machine has no"):
+        with pytest.raises(ss.NotAvailable, match="this rig has no"):
             off.plot(kind)
 
 

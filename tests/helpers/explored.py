@@ -18,8 +18,8 @@ from steadyslip.kernels.printers import javascript
 from steadyslip.linear.modes import mode_of
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
-from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.numbers import linear_numbers
+from steadyslip.verdict.slider import numbers_of
 
 BAR = 1e-12
 

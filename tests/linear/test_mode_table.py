@@ -23,7 +23,7 @@ from machines import (
 from steadyslip.linear.mode_changes import Perturbation
 from steadyslip.linear.mode_origin import feeds_of
 from steadyslip.model.numeric.machine_point import machine_point
-from steadyslip.verdict.machine import machine_facts
+from steadyslip.verdict.whole_text import facts
 from structures_at_random import by_hand, random_structure, reed
 
 HELD = 1e-6  # share of its stiffness by which the shoe of a brake is held besides
@@ -229,7 +229,7 @@ def test_slopes_move_the_edge():
 
 def test_the_verdict_says_which_modes_meet():
     found = ss.analyze(ss.read_rig("examples/machines/brake-pad.toml"))
-    assert dict(machine_facts(found))["why it grows"] == found.origin.words
+    assert dict(facts(found))["why it grows"] == found.origin.words
     assert found.origin.words.startswith("modes 1 and 2 meet at 746.5 Hz where friction at disc exceeds 0.417")
     told = found.to_dict()["why_it_grows"]
     assert (told["modes"], told["words"]) == ([1, 2], found.origin.words)

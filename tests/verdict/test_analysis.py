@@ -12,7 +12,7 @@ import steadyslip as ss
 from rigs_of_theory import CONTACTS
 from steadyslip.verdict.judder import motion_after
 from steadyslip.verdict.support import support_stiffness
-from steadyslip.verdict.words import facts
+from steadyslip.verdict.whole_text import facts
 
 PAPER = ss.read_rig(Path(__file__).parents[2] / "examples" / "inclined-spring.toml")
 PLAIN = ss.Slider(

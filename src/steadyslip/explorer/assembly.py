@@ -45,10 +45,10 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.steady_results import ABSENT
 from steadyslip.motion.sentence import JUDDERS
-from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import page_reasons
+from steadyslip.verdict.slider import numbers_of
 from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES
 
 MODULES = (

@@ -37,7 +37,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
 from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, FrozenVerdicts, HopfCurve
-from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated
+from steadyslip.verdict import Analysis, Tolerated
 
 __all__ = [
     "ANGLES",
@@ -76,6 +76,10 @@ __all__ = [
 ]
 
 
+def _verdict(found: Analysis, ax: Axes | None = None) -> Any:
+    return machine_verdict(found) if found.rig.in_forces else _locus(found, ax)
+
+
 def _locus(found: Analysis, ax: Axes | None = None, **options: Any) -> Axes:
     return root_locus(found.rig, ax, **options)
 
@@ -84,9 +88,8 @@ for _name in __all__:
     if isinstance(_drawn := globals()[_name], FunctionType):  # not the tuple ANGLES
         globals()[_name] = in_written_units(_drawn)
 saved_by(save_with_footer)
-register_figures(Analysis, locus=_locus)
 register_figures(
-    MachineAnalysis, verdict=machine_verdict, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane
+    Analysis, verdict=_verdict, locus=_locus, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane
 )
 register_figures(Modes, mode=mode_shape)
 register_figures(ModeChart, chart=mode_chart)

@@ -16,13 +16,13 @@ from steadyslip.figures.style import axes_or_new
 from steadyslip.linear import Modes
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
-from steadyslip.verdict import MachineAnalysis
+from steadyslip.verdict import Analysis
 
 _SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
 _MAX_PARAMETERS = 24  # rows of `stable_ranges`, so that the figure fits on a page (by trial)
 
 
-def machine_verdict(found: MachineAnalysis) -> np.ndarray:
+def machine_verdict(found: Analysis) -> np.ndarray:
     """Plot stable ranges, leading mode and eigenvalues side by side.
 
     Returns
@@ -49,7 +49,7 @@ def machine_verdict(found: MachineAnalysis) -> np.ndarray:
     return np.array(axes)
 
 
-def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
+def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     """Plot the stable range of each parameter, the others held, as a bar over the parameter divided by its own value.
 
     Only positive parameters with an edge within a factor of 100 are drawn, nearest edge first; the text is the value at
@@ -93,13 +93,13 @@ def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _drawn_margins(found: MachineAnalysis) -> list[Margin]:
+def _drawn_margins(found: Analysis) -> list[Margin]:
     low, high = 1 / _SPAN_FACTOR, _SPAN_FACTOR
     drawn = [m for m in found.margins if m.edge is not None and m.value > 0 and low < m.edge.value / m.value < high]
     return drawn[:_MAX_PARAMETERS]
 
 
-def undrawn_edges(found: MachineAnalysis) -> list[str]:
+def undrawn_edges(found: Analysis) -> list[str]:
     """Names of parameters with an edge that `stable_ranges` does not draw: too far away, too many, or not positive."""
     drawn = {one.parameter for one in _drawn_margins(found)}
     return [one.parameter for one in found.margins if one.edge is not None and one.parameter not in drawn]
@@ -128,7 +128,7 @@ def _stable_intervals(margin: Margin) -> list[tuple[float, float]]:
     return [(low, high) for low, high, good in zip(ends[:-1], ends[1:], stable, strict=True) if good]
 
 
-def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> None:
+def _edge_text(found: Analysis, ax: Axes, row: int, margin: Margin) -> None:
     edge = margin.edge
     if edge is None:
         return
@@ -143,7 +143,7 @@ def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> No
     )  # fmt: skip
 
 
-def mode_shape(found: MachineAnalysis | Modes, ax: Axes | None = None) -> Axes:
+def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
     """Plot the amplitude of every body in a mode, and the largest shares of its energy.
 
     It is the leading mode of an analysis, and the chosen one of `steadyslip.modes`.
@@ -164,7 +164,7 @@ def mode_shape(found: MachineAnalysis | Modes, ax: Axes | None = None) -> Axes:
     """
     mode = found.mode
     if mode is None:
-        raise NotAvailable("this machine has no mode: it does not slide steadily, or its equations are ill-posed")
+        raise NotAvailable("this rig has no mode: modes are of machines that slide steadily and are not ill-posed")
     names = list(mode.amplitudes)
     energy = {n: share for n, share in sorted(mode.energy.items(), key=lambda item: -item[1])[:3] if share > 0.005}
     ax = axes_or_new(ax, 1.2 + 0.32 * (len(names) + len(energy)))
@@ -196,7 +196,7 @@ def mode_shape(found: MachineAnalysis | Modes, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def eigenvalue_plane(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
+def eigenvalue_plane(found: Analysis, ax: Axes | None = None) -> Axes:
     """Plot eigenvalues in the complex plane, on axes that are logarithmic beyond the smallest part and linear within.
 
     Raises
@@ -213,9 +213,7 @@ def eigenvalue_plane(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     s = np.array(found.eigenvalues)
     s = s[np.isfinite(s)]
     if not s.size:
-        raise NotAvailable(
-            "this machine has no eigenvalues: it does not slide steadily, or its equations are ill-posed"
-        )
+        raise NotAvailable("this rig has no eigenvalues: it does not slide steadily, or its equations are ill-posed")
     ax = axes_or_new(ax)
     sizes = np.abs(np.concatenate([s.real, s.imag]))
     least = float(np.min(sizes[sizes > 1e-9 * np.max(sizes)], initial=np.max(sizes) or 1.0))

@@ -13,13 +13,13 @@ from steadyslip.reports.brief import result_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, table
 from steadyslip.reports.sections import assumptions, motion, recommendation, references
-from steadyslip.verdict import MachineAnalysis, Tolerated
-from steadyslip.verdict.machine import machine_facts
+from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict.whole_text import facts
 from steadyslip.verdict.words import headline
 
 
 def verdict_parts(
-    analysis: MachineAnalysis, tolerated: Tolerated | None = None, order: rig_report.Order = rig_report.ORDER
+    analysis: Analysis, tolerated: Tolerated | None = None, order: rig_report.Order = rig_report.ORDER
 ) -> Parts:
     """Contents of the document of a verdict on a machine, with tolerances if given."""
     machine = analysis.rig
@@ -40,7 +40,7 @@ def verdict_parts(
     return Parts(headline(analysis, capitals=False), lead, question, body, machine)
 
 
-def _verdict_figure(analysis: MachineAnalysis) -> str:
+def _verdict_figure(analysis: Analysis) -> str:
     words = "Where it is stable in each parameter, how it moves in its leading mode, and its eigenvalues."
     if far := undrawn_edges(analysis):
         words += (
@@ -50,12 +50,12 @@ def _verdict_figure(analysis: MachineAnalysis) -> str:
     return figure(figure_html(lambda: figures.machine_verdict(analysis), words, 8.0), words)
 
 
-def _verdict_section(analysis: MachineAnalysis) -> Iterator[str]:
+def _verdict_section(analysis: Analysis) -> Iterator[str]:
     """HTML of the verdict: facts, steady sliding of every contact, eigenvalues."""
     if analysis.steady is None:
         return
     yield table(
-        row for row in machine_facts(analysis) if row[0] != "steady sliding"
+        row for row in facts(analysis) if row[0] != "steady sliding"
     )  # steady sliding has a table of its own below
     contacts = [
         (name, format_quantity(one.slip_rate, "m/s"), format_quantity(one.normal_force, "N"),

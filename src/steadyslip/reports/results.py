@@ -39,7 +39,7 @@ from steadyslip.reports.brief import kind_of, result_html, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.sections import notes_of, references
-from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
+from steadyslip.verdict import Analysis, Tolerated, analyze, tolerate
 from steadyslip.verdict.compare import RigComparison
 from steadyslip.verdict.words import headline
 
@@ -250,20 +250,19 @@ def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
 
 
 @parts_of.register
-def _machine_analysis(result: MachineAnalysis) -> Parts:
-    return machine_report.verdict_parts(result)
-
-
-@parts_of.register
 def _tolerated(result: Tolerated) -> Parts:
-    if isinstance(result.rig, Machine):
-        return machine_report.verdict_parts(analyze(result.rig), result)
-    return rig_report.verdict_parts(analyze(result.rig), None, result)
+    return _verdict_parts(analyze(result.rig), result)
 
 
 @parts_of.register
 def _analysis(result: Analysis) -> Parts:
-    return rig_report.verdict_parts(result)
+    return _verdict_parts(result)
+
+
+def _verdict_parts(result: Analysis, within: Tolerated | None = None) -> Parts:
+    if result.rig.in_forces:
+        return machine_report.verdict_parts(result, within)
+    return rig_report.verdict_parts(result, tolerated=within)
 
 
 @parts_of.register

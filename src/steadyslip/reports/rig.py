@@ -35,8 +35,8 @@ from steadyslip.reports.sections import (
     tolerances_of,
 )
 from steadyslip.verdict import Analysis, Tolerated
-from steadyslip.verdict.findings import Verdict
-from steadyslip.verdict.words import edge_rows, facts, headline, meaning
+from steadyslip.verdict.whole_text import facts, meaning
+from steadyslip.verdict.words import edge_rows, headline
 
 VALIDITY = (
     "The verdict is on small disturbances of steady sliding: it holds for the model and the inputs below, and says "
@@ -103,7 +103,7 @@ def input_table(
     return table(rows, ("parameter", "letter", "value", "meaning", *more), caption="Inputs.")
 
 
-def edge_table(analysis: Verdict) -> Iterator[str]:
+def edge_table(analysis: Analysis) -> Iterator[str]:
     """HTML table of the nearest edge of every parameter, and a line of the parameters without one."""
     rows, without = edge_rows(analysis)
     if rows:
@@ -114,7 +114,7 @@ def edge_table(analysis: Verdict) -> Iterator[str]:
         yield paragraph(f"No edge within range: {', '.join(without)}.", "small")
 
 
-def checks_line(analysis: Verdict) -> Iterator[str]:
+def checks_line(analysis: Analysis) -> Iterator[str]:
     """HTML line on the independent checks of a verdict; nothing if there were none."""
     if analysis.checks:
         yield paragraph(in_words(analysis.checks), "small")

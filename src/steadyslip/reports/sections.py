@@ -30,14 +30,14 @@ from steadyslip.model.numeric import has_structure
 from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table
 from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
-from steadyslip.verdict.findings import Verdict
+from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, motion_after
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
 _ROWS = 4  # changes that are recommended, nearest first
 
 
-def recommendation(analysis: Verdict, adjustable: Sequence[str] = ()) -> Iterator[str]:
+def recommendation(analysis: Analysis, adjustable: Sequence[str] = ()) -> Iterator[str]:
     """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
 
     `adjustable` names what can be changed; otherwise all that the rig has but parameters of friction, and these if
@@ -76,7 +76,7 @@ def _cures(margin: Margin) -> bool:
     return not margin.remote and edge.stable == ("above" if edge.value > margin.value else "below")
 
 
-def _change(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str] | None:
+def _change(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str] | None:
     """Row of a change: name, value, recommended value, edge, and whether it is stable there; None if not."""
     if margin.edge is None:
         return None
@@ -94,7 +94,7 @@ def _change(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str]
     return said(rig, margin.parameter), words[0], words[1], f"{word} {words[2]}", "yes"
 
 
-def _value(analysis: Verdict, margin: Margin, value: float) -> str:
+def _value(analysis: Analysis, margin: Margin, value: float) -> str:
     return format_quantity(value, margin.unit, area=analysis.rig.printed_area(margin.parameter))
 
 
@@ -137,7 +137,7 @@ def notes_of(text: str) -> dict[str, str]:
     return found
 
 
-def motion(analysis: Verdict) -> Iterator[str]:
+def motion(analysis: Analysis) -> Iterator[str]:
     """HTML of the motion after a small disturbance: time history and phase plane with the cycle."""
     yield heading("The motion")
     rig: Any = analysis.rig

@@ -10,12 +10,10 @@ from steadyslip import figures
 from steadyslip.files.output import write_by_ending
 from steadyslip.files.standalone import write_page
 from steadyslip.machine.slider import Slider
-from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated
+from steadyslip.verdict import Analysis, Tolerated
 
 
-def write_verdict(
-    found: Analysis | MachineAnalysis, within: Tolerated | None, path: Path, source: Path, journal: bool = False
-) -> None:
+def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source: Path, journal: bool = False) -> None:
     """Write the verdict on a rig as .html, or as a picture: for sliders the stability chart, for machines its ranges.
 
     Raises
@@ -27,7 +25,7 @@ def write_verdict(
 
     def drawn() -> Any:
         with figures.journal() if journal else nullcontext():
-            if not isinstance(found, Analysis):
+            if found.rig.in_forces:
                 return found.plot()
             rig: Slider = found.rig
             stiffness = rig.stiffness_name()

@@ -4,10 +4,10 @@ Knows no maps, figures or documents.
 """
 
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances, read_tolerances
-from steadyslip.verdict.analyze import Analysis, analyze
+from steadyslip.verdict.analysis import Analysis
+from steadyslip.verdict.analyze import analyze
 from steadyslip.verdict.compare import Difference, RigComparison, compare_rigs
 from steadyslip.verdict.cures import Cures, Window, cure
-from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
 from steadyslip.verdict.unknown import StableWithin, ValuesWithin, stable_within
 
@@ -16,7 +16,6 @@ __all__ = [
     "Analysis",
     "Cures",
     "Difference",
-    "MachineAnalysis",
     "RigComparison",
     "StableWithin",
     "Tolerances",

@@ -1,83 +1,51 @@
-"""`analyze`: steady sliding of a rig, its stability, critical stiffness, margins and onset, as one `Analysis`."""
+"""`analyze`: steady sliding of a rig, its stability, edges, margins and onset, as one `Analysis`."""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, overload
+from dataclasses import replace
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from steadyslip.core.areas import stress_name
+from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
-from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
-from steadyslip.core.pictures import draw
-from steadyslip.linear import formula as linear_formula
-from steadyslip.linear.boundary import Margin, margins, margins_and_missing
+from steadyslip.linear.boundary import Margin, margins, margins_and_missing, oscillatory_edge
+from steadyslip.linear.coupling import is_undamped
+from steadyslip.linear.matrix_route import require_matrices
+from steadyslip.linear.mode_table import growth_origin
+from steadyslip.linear.modes import Mode, matrix_mode, mode_of
+from steadyslip.linear.pencil import GOOD
 from steadyslip.linear.status import decided_by_rounding, on_edge
-from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.sliding import steady_states
-from steadyslip.model.steady_results import SteadySliding
+from steadyslip.model.numeric import by_matrices, has_response, has_structure
+from steadyslip.model.numeric.measured import measured_machine
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import steady_machine, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
+from steadyslip.verdict import machine, slider
+from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.causes import undecided_without_mass
-from steadyslip.verdict.checks import critical_check, edge_checks, undecided, verdict_checks
-from steadyslip.verdict.export import as_dict
-from steadyslip.verdict.findings import Findings
-from steadyslip.verdict.machine import MachineAnalysis, analyze_machine
+from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
+from steadyslip.verdict.matrix_checks import is_on_edge, matrix_checks, matrix_edge_checks, matrix_numbers
+from steadyslip.verdict.measured import response_numbers
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.words import headline, unlikely_speed, verdict
+from steadyslip.verdict.reasons import reason as slider_reason
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from steadyslip.nonlinear.kicks.threshold import Threshold
 
-
-@dataclass(frozen=True, repr=False)
-class Analysis(Findings):  # noqa: D101 -- its base has it
-    __doc__ = Findings.__doc__
-
-    def formula(self, along: str | None = None) -> sp.Eq:
-        """Critical stiffness, or the edge in another parameter, as a SymPy equation; see `steadyslip.formula`."""
-        return linear_formula(self.rig, along)
-
-    def plot(self, ax: Any = None) -> Any:
-        """Root locus in the stiffness; see `steadyslip.figures.root_locus`."""
-        return draw(self, ax=ax)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units per unit area (with an area, forces as well), as ``--json`` prints it."""
-        return as_dict(self)
-
-    def to_json(self) -> str:
-        """`to_dict` as JSON text."""
-        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
-
-    def __str__(self) -> str:
-        return verdict(self)
-
-    def __repr__(self) -> str:
-        return f"<Analysis: {headline(self)}; print it for the whole verdict>"
-
-
-@overload
-def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis: ...
-
-
-@overload
-def analyze(rig: Machine, *, branch: int = 0, kick: str | Sequence[str] = ()) -> MachineAnalysis: ...
+ON_THE_EDGE = "the rig is on the edge of stability to within rounding; neither verdict should be relied on"
 
 
 @checked()
-def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis | MachineAnalysis:
+def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:
     """Verdict on a rig.
 
     Parameters
@@ -92,7 +60,7 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
 
     Returns
     -------
-    Analysis or MachineAnalysis
+    Analysis
         With ``stable = None`` and the reason if steady sliding does not exist.
 
     Raises
@@ -109,125 +77,167 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     >>> verdict.stable, round(verdict.critical_stiffness / 1e9, 3)
     (False, 29.07)
     """
+    from steadyslip import __version__
+
     if not isinstance(rig, Rig):
         raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider or a Machine, such as read_rig gives")])
     rig.check_branch(branch)
     kicks = (kick,) if isinstance(kick, str) else tuple(kick)
-    return analyze_machine(rig, kicks) if isinstance(rig, Machine) else _analyze_slider(rig, branch, kicks)
-
-
-def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysis:
-    from steadyslip import __version__
-
     with np.errstate(all="ignore"):
         try:
-            states = steady_states(rig)
+            found = _judged_by_response(rig, kicks) if has_response(rig) else _judged(rig, branch, kicks)
         except NoSteadySliding as error:
             why = str(error).removeprefix("no steady sliding: ")
-            return Analysis(rig=rig, stable=None, reason=why, margins=margins(rig), version=__version__)
-        if not 0 <= branch < len(states):
-            raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
-        values = operating_point(rig, None, rig.kept_zeros(), branch)
-        numbers = numbers_of(rig, values)
-        on_the_edge = bool(on_edge(values)) or decided_by_rounding(values)
-        checks = verdict_checks(rig, values, numbers["stable"], on_the_edge)
-        posed = numbers["growth_rate"] != math.inf
-        if doubt := undecided(checks) or ("" if posed else undecided_without_mass(rig, branch)):
-            return Analysis(rig=rig, stable=None, reason=doubt, margins=(), checks=checks, version=__version__)
-        distances, of_edges = edge_checks(rig, *margins_and_missing(rig, branch), branch)
-        checks += of_edges
-        if numbers.get("critical_angular_frequency") is not None:
-            checks += (critical_check(values, numbers["critical_stiffness"], numbers["critical_angular_frequency"]),)
-            if not checks[-1].passed:
-                numbers |= dict.fromkeys([name for name in numbers if name.startswith("critical_")])
-        onset = _onset(rig, distances, branch)
-        found = Analysis(
-            rig=rig,
-            steady=states[branch],
-            reason="",
-            margins=distances,
-            onset=onset,
-            kicks=_kicks(rig, kicks, branch),
-            on_edge=on_the_edge,
-            branch=branch,
-            warnings=_warnings(rig, values, states, on_the_edge),
-            checks=(*checks, *(onset.checks if onset else ())),
-            version=__version__,
-            **numbers,
-        )
-    from steadyslip.verdict.reasons import reason
-
-    return replace(found, reason=reason(found))
+            found = Analysis(rig=rig, stable=None, reason=why, margins=margins(rig))
+    return replace(found, version=__version__)
 
 
-def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | None:
-    """Onset at the oscillatory edge nearest to the rig's stiffness (or gain kp); None without such an edge."""
+class _Linear(NamedTuple):
+    """Linear stability of a rig at a `point`, by its equations or by its matrices.
+
+    `numbers` are fields of `Analysis`; `edges` gives margins and their checks, `mode` that of an eigenvalue.
+    """
+
+    point: Any
+    numbers: dict[str, Any]
+    on_edge: bool
+    undamped: bool
+    checks: tuple[Check, ...]
+    edges: Callable[[], tuple[tuple[Margin, ...], tuple[Check, ...]]]
+    mode: Callable[[complex], Mode]
+
+
+def _by_equations(rig: Any, branch: int, steady: Any) -> _Linear:
+    point = operating_point(rig, None, rig.kept_zeros(), branch)
+    numbers = linear_numbers(point)  # refuses what cannot be counted, before the edges are looked for
+    edged = bool(on_edge(point)) or decided_by_rounding(point)
+    return _Linear(
+        point,
+        numbers,
+        edged,
+        rig.in_forces and bool(is_undamped(point)),
+        verdict_checks(rig, point, numbers["stable"], edged, steady if rig.in_forces else None),
+        lambda: edge_checks(rig, *margins_and_missing(rig, branch), branch),
+        lambda eigenvalue: mode_of(rig, point, eigenvalue),
+    )
+
+
+def _by_matrices(rig: Machine) -> _Linear:
+    point = require_matrices(rig)
+    numbers, edged = matrix_numbers(point), is_on_edge(point)
+    return _Linear(
+        point,
+        numbers,
+        edged,
+        False,
+        matrix_checks(point, numbers["stable"], edged),
+        lambda: matrix_edge_checks(point, margins(rig)),
+        lambda eigenvalue: matrix_mode(point, eigenvalue),
+    )
+
+
+def _judged(rig: Any, branch: int, kicks: Sequence[str]) -> Analysis:
+    """Verdict on a rig by its equations or, where these would be too long, by its matrices: then without an onset."""
+    matrices = by_matrices(rig)
+    if kicks and has_structure(rig):
+        raise NotAvailable("kicks are not offered for a machine with a structure, whose equations are matrices")
+    states = steady_states(rig)
+    if not 0 <= branch < len(states):
+        raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
+    linear = _by_matrices(rig) if matrices else _by_equations(rig, branch, states[branch])
+    numbers, checks = linear.numbers, linear.checks
+    massless = numbers["growth_rate"] == math.inf and not matrices
+    if doubt := undecided(checks) or (undecided_without_mass(rig, branch) if massless else ""):
+        return Analysis(rig=rig, stable=None, reason=doubt, checks=checks, branch=branch)
+    distances, of_edges = linear.edges()
+    if rig.in_forces:
+        own, of_own = _leading_mode(rig, linear)
+    else:
+        own, of_own = slider.checked_stiffness_numbers(rig, linear.point)
+    onset = None if matrices or linear.undamped else _onset(rig, distances, branch)
+    found = Analysis(
+        rig=rig,
+        steady=states[branch],
+        margins=distances,
+        onset=onset,
+        kicks=_kicks(rig, kicks, branch),
+        on_edge=linear.on_edge,
+        undamped=linear.undamped,
+        branch=branch,
+        checks=(*checks, *of_edges, *of_own, *(onset.checks if onset else ())),
+        **numbers,
+        **own,
+    )
+    return _explained(found, states)
+
+
+def _explained(found: Analysis, states: Sequence[Any]) -> Analysis:
+    """The same with its reason and warnings; `states` are all steady states of the rig."""
+    if found.rig.in_forces:
+        return replace(found, reason=machine.reason(found), warnings=tuple(machine.warnings(found, states)))
+    edged = (ON_THE_EDGE,) if found.on_edge else ()
+    return replace(found, reason=slider_reason(found), warnings=(*edged, *slider.warnings(found, states)))
+
+
+def _judged_by_response(rig: Any, kicks: Sequence[str]) -> Analysis:
+    """Verdict on a machine with a structure given by its measured response: the growing roots are counted."""
+    if kicks:
+        raise NotAvailable("kicks are not offered for a structure given by its measured response")
+    found = measured_machine(rig)
+    if found.count.growing is None:
+        return Analysis(rig=rig, stable=None, reason=UNDECIDED + found.count.doubt)
+    distances, missing = margins_and_missing(rig)
+    steady = steady_machine(rig)
+    answer = _explained(
+        Analysis(rig=rig, steady=steady, margins=distances, **response_numbers(found)),
+        (steady,),
+    )
+    lost = (f"{UNDECIDED}edges of {', '.join(missing)}",) if missing else ()
+    return replace(answer, warnings=(*answer.warnings, *lost))
+
+
+def _leading_mode(rig: Machine, linear: _Linear) -> tuple[dict[str, Any], tuple[Check, ...]]:
+    """Fields on the leading mode, and the check of why it grows; a reason that fails is left out."""
+    known = linear.numbers["growth_rate"] not in (math.inf, None)
+    first = next(iter(linear.numbers.get("eigenvalues", ()) if known else ()), None)
+    if first is None:
+        return {}, ()
+    mode = linear.mode(complex(first.real, abs(first.imag)))
+    origin = growth_origin(rig, mode.eigenvalue, mode.number)
+    if origin is None:
+        return {"mode": mode}, ()
+    off = abs(sum(origin.feeds.values()) - mode.eigenvalue.real) / abs(mode.eigenvalue)
+    own = check("why it grows", "work of all forces added up", off, GOOD)
+    return {"mode": mode, "origin": origin if own.passed else None}, (own,)
+
+
+def _onset(rig: Slider | Machine, distances: Sequence[Margin], branch: int) -> Onset | None:
+    """Onset at the nearest oscillatory edge: of a slider in stiffness (or gain kp), of a machine in any parameter."""
+    if rig.default_along is None:
+        nearest = oscillatory_edge(distances)
+        return None if nearest is None else onset_at(rig, nearest)
     name = rig.parameter_along("slider.stiffness")
-    for margin in distances:
-        if margin.parameter == name:
-            edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]
-            if edges:
-                with suppress(NotAvailable):  # with a delay
-                    return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)
+    margin = next((one for one in distances if one.parameter == name), None)
+    edges = [one for one in margin.edges if one.kind == "oscillatory" and one.stable != "neither"] if margin else []
+    if margin is None or not edges:
+        return None
+    with suppress(NotAvailable):  # with a delay
+        return onset_at(rig, min(edges, key=lambda one: abs(one.value - margin.value)), branch)
     return None
 
 
-def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold, ...]:
+def _kicks(rig: Slider | Machine, kinds: Sequence[str], branch: int) -> tuple[Threshold, ...]:
+    """Thresholds of kicks given as text such as ``force at table``."""
     if not kinds:
         return ()
     from steadyslip.nonlinear.cycle_commands import thresholds_shown  # compiles; only where asked for
+    from steadyslip.nonlinear.kicks.kicks import kick_problems
 
-    return thresholds_shown(rig, kinds, branch=branch).found
-
-
-def numbers_of(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
-    """Fields of `Analysis` that follow from the characteristic equation and from the stable set in stiffness."""
-    return linear_numbers(values) | _stiffness_numbers(rig, values)
-
-
-def _stiffness_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
-    """Fields of `Analysis` on stiffness: stable intervals (Pa/m) and the edge nearest to the rig's own stiffness."""
-    try:
-        found = set_of_one(values)
-    except NotAvailable:  # a delay makes windows without end
-        return {}
-    own = float(values.named()["slider.stiffness"])
-    intervals = found.intervals[np.all(np.isfinite(found.intervals[:, :1]), axis=-1)]
-    numbers: dict[str, Any] = {"stable_stiffness": tuple((float(a), float(b)) for a, b in intervals)}
-    at = np.flatnonzero(found.changes)
-    if at.size:
-        i = at[np.argmin(np.abs(found.edges[at] - own))]
-        critical, beta = float(found.edges[i]), float(found.frequencies[i])
-        numbers["critical_stiffness"] = critical
-        numbers["critical_angular_frequency"] = beta if math.isfinite(beta) else None
-        numbers["critical_side"] = "above" if np.any(intervals[:, 0] == critical) else "below"
-        if rig.axial_stiffness is not None:
-            numbers["critical_axial_stiffness"] = critical / float(values.axial_share)
-    return numbers
-
-
-def _warnings(
-    rig: Slider, values: OperatingPoint, states: tuple[SteadySliding, ...], on_the_edge: bool
-) -> tuple[str, ...]:
-    """Warnings: on an edge, several steady states, no memory in the friction law, friction that is not positive."""
-    found = []
-    if on_the_edge:
-        found.append("the rig is on the edge of stability to within rounding; neither verdict should be relied on")
-    if len(states) > 1:
-        stresses = ", ".join(format_quantity(s.normal_stress, "Pa", area=rig.area) for s in states)
-        found.append(
-            f"steady sliding is possible at {len(states)} values of {stress_name('normal stress', rig.area)} "
-            f"({stresses}); "
-            "this verdict is for the one at "
-            f"{format_quantity(states[values.branch].normal_stress, 'Pa', area=rig.area)}"
-        )
-    found += unlikely_speed("the drive's velocity is", float(rig.drive.velocity), rig.friction)
-    if not rig.friction.memory() and rig.friction.lateness() == 0:
-        found.append(
-            "this friction law has no memory of sliding, so it cannot predict a critical stiffness; "
-            "use a law with memory"
-        )
-    if states[values.branch].friction <= 0:
-        level = "".join(f"{name.rpartition('.')[2]} and " for name in rig.of_kind("friction level"))
-        found.append(f"the friction coefficient in steady sliding is not positive; check {level}the velocity")
-    return tuple(found)
+    asked = [(kick.strip(), at.strip() or None) for kick, _, at in (words.partition(" at ") for words in kinds)]
+    if problems := [one for kick, at in asked for one in kick_problems(rig, kick, at)]:
+        raise ParameterError(problems)
+    return tuple(
+        one
+        for at, same in groupby(asked, key=lambda kick: kick[1])
+        for one in thresholds_shown(rig, [kick for kick, _ in same], at=at, branch=branch).found
+    )

@@ -23,7 +23,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.verdict.analyze import analyze
 from steadyslip.verdict.between import Between, Place, comparable, ones_and_others, places, shapley
 from steadyslip.verdict.export import finite
-from steadyslip.verdict.findings import Findings, Verdict
+from steadyslip.verdict.findings import Findings
 from steadyslip.verdict.support import support_stiffness
 from steadyslip.verdict.tolerances import Tolerated, format_chance, tolerate
 from steadyslip.verdict.words import edge_rows, headline
@@ -68,7 +68,7 @@ class RigComparison(Displayed):
     Attributes
     ----------
     names : tuple of str
-    verdicts : tuple of Analysis or MachineAnalysis
+    verdicts : tuple of Analysis
     within : tuple of Tolerated or None
         Chances of stable sliding, of a rig with tolerances.
     differences : tuple of Difference
@@ -78,7 +78,7 @@ class RigComparison(Displayed):
     """
 
     names: tuple[str, str]
-    verdicts: tuple[Verdict, Verdict] = field(repr=False)
+    verdicts: tuple[Findings, Findings] = field(repr=False)
     within: tuple[Tolerated | None, Tolerated | None] = field(repr=False)
     differences: tuple[Difference, ...]
     measure: str
@@ -288,9 +288,9 @@ def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
     return f"{name.rpartition('.')[2]} {words}" if named else words
 
 
-def _factor(one: Verdict) -> float | None:
+def _factor(one: Findings) -> float | None:
     """k/k_cr of a slider, a gain counted with both; None where there is none."""
-    if not isinstance(one, Findings) or one.steady is None:
+    if one.rig.in_forces or one.steady is None:
         return None
     support = support_stiffness(one)
     if support.critical is None or not support.critical + support.beside:
@@ -298,22 +298,22 @@ def _factor(one: Verdict) -> float | None:
     return (support.own + support.beside) / (support.critical + support.beside)
 
 
-def _ratio(one: Verdict) -> str:
+def _ratio(one: Findings) -> str:
     factor = _factor(one)
     return "" if factor is None else f"{factor:.4g}"
 
 
-def _growth(one: Verdict) -> str:
+def _growth(one: Findings) -> str:
     return "" if one.growth_rate is None else format_quantity(one.growth_rate, "1/s")
 
 
-def _period(one: Verdict) -> str:
+def _period(one: Findings) -> str:
     if one.period is None or one.damping_ratio is None:
         return ""
     return f"period {format_quantity(one.period, 's')}, damping ratio {one.damping_ratio:.3g}"
 
 
-def _edge(one: Verdict) -> str:
+def _edge(one: Findings) -> str:
     rows, _ = edge_rows(one)
     return " ".join(rows[0][i] for i in (0, 3)) if rows else ""
 

@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.areas import total
 from steadyslip.core.checks import as_data
+from steadyslip.model.steady_results import SteadyMachine, SteadySliding
 from steadyslip.verdict.support import support_stiffness
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
     from steadyslip.nonlinear.onset.hopf import Onset
-    from steadyslip.verdict.findings import Findings, Verdict
+    from steadyslip.verdict.findings import Findings
 
+_UNITS = ("units", "area")
 _LAST = ("judders", "boundaries", "warnings", "checked", "checks")
 
 
 def as_dict(analysis: Findings) -> dict[str, Any]:
-    """Verdict on a slider as JSON-ready dict, SI units per unit area; NaN and infinite numbers become None."""
-    steady = analysis.steady
+    """Verdict as JSON-ready dict in SI units, of a slider per unit area; NaN and infinite numbers become None."""
     common = common_numbers(analysis)
+    first = ("version", "stable", "on_edge", "undamped", "reason")
+    own = _of_machine if analysis.rig.in_forces else _of_slider
     data: dict[str, Any] = {
-        **{name: common[name] for name in ("version", "stable", "on_edge", "reason")},
-        "steady": None
-        if steady is None
-        else {
-            "velocity": steady.velocity,
-            "normal_stress": steady.normal_stress,
-            "shear_stress": steady.shear_stress,
-            "friction": steady.friction,
-            "spring_stress": steady.spring_stress,
-            "states": steady.states,
-        },
-        "critical_stiffness": analysis.critical_stiffness,
-        "critical_side": analysis.critical_side,
-        "critical_angular_frequency": analysis.critical_angular_frequency,
-        "critical_axial_stiffness": analysis.critical_axial_stiffness,
-        "stable_stiffness": [[low, high] for low, high in analysis.stable_stiffness],
-        **_held_by(analysis),
+        **{name: common[name] for name in first if name in common},
+        "steady": None if analysis.steady is None else _steady(analysis.steady),
+        **own(analysis),
         **{name: value for name, value in common.items() if name not in _LAST},
         "onset": None if analysis.onset is None else onset_dict(analysis.onset),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
@@ -48,6 +38,32 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
         data["forces"] = _forces(analysis, analysis.rig.area)
     found: dict[str, Any] = finite(data)
     return found
+
+
+def _steady(steady: SteadySliding | SteadyMachine) -> dict[str, Any]:
+    """Steady sliding as data: its fields, without the units of a slider's states and its area."""
+    data = asdict(steady)
+    return data if isinstance(steady, SteadyMachine) else {name: data[name] for name in data if name not in _UNITS}
+
+
+def _of_machine(analysis: Findings) -> dict[str, Any]:
+    """Rows of a machine alone: its leading mode, and why it grows."""
+    return {
+        "mode": analysis.mode and analysis.mode.to_dict(),
+        "why_it_grows": analysis.origin and analysis.origin.to_dict(),
+    }
+
+
+def _of_slider(analysis: Findings) -> dict[str, Any]:
+    """Rows of a slider alone: critical and stable stiffnesses."""
+    return {
+        "critical_stiffness": analysis.critical_stiffness,
+        "critical_side": analysis.critical_side,
+        "critical_angular_frequency": analysis.critical_angular_frequency,
+        "critical_axial_stiffness": analysis.critical_axial_stiffness,
+        "stable_stiffness": [[low, high] for low, high in analysis.stable_stiffness],
+        **_held_by(analysis),
+    }
 
 
 def _held_by(analysis: Findings) -> dict[str, Any]:
@@ -71,8 +87,8 @@ def _held_by(analysis: Findings) -> dict[str, Any]:
     }
 
 
-def common_numbers(found: Verdict) -> dict[str, Any]:
-    """Entries that the verdicts on sliders and on machines have in common, as a dict; the order is that of the JSON."""
+def common_numbers(found: Findings) -> dict[str, Any]:
+    """Entries that verdicts on sliders and on machines have in common, as a dict; the order is that of the JSON."""
     late = {
         "characteristic_terms": [{"delay": h, "coefficients": list(c)} for h, c in found.characteristic_terms],
         "unstable_roots": found.unstable_roots,

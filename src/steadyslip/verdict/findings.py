@@ -1,4 +1,4 @@
-"""Results of an analysis as frozen data classes, from which texts and JSON are made."""
+"""What an analysis found, as one frozen data class, from which texts, JSON and figures are made."""
 
 from __future__ import annotations
 
@@ -13,10 +13,6 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.linear.mode_origin import Origin
 from steadyslip.linear.modes import Mode
 from steadyslip.linear.search import Boundary
-from steadyslip.machine.machine import Machine
-from steadyslip.machine.rig import Rig
-from steadyslip.machine.slider import Slider
-from steadyslip.model.steady_results import SteadyMachine, SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset
 
 if TYPE_CHECKING:
@@ -24,13 +20,71 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Verdict(Displayed):
-    """Fields that verdicts on sliders and on machines have in common: stability, eigenvalues, margins, checks."""
+class Findings(Displayed):
+    """Verdict on one rig, a slider or a machine; printing it gives the verdict in words.
 
-    rig: Rig
+    Attributes
+    ----------
+    rig : Slider or Machine
+    stable : bool or None
+        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
+    reason : str
+        Why, in one sentence; of a machine without steady sliding, which contact locks up or lifts off.
+    steady : SteadySliding, SteadyMachine or None
+    eigenvalues : tuple of complex
+        1/s, by falling real part; with a delay the rightmost.
+    characteristic_polynomial, routh : tuple of float
+        Coefficients, lowest power first (theory 3: a0, a1, ...); first column of the Routh array, stable if all are
+        positive. Empty with a delay, for then it is none, and where equations are matrices.
+    characteristic_terms : tuple of (float, tuple of float)
+        With a delay: delays (s) and the polynomials that stand before exp(−s delay), that without delay first.
+    unstable_roots : int or None
+        With a delay, or a structure given by its measured response: how many eigenvalues grow.
+    growth_rate : float or None
+        Largest real part (1/s), inf if ill-posed.
+    period : float or None
+        Of the least damped oscillation (s).
+    damping_ratio : float or None
+        Of that oscillation; negative if it grows.
+    time_to_halve, time_to_double : float or None
+        Of the slowest decay, or of the fastest growth (s).
+    on_edge : bool
+        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
+    undamped : bool
+        Whether nothing damps a machine, its friction included: then no disturbance dies out, and edges are of growth.
+    margins : tuple of Margin
+        Distance of each parameter to its nearest edge, the most critical first.
+    onset : Onset or None
+        Kind of onset at the nearest oscillatory edge: of a slider in stiffness, of a machine in any parameter.
+    kicks : tuple of Threshold
+        Smallest kicks that are not survived, where asked for.
+    critical_stiffness : float or None
+        Of a slider: edge of the stable set nearest to its own stiffness (Pa/m along the sliding direction).
+    critical_side : str or None
+        ``above`` or ``below``: where, next to that edge, sliding is stable.
+    critical_angular_frequency : float or None
+        Of the oscillation at the critical stiffness (rad/s), 0 if it does not oscillate.
+    critical_axial_stiffness : float or None
+        The same edge as stiffness along the axis of spring, rod or press, where the rig gives one (Pa/m).
+    stable_stiffness : tuple of (float, float)
+        Of a slider: all stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
+    mode : Mode or None
+        How a machine moves in the mode that grows fastest, or decays slowest.
+    origin : Origin or None
+        Why that mode grows: what feeds it, and which modes couple. None if it is no oscillation that grows.
+    branch : int
+        Which steady sliding is judged.
+    warnings : tuple of str
+    checks : tuple of Check
+        The second question that was asked of each number. What failed is left out; a verdict that failed has
+        ``stable = None`` and a reason that begins with ``not decided``.
+    """
+
+    rig: Any
     stable: bool | None
-    reason: str
-    margins: tuple[Margin, ...]
+    reason: str = ""
+    margins: tuple[Margin, ...] = ()
+    steady: Any = None  # SteadySliding of a slider, SteadyMachine of a machine
     warnings: tuple[str, ...] = ()
     eigenvalues: tuple[complex, ...] = ()
     characteristic_polynomial: tuple[float, ...] = ()
@@ -45,6 +99,16 @@ class Verdict(Displayed):
     characteristic_terms: tuple[tuple[float, tuple[float, ...]], ...] = ()
     unstable_roots: int | None = None
     checks: tuple[Check, ...] = ()
+    onset: Onset | None = None
+    kicks: tuple[Threshold, ...] = ()
+    critical_stiffness: float | None = None
+    critical_side: str | None = None
+    critical_angular_frequency: float | None = None
+    critical_axial_stiffness: float | None = None
+    stable_stiffness: tuple[tuple[float, float], ...] = ()
+    mode: Mode | None = None
+    origin: Origin | None = None
+    branch: int = 0
     version: str = field(default="", repr=False)
 
     @property
@@ -61,123 +125,5 @@ class Verdict(Displayed):
         """
         from steadyslip.verdict.judder import judder_sentence
 
-        rig: Any = self.rig
         asked = self.stable is False and not self.on_edge and self.growth_rate != math.inf
-        return judder_sentence(rig, self.eigenvalues, getattr(self, "branch", 0)) if asked else ""
-
-
-@dataclass(frozen=True, repr=False)
-class Findings(Verdict):
-    """Verdict on one rig; printing it gives the verdict in words.
-
-    Attributes
-    ----------
-    rig : Slider
-    stable : bool or None
-        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
-    reason : str
-        Why, in one sentence.
-    steady : SteadySliding or None
-    critical_stiffness : float or None
-        Edge of the stable set nearest to the rig's own stiffness (Pa/m along the sliding direction).
-    critical_side : str or None
-        ``above`` or ``below``: where, next to that edge, sliding is stable.
-    critical_angular_frequency : float or None
-        Of the oscillation at the critical stiffness (rad/s), 0 if it does not oscillate.
-    critical_axial_stiffness : float or None
-        The same edge as stiffness along the axis of spring, rod or press, where the rig gives one (Pa/m).
-    stable_stiffness : tuple of (float, float)
-        All stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
-    eigenvalues : tuple of complex
-        1/s, by falling real part.
-    characteristic_polynomial : tuple of float
-        Coefficients, lowest power first (theory 3: a0, a1, ...).
-    routh : tuple of float
-        First column of the Routh array; stable if all are positive.
-    characteristic_terms, unstable_roots
-        With a delay in place of the two before: delays (s) and the polynomials that stand before exp(−s delay), that
-        without delay first; and how many of the infinitely many eigenvalues grow.
-    growth_rate : float or None
-        Largest real part (1/s), inf if ill-posed.
-    period : float or None
-        Of the least damped oscillation (s).
-    damping_ratio : float or None
-        Of that oscillation; negative if it grows.
-    time_to_halve, time_to_double : float or None
-        Of the slowest decay, or of the fastest growth (s).
-    on_edge : bool
-        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
-    onset : Onset or None
-        Kind of onset at the oscillatory edge in stiffness nearest to the rig, None where there is none.
-    kicks : tuple of Threshold
-        Smallest kicks that are not survived, where asked for.
-    margins : tuple of Margin
-        Distance of each parameter to its nearest edge, the most critical first.
-    branch : int
-        Which steady sliding is judged.
-    warnings : tuple of str
-    checks : tuple of Check
-        The second question that was asked of each number. What failed is left out; a verdict that failed has
-        ``stable = None`` and a reason that begins with ``not decided``.
-    """
-
-    rig: Slider
-    steady: SteadySliding | None = None
-    critical_stiffness: float | None = None
-    critical_side: str | None = None
-    critical_angular_frequency: float | None = None
-    critical_axial_stiffness: float | None = None
-    stable_stiffness: tuple[tuple[float, float], ...] = ()
-    branch: int = 0
-    onset: Onset | None = None
-    kicks: tuple[Threshold, ...] = ()
-
-
-@dataclass(frozen=True, repr=False)
-class MachineFindings(Verdict):
-    """Verdict on one machine; printing it gives the verdict in words.
-
-    Attributes
-    ----------
-    rig : Machine
-    stable : bool or None
-        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
-    reason : str
-        Why, in one sentence; without steady sliding, which contact locks up or lifts off.
-    steady : SteadyMachine or None
-    mode : Mode or None
-        How the machine moves in the mode that grows fastest, or decays slowest.
-    origin : Origin or None
-        Why that mode grows: what feeds it, and which modes couple. None if it is no oscillation that grows.
-    eigenvalues : tuple of complex
-        1/s, by falling real part; with a delay the rightmost.
-    characteristic_polynomial, routh : tuple of float
-        Coefficients, lowest power first; first column of the Routh array, stable if all are positive.
-        Empty with a delay, for then it is none.
-    characteristic_terms : tuple of (float, tuple of float)
-        With a delay: delays (s) and the polynomials that stand before exp(−s delay), that without delay first.
-    unstable_roots : int or None
-        With a delay, or a structure given by its measured response: how many eigenvalues grow.
-    growth_rate, period, damping_ratio, time_to_halve, time_to_double : float or None
-        As for a slider.
-    on_edge : bool
-    undamped : bool
-        Whether nothing damps it, its friction included: then no disturbance dies out, and edges are those of growth.
-    onset : Onset or None
-        Kind of onset at the nearest oscillatory edge of all parameters, None where there is none, or with a delay.
-    kicks : tuple of Threshold
-        Smallest kicks that are not survived, where asked for.
-    margins : tuple of Margin
-        Distance of each parameter to its nearest edge, the most critical first.
-    warnings : tuple of str
-    checks : tuple of Check
-        The second question that was asked of each number. What failed is left out; a verdict that failed has
-        ``stable = None`` and a reason that begins with ``not decided``.
-    """
-
-    rig: Machine
-    steady: SteadyMachine | None = None
-    mode: Mode | None = None
-    origin: Origin | None = None
-    onset: Onset | None = None
-    kicks: tuple[Threshold, ...] = ()
+        return judder_sentence(self.rig, self.eigenvalues, self.branch) if asked else ""

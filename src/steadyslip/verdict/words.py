@@ -1,4 +1,4 @@
-"""Text of verdicts: headline, facts, table of nearest edges, warnings."""
+"""Words of verdicts: headline, clauses on disturbances, onset and kicks, table of nearest edges."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import textwrap
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from steadyslip.core.checks import UNDECIDED, in_words
+from steadyslip.core.checks import UNDECIDED
 from steadyslip.core.format import format_quantity
 from steadyslip.core.records import parameters
 from steadyslip.linear.boundary import REMOTE
-from steadyslip.machine.slider import Slider
-from steadyslip.verdict.reasons import NEXT_TO_IT, in_stiffness
-from steadyslip.verdict.support import gain_words, support_stiffness
+from steadyslip.verdict.reasons import NEXT_TO_IT
+from steadyslip.verdict.support import gain_words
 
 if TYPE_CHECKING:
     from steadyslip.laws.friction import FrictionLaw
@@ -21,12 +20,10 @@ if TYPE_CHECKING:
     from steadyslip.linear.search import Boundary
     from steadyslip.nonlinear.kicks.threshold import Threshold
     from steadyslip.nonlinear.onset.hopf import Onset
-    from steadyslip.verdict.findings import Findings, Verdict
+    from steadyslip.verdict.findings import Findings
 
-# Chosen by trial: length of the text against completeness.
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
-MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text
 
 _ONSETS = {
     "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
@@ -65,54 +62,13 @@ def beyond(edge: Boundary) -> str:
     return f"{edge.contact} {words.removeprefix('it ')}" if edge.contact and words.startswith("it ") else words
 
 
-def verdict(analysis: Findings) -> str:
-    """Whole verdict on a slider as text, about 100 columns wide."""
-    return verdict_text(analysis, facts(analysis), margin_table(analysis), meaning(analysis))
-
-
-def verdict_text(analysis: Verdict, known: list[tuple[str, str]], edges: list[str], meant: list[str]) -> str:
-    """Join headline, reason, facts (label, text), edges, checks, remarks and warnings into one text."""
-    lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
-    for name, text in known:
-        lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
-    lines += edges
-    lines += ["", *textwrap.wrap(in_words(analysis.checks), 100, subsequent_indent="  ")] if analysis.checks else []
-    lines += ["", *(line for one in meant for line in textwrap.wrap(one, 120))] if meant else []
-    for text in analysis.warnings:
-        lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
-    return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
-
-
 JUDDERS = "steadyslip simulate shows what it does instead: how often it slips, how far, and with what force."
 """Line on an unstable rig whose motion mass or damping limits, where no slip events were found to repeat."""
 
 
-def instead(analysis: Verdict) -> str:
+def instead(analysis: Findings) -> str:
     """Line on what an unstable rig does instead of sliding steadily."""
     return f"{analysis.judders} (simulated, after a small disturbance)" if analysis.judders else JUDDERS
-
-
-def meaning(analysis: Findings) -> list[str]:
-    """Lines on the limits of the verdict: large kicks if stable, growth without bound if unstable."""
-    if analysis.stable is None or analysis.on_edge:
-        return []
-    if analysis.stable:
-        kicked = "A large enough kick may still start an oscillation or a run-away."
-        lines = [f"Stable means: small disturbances die out. {kicked}"]
-        if not analysis.kicks:
-            lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
-        return lines if analysis.onset is not None or analysis.kicks else lines[:1]
-    if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away() and not _limited(analysis.rig):
-        return [
-            "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
-            "steadyslip simulate shows which.",
-        ]
-    return [] if analysis.growth_rate == math.inf else [instead(analysis)]
-
-
-def _limited(rig: Slider) -> bool:
-    """True if mass or damping keeps velocity finite."""
-    return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.dashpot()))
 
 
 HEADLINES = {
@@ -126,7 +82,7 @@ HEADLINES = {
 """First line of a verdict: the part in capitals, and the rest; pages use the same words."""
 
 
-def headline(analysis: Verdict, capitals: bool = True) -> str:
+def headline(analysis: Findings, capitals: bool = True) -> str:
     """First line of a verdict: stable, unstable, on the edge, not decided, or no steady sliding; with the speed."""
     drive = analysis.rig.parameters()["drive.velocity"]
     speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
@@ -139,58 +95,9 @@ def headline(analysis: Verdict, capitals: bool = True) -> str:
     return (first.upper() if capitals else first) + rest.format(speed=f"at {speed}")
 
 
-def is_undecided(analysis: Verdict) -> bool:
+def is_undecided(analysis: Findings) -> bool:
     """True if there is no verdict because one of its checks failed."""
     return analysis.reason.startswith(UNDECIDED)
-
-
-def _stress(analysis: Findings, value: float) -> str:
-    area = analysis.rig.area
-    return (
-        format_quantity(value, "Pa")
-        if area is None
-        else f"{format_quantity(value * area, 'N')} ({format_quantity(value, 'Pa')})"
-    )
-
-
-def facts(analysis: Findings) -> list[tuple[str, str]]:
-    """Rows (label, text) on steady sliding, small disturbances, stable stiffnesses, onset and kicks of a slider."""
-    steady = analysis.steady
-    if steady is None:
-        return []
-    force = "force" if analysis.rig.area is not None else "stress"
-    rows = [
-        (
-            "steady sliding",
-            f"normal {force} {_stress(analysis, steady.normal_stress)}, "
-            f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}",
-        ),
-        *_pull(analysis.rig),
-        ("a disturbance", disturbance(analysis)),
-        ("stable for", _stable_set(analysis)),
-    ]
-    beta = analysis.critical_angular_frequency
-    if beta:
-        rows.append(("at the edge", f"oscillation with period {format_quantity(2 * math.pi / beta, 's')}"))
-    if analysis.critical_axial_stiffness is not None:
-        rows.append(
-            ("along the axis", f"critical stiffness {in_stiffness(analysis, analysis.critical_axial_stiffness)}")
-        )
-    rows += stable_speeds(analysis)
-    if analysis.onset is not None:
-        rows.append(("onset", onset_words(analysis.onset)))
-    return rows + [("a kick", threshold_words(kick)) for kick in analysis.kicks]
-
-
-def _pull(rig: Slider) -> list[tuple[str, str]]:
-    """Row (label, text) on what T, the force that presses a contact, contains; none if the spring alone."""
-    control = [rig.drive.proportional(), rig.drive.dashpot(), rig.drive.integral()]
-    inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
-    pulling = [f"the {name}" for name, there in inside.items() if there]
-    if (pulling == ["the spring"] and not rig.radiation_damping) or not rig.contact.follows_spring():
-        return []
-    text = f"the normal force follows T, the pull of {' and '.join(pulling)}"
-    return [("the pull T", text + ("; radiation damping is not in it" if rig.radiation_damping else ""))]
 
 
 def unlikely_speed(what: str, speed: float, friction: FrictionLaw) -> tuple[str, ...]:
@@ -206,7 +113,7 @@ def unlikely_speed(what: str, speed: float, friction: FrictionLaw) -> tuple[str,
     )
 
 
-def stable_speeds(analysis: Verdict) -> list[tuple[str, str]]:
+def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
     """Row (label, text) of all drive velocities at which sliding is stable; none if there is one edge at most."""
     margin = next((one for one in analysis.margins if one.parameter == "drive.velocity"), None)
     if margin is None or len(margin.edges) < 2:
@@ -276,7 +183,7 @@ def threshold_words(kick: Threshold) -> str:
     return f"survives {what} {survived}; {why} from there to {amount}{edge}{reason}; {after}"
 
 
-def disturbance(analysis: Verdict) -> str:
+def disturbance(analysis: Findings) -> str:
     """Clause on a small disturbance: time to double or halve, period and damping ratio."""
     if analysis.growth_rate == math.inf:
         return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
@@ -299,35 +206,13 @@ def disturbance(analysis: Verdict) -> str:
     return text if analysis.on_edge else f"{text} without oscillating"
 
 
-def _stable_set(analysis: Findings) -> str:
-    support = support_stiffness(analysis)
-    parts = []
-    for low, high in support.stable:
-        if low == 0 and high == math.inf:
-            parts.append(f"every {support.words}{' above zero' if analysis.on_edge else ''}")
-        elif high == math.inf:
-            parts.append(f"{support.words} above {in_stiffness(analysis, low)}")
-        elif low == 0:
-            parts.append(f"{support.words} below {in_stiffness(analysis, high)}")
-        else:
-            parts.append(f"{support.words} from {in_stiffness(analysis, low)} to {in_stiffness(analysis, high)}")
-    if len(parts) > MOST_WINDOWS:  # list those around the rig's own stiffness, or the lowest
-        at = next((i for i, (low, high) in enumerate(support.stable) if low < support.own < high), 0)
-        first = max(0, min(at - MOST_WINDOWS // 2, len(parts) - MOST_WINDOWS))
-        more = f"{len(parts) - MOST_WINDOWS} windows more, see stable_stiffness"
-        parts = [*parts[first : first + MOST_WINDOWS], more]
-    if not parts and analysis.characteristic_terms and analysis.stable:
-        return f"windows of {support.words} too many to be listed"
-    return ", or ".join(parts) or f"no {support.words}"
-
-
-def edge_rows(analysis: Verdict) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
+def edge_rows(analysis: Findings) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
     """Rows (name, value, edge, change, what happens beyond) of parameters with an edge; names of those without."""
     rows = [_margin_row(analysis, margin, margin.edge) for margin in analysis.margins if margin.edge is not None]
     return rows, [margin.parameter for margin in analysis.margins if margin.edge is None]
 
 
-def margin_table(analysis: Verdict) -> list[str]:
+def margin_table(analysis: Findings) -> list[str]:
     """Lines of the table of nearest edges, one parameter varied at a time; those beyond a factor `REMOTE` last."""
     if not analysis.margins:
         return []
@@ -348,7 +233,7 @@ def margin_table(analysis: Verdict) -> list[str]:
     return lines
 
 
-def _margin_row(analysis: Verdict, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:
+def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:
     """Row of the table of nearest edges: name, value, edge, change and what happens beyond."""
     if margin.unit == "rad":
         change = f"{math.degrees(margin.absolute):+.4g} deg"

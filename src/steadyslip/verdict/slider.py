@@ -1,0 +1,169 @@
+"""What a verdict says of sliders alone: stresses, pull of the spring, stable stiffnesses, warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.core.areas import stress_name
+from steadyslip.core.checks import Check
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.format import format_quantity
+from steadyslip.linear.stiffness import set_of_one
+from steadyslip.machine.slider import Slider
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.steady_results import SteadySliding
+from steadyslip.verdict.checks import critical_check
+from steadyslip.verdict.numbers import linear_numbers
+from steadyslip.verdict.reasons import in_stiffness
+from steadyslip.verdict.support import support_stiffness
+from steadyslip.verdict.words import instead, unlikely_speed
+
+if TYPE_CHECKING:
+    from steadyslip.verdict.findings import Findings
+
+MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text; chosen by trial, length against completeness
+
+
+def numbers_of(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
+    """Fields of a verdict that follow from the characteristic equation and from the stable set in stiffness."""
+    return linear_numbers(point) | stiffness_numbers(rig, point)
+
+
+def stiffness_numbers(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
+    """Fields of a verdict on stiffness: stable intervals (Pa/m) and the edge nearest to the rig's own stiffness."""
+    try:
+        found = set_of_one(point)
+    except NotAvailable:  # a delay makes windows without end
+        return {}
+    own = float(point.named()["slider.stiffness"])
+    intervals = found.intervals[np.all(np.isfinite(found.intervals[:, :1]), axis=-1)]
+    numbers: dict[str, Any] = {"stable_stiffness": tuple((float(a), float(b)) for a, b in intervals)}
+    at = np.flatnonzero(found.changes)
+    if at.size:
+        i = at[np.argmin(np.abs(found.edges[at] - own))]
+        critical, beta = float(found.edges[i]), float(found.frequencies[i])
+        numbers["critical_stiffness"] = critical
+        numbers["critical_angular_frequency"] = beta if math.isfinite(beta) else None
+        numbers["critical_side"] = "above" if np.any(intervals[:, 0] == critical) else "below"
+        if rig.axial_stiffness is not None:
+            numbers["critical_axial_stiffness"] = critical / float(point.axial_share)
+    return numbers
+
+
+def checked_stiffness_numbers(rig: Slider, point: OperatingPoint) -> tuple[dict[str, Any], tuple[Check, ...]]:
+    """`stiffness_numbers`, and the check of the critical stiffness; what fails it is left out."""
+    numbers = stiffness_numbers(rig, point)
+    if numbers.get("critical_angular_frequency") is None:
+        return numbers, ()
+    found = critical_check(point, numbers["critical_stiffness"], numbers["critical_angular_frequency"])
+    if found.passed:
+        return numbers, (found,)
+    return {name: one for name, one in numbers.items() if not name.startswith("critical_")}, (found,)
+
+
+def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
+    """Rows (label, text) on steady sliding, and on what T, the force that presses the contact, contains."""
+    force = "force" if analysis.rig.area is not None else "stress"
+    steady = analysis.steady
+    text = (
+        f"normal {force} {_stress(analysis, steady.normal_stress)}, "
+        f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}"
+    )
+    return [("steady sliding", text), *_pull(analysis.rig)]
+
+
+def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
+    """Rows (label, text) on stable stiffnesses and the critical one."""
+    rows = [("stable for", _stable_set(analysis))]
+    if beta := analysis.critical_angular_frequency:
+        rows.append(("at the edge", f"oscillation with period {format_quantity(2 * math.pi / beta, 's')}"))
+    if (axial := analysis.critical_axial_stiffness) is not None:
+        rows.append(("along the axis", f"critical stiffness {in_stiffness(analysis, axial)}"))
+    return rows
+
+
+def _stress(analysis: Findings, value: float) -> str:
+    area = analysis.rig.area
+    return (
+        format_quantity(value, "Pa")
+        if area is None
+        else f"{format_quantity(value * area, 'N')} ({format_quantity(value, 'Pa')})"
+    )
+
+
+def _pull(rig: Slider) -> list[tuple[str, str]]:
+    """Row (label, text) on what T, the force that presses a contact, contains; none if the spring alone."""
+    control = [rig.drive.proportional(), rig.drive.dashpot(), rig.drive.integral()]
+    inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
+    pulling = [f"the {name}" for name, there in inside.items() if there]
+    if (pulling == ["the spring"] and not rig.radiation_damping) or not rig.contact.follows_spring():
+        return []
+    text = f"the normal force follows T, the pull of {' and '.join(pulling)}"
+    return [("the pull T", text + ("; radiation damping is not in it" if rig.radiation_damping else ""))]
+
+
+def _stable_set(analysis: Findings) -> str:
+    support = support_stiffness(analysis)
+    parts = []
+    for low, high in support.stable:
+        if low == 0 and high == math.inf:
+            parts.append(f"every {support.words}{' above zero' if analysis.on_edge else ''}")
+        elif high == math.inf:
+            parts.append(f"{support.words} above {in_stiffness(analysis, low)}")
+        elif low == 0:
+            parts.append(f"{support.words} below {in_stiffness(analysis, high)}")
+        else:
+            parts.append(f"{support.words} from {in_stiffness(analysis, low)} to {in_stiffness(analysis, high)}")
+    if len(parts) > MOST_WINDOWS:  # list those around the rig's own stiffness, or the lowest
+        at = next((i for i, (low, high) in enumerate(support.stable) if low < support.own < high), 0)
+        first = max(0, min(at - MOST_WINDOWS // 2, len(parts) - MOST_WINDOWS))
+        more = f"{len(parts) - MOST_WINDOWS} windows more, see stable_stiffness"
+        parts = [*parts[first : first + MOST_WINDOWS], more]
+    if not parts and analysis.characteristic_terms and analysis.stable:
+        return f"windows of {support.words} too many to be listed"
+    return ", or ".join(parts) or f"no {support.words}"
+
+
+def meaning(analysis: Findings) -> list[str]:
+    """Lines on the limits of a decided verdict: large kicks if stable, growth without bound if unstable."""
+    if analysis.stable:
+        kicked = "A large enough kick may still start an oscillation or a run-away."
+        lines = [f"Stable means: small disturbances die out. {kicked}"]
+        if not analysis.kicks:
+            lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
+        return lines if analysis.onset is not None or analysis.kicks else lines[:1]
+    if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away() and not _limited(analysis.rig):
+        return [
+            "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
+            "steadyslip simulate shows which.",
+        ]
+    return [] if analysis.growth_rate == math.inf else [instead(analysis)]
+
+
+def _limited(rig: Slider) -> bool:
+    """True if mass or damping keeps velocity finite."""
+    return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.dashpot()))
+
+
+def warnings(analysis: Findings, states: Sequence[SteadySliding]) -> Iterator[str]:
+    """Warnings: several steady states, speed, no memory in the friction law, friction that is not positive."""
+    rig, steady = analysis.rig, states[analysis.branch]
+    if len(states) > 1:
+        stresses = [format_quantity(one.normal_stress, "Pa", area=rig.area) for one in states]
+        yield (
+            f"steady sliding is possible at {len(states)} values of {stress_name('normal stress', rig.area)} "
+            f"({', '.join(stresses)}); this verdict is for the one at {stresses[analysis.branch]}"
+        )
+    yield from unlikely_speed("the drive's velocity is", float(rig.drive.velocity), rig.friction)
+    if not rig.friction.memory() and rig.friction.lateness() == 0:
+        yield (
+            "this friction law has no memory of sliding, so it cannot predict a critical stiffness; "
+            "use a law with memory"
+        )
+    if steady.friction <= 0:
+        level = "".join(f"{name.rpartition('.')[2]} and " for name in rig.of_kind("friction level"))
+        yield f"the friction coefficient in steady sliding is not positive; check {level}the velocity"

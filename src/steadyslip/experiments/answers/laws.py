@@ -17,9 +17,11 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
 from steadyslip.experiments.fitting.fit import refit_from, search_fit
+from steadyslip.experiments.fitting.loading_words import enumerated
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.words import short_names
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
@@ -61,7 +63,11 @@ class LawComparison(Displayed):
 
     @property
     def best(self) -> str:
-        """Label of the model with the least BIC, which penalises additional parameters."""
+        """Label of the model with the least BIC, which penalises additional parameters.
+
+        One that is ahead by taking what the records leave open to be none (a memory of normal stress) comes behind the
+        next that frees it.
+        """
         return next(iter(self.fits))
 
     @property
@@ -96,18 +102,25 @@ class LawComparison(Displayed):
         best, *others = self.fits
         if not others:
             return ""
-        own, next_best = self.fits[best], self.fits[others[0]]
-        ahead = self.criteria[others[0]][1] - self.criteria[best][1]
+        other = others[0]
+        own, next_best = self.fits[best], self.fits[other]
+        ahead = self.criteria[other][1] - self.criteria[best][1]
         times = next_best.ssq / own.ssq
         less = (
             f"{times:.3g} times the sum of squares" if times > MIN_SHOWN_RATIO else f"a sum of squares {times - 1:+.2%}"
         )
+        if taken := _taken_as_none(next_best) & set(own.names):
+            return (
+                f"'{best}' it is, though the records do not tell {enumerated(sorted(taken))}: '{other}' has {less} and "
+                f"is {abs(ahead):.1f} {'behind' if ahead > 0 else 'ahead'} in BIC, and takes that to be none; "
+                f"{_agreement(own, next_best)}."
+            )
         if ahead < STRONG_EVIDENCE:
             return (
-                f"The records hardly tell '{best}' from '{others[0]}', which has {less} "
-                f"and is {ahead:.1f} behind in BIC; what both agree on may be relied on."
+                f"The records hardly tell '{best}' from '{other}', which has {less} and is {ahead:.1f} behind in BIC; "
+                f"{_agreement(own, next_best)}."
             )
-        return f"'{best}' it is: '{others[0]}', the next, has {less} and is {ahead:.1f} behind in BIC."
+        return f"'{best}' it is: '{other}', the next, has {less} and is {ahead:.1f} behind in BIC."
 
     def plot(self, ax: Any = None) -> Any:
         """Draw each law's difference from the best.
@@ -117,6 +130,22 @@ class LawComparison(Displayed):
         matplotlib.axes.Axes
         """
         return draw(self, ax=ax)
+
+
+def _taken_as_none(one: Fit) -> set[str]:
+    """Parameters that a fit lacks and that would change what it has, so that they leave it open."""
+    return {name for own in one.unidentified for name in own.weights} - set(one.names)
+
+
+def _agreement(one: Fit, other: Fit) -> str:
+    """Clause on the numbers on which two fits agree: both are determined, and each is in the other's interval."""
+    both = {own.name for own in (*one.estimates, *one.derived)}
+    pairs = [(one[e.name], e) for e in (*other.estimates, *other.derived) if e.name in both and e.unit != "s"]
+    agreed = [a.name for a, b in pairs if a.determined and b.determined and a.low <= b.value <= a.high
+              and b.low <= a.value <= b.high]  # fmt: skip
+    if len(agreed) == len(pairs):
+        return "they agree on all numbers that both have"
+    return f"they agree on {enumerated(short_names(tuple(agreed)))} only" if agreed else "they agree on no number"
 
 
 @checked()
@@ -144,7 +173,7 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
     slip               6     1.56072e-05   0.0    0.0   0.500
     the same           6     1.56072e-05   0.0    0.0   0.500
     The records hardly tell 'slip' from 'the same', which has a sum of squares +0.00% and is 0.0 behind
-    in BIC; what both agree on may be relied on.
+    in BIC; they agree on all numbers that both have.
     """
     if len(fits) < 2:
         raise ParameterError([Problem("fits", f"got {len(fits)}; allowed: two or more")])
@@ -162,6 +191,9 @@ def _in_order(fits: Mapping[str, Fit]) -> LawComparison:
     best = min(fits.values(), key=lambda f: f.ssq)
     criteria = {label: one.criteria(best.noise) for label, one in fits.items()}
     order = sorted(fits, key=lambda label: criteria[label][1])
+    taken = _taken_as_none(fits[order[0]])
+    if freed := next((label for label in order if taken & set(fits[label].names)), None):
+        order.insert(0, order.pop(order.index(freed)))
     return LawComparison({label: fits[label] for label in order}, {label: criteria[label] for label in order})
 
 

@@ -308,4 +308,5 @@ def fit_with_errors(
     if search.converged:
         covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
         undetermined += opened
-    return Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)
+    fit = Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)
+    return fit.with_memories()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -13,9 +13,10 @@ from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fitted import Fitted
+from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
-from steadyslip.experiments.fitting.remedies import Remedy, remedies
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedies
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
@@ -66,13 +67,44 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """Short fits with other laws, a lag or a trend, the best first; empty if residuals have no structure."""
-        return remedies(self.plan, self.ssq, self.values) if self.whiteness.p < STRUCTURE else ()
+        """Short fits with other laws, a lag or a trend, the best first, where residuals have structure.
+
+        Where they have none, those with memories of normal stress that fit as well as none, if the stress changes.
+        """
+        if self.whiteness.p < STRUCTURE:
+            return remedies(self.plan, self.ssq, self.values)
+        return tuple(one.remedy for one in self._equal_memories())
+
+    def with_memories(self) -> Self:
+        """The same fit, without an error of what a memory of normal stress that fits as well moves far.
+
+        Where one fits better, the text says so, as it does where residuals have structure.
+        """
+        if not (forgets_changes(self.plan) and self.search.converged) or self.whiteness.p < STRUCTURE:
+            return self
+        rivals = self._equal_memories()
+        equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
+        lost, found = opened(self.space, self._deviations, equal if len(equal) == len(rivals) else [])
+        covariance = self.covariance.copy()
+        covariance[lost, :] = covariance[:, lost] = 0.0
+        covariance[lost, lost] = np.inf
+        same = replace(self, covariance=covariance, unidentified=self.unidentified + found)
+        same.__dict__["remedies"] = tuple(one.remedy for one in rivals)
+        return same
 
     def with_variants(self) -> Self:
         """The same fit, with the short refits computed that its text tells, so that printing searches nothing."""
         _ = self.as_measured, self.as_ramps, self.remedies
         return self
+
+    def _equal_memories(self) -> list[Rival]:
+        parts = zip(self.comparison.slices, self.noise, strict=True)
+        independent = sum((where.stop - where.start) / max(noise.inflation, 1.0) for where, noise in parts)
+        return equal_memories(self.plan, self.ssq, self.values, self._deviations, independent)
+
+    @property
+    def _deviations(self) -> Array:
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:

@@ -109,14 +109,16 @@ def _changed(plan: Plan) -> Iterator[Plan]:
     pressed = plan.pressed and any(record.stress_changes for record in plan.records)
     memories = {word for own in law.decided_by_stress.values() for word in own}
     choices = [*product(*law.decided_by_stress.values())] if pressed else []
-    forms = sorted((word for word in words if word not in memories), key=lambda word: len(_with(plan, [word]).free))
+    forms = sorted(
+        (word for word in words if word not in memories), key=lambda word: len(with_words(plan, [word]).free)
+    )
     for form, memory in product(forms, choices or [()]):
-        yield _with(plan, [form, *memory])
+        yield with_words(plan, [form, *memory])
     if plan.trend < MAX_TREND:
         yield replace(plan, trend=plan.trend + 1)
 
 
-def _with(plan: Plan, words: Sequence[str]) -> Plan:
+def with_words(plan: Plan, words: Sequence[str]) -> Plan:
     """Plan with the alternative of its law that words name; what that has besides is free."""
     law: FrictionLaw = plan.rig.friction
     known = law.alternatives()
@@ -138,12 +140,19 @@ def _fitted(own: Plan, plan: Plan, ssq: float, size: int, values: Mapping[str, f
             best = find_minimum(own, TRIAL_STARTS, effort, None)
     except NotAvailable:
         return None
-    r = best.comparison.residuals(best.coordinates[None])[0][0]
-    parts = [r[where] for where in best.comparison.slices]
+    return remedy(plan, own, best.comparison, best.coordinates, ssq, size)
+
+
+def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, size: int) -> Remedy:
+    """Remedy at a minimum of the plan `own`, in place of one of `plan` with `size` unknowns and the given `ssq`."""
+    space = comparison.space
+    r = comparison.residuals(z[None])[0][0]
+    parts = [r[where] for where in comparison.slices]
     worth = sum(len(part) / max(describe(part).inflation, 1.0) for part in parts)
-    gain = worth * float(np.log(ssq / best.ssq)) - (len(space) - size) * float(np.log(max(worth, 2.0)))
-    ends = dict(zip((one.name for one in space.unknowns), map(float, space.values(best.coordinates)), strict=True))
-    return Remedy(_choice(plan, own), best.ssq, gain, whiteness(parts).p, ends)
+    least = float(r @ r)
+    gain = worth * float(np.log(ssq / least)) - (len(space) - size) * float(np.log(max(worth, 2.0)))
+    ends = dict(zip((one.name for one in space.unknowns), map(float, space.values(z)), strict=True))
+    return Remedy(_choice(plan, own), least, gain, whiteness(parts).p, ends)
 
 
 def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float]) -> FoundMinimum:

@@ -13,9 +13,10 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.loading_words import enumerated, loading_warnings, own_rate
+from steadyslip.experiments.fitting.memories import forgets_changes
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
@@ -124,7 +125,7 @@ def _left_out(fit: FitNumbers) -> list[str]:
 
 def warnings(fit: FitNumbers) -> list[str]:
     """Warnings on a fit, each a sentence, that a reader must know before using the numbers."""
-    found = [str(one) for one in fit.unidentified]
+    found = [str(one) for one in fit.unidentified] + _open_memory(fit)
     if fit.search.cut:
         found.append(_cut_off(fit))
     elif not fit.search.converged:
@@ -232,27 +233,71 @@ def _structure(fit: FitNumbers) -> list[str]:
     """Warning on structure in the residuals, or on a normal stress that this law does not remember; what mends it."""
     plan = fit.plan
     changing = [record.source for record in plan.records if record.stress_changes]
-    forgets = bool(changing) and plan.pressed and plan.rig.friction.forgets_stress()
+    forgets = forgets_changes(plan)
     said = f"the normal stress changes in {enumerated(changing)}, and this law has no memory of it"
-    if fit.whiteness.p >= STRUCTURE:
-        return [f"{said}; residuals are noise, which speaks for none"] if forgets else []
+    best = next(iter(fit.remedies), None)
+    if fit.whiteness.p >= STRUCTURE and (best is None or best.gain < STRONG_EVIDENCE):
+        return [f"{said}; {_equal_memories(fit)}"] if forgets else []
     if not forgets:
         said = f"residuals have structure (whiteness {_chance(fit.whiteness.p)})"
-    best = next(iter(fit.remedies), None)
     if best is None or best.gain < STRONG_EVIDENCE:
         tried = "; ".join(one.choice for one in fit.remedies)
         return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
-    added = [f"{n.partition('.')[2] or n} {x:.3g}" for n, x in best.values.items()
-             if n not in fit.values and not n.startswith(("step.", "jump."))]  # fmt: skip
-    moved = [f"{_symbol(n)} {best.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
-             if n in best.values and fit.values.get(n)]  # fmt: skip
-    asked = f"{best.choice} ({', '.join(added)})" if added else best.choice
+    asked, moved = _asked(fit, best), _moved(fit, best)
     rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {_chance(best.p)})"
     return [
         f"{said}: with {asked} the sum of squares is "
         f"{best.ssq / fit.ssq:.2g} of this, BIC {best.gain:.0f} less, {', '.join([rest, *moved])}; "
         "do not use these numbers, and ask for that with --set or in the file of the fit (lab_rig and fit in Python)"
     ]
+
+
+def _asked(fit: FitNumbers, one: Remedy) -> str:
+    """What to ask for, with the values of what it adds."""
+    added = [f"{n.partition('.')[2] or n} {x:.3g}" for n, x in one.values.items()
+             if n not in fit.values and not n.startswith(("step.", "jump."))]  # fmt: skip
+    return f"{one.choice} ({', '.join(added)})" if added else one.choice
+
+
+def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
+    """Relative changes of the parameters of the law and of the stiffness."""
+    return [f"{_symbol(n)} {one.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
+            if n in one.values and fit.values.get(n)]  # fmt: skip
+
+
+def _equal_memories(fit: FitNumbers) -> str:
+    """Clause on the memories of normal stress with which the fit is as good, of a law that has none."""
+    if not fit.remedies:
+        return "residuals are noise, and with a memory the fit is worse, which speaks for none"
+    before = _weakening(fit, fit.values)
+    best = max(fit.remedies, key=lambda one: abs(_weakening(fit, one.values) - before))
+    after = _weakening(fit, best.values)
+    sign = ", so that not even its sign is determined" if before * after < 0 else ""
+    return (
+        f"it takes that to be none; the record is fitted as well with {_asked(fit, best)}, where a - b is {after:.2g} "
+        f"in place of {before:.2g}{sign}, {', '.join(_moved(fit, best))}; ask for that with --set (lab_rig in Python)"
+    )
+
+
+def _open_memory(fit: FitNumbers) -> list[str]:
+    """What would tell a memory of normal stress that is open."""
+    lost = {name for one in fit.unidentified for name in one.weights if "normal_memory." in name}
+    if not lost:
+        return []
+    return [
+        f"changes of normal stress alone do not tell {enumerated(sorted(lost))} from the rest of the law: fit a record "
+        "with steps of velocity of the same rock along, or give (fix) what is known of the memory"
+    ]
+
+
+def _weakening(fit: FitNumbers, values: dict[str, float]) -> float:
+    """a − b (a less all b) of the first record, from the values of unknowns."""
+    rig = fit.rig(0)
+    gain, loss = (
+        sum(values.get(n, values.get(f"{n}@1", rig.value(n) or 0.0)) for n in rig.of_kind(kind))
+        for kind in ("direct effect", "evolution effect")
+    )
+    return float(gain - loss)
 
 
 def _drained_at_once(fit: FitNumbers) -> list[str]:

@@ -1,0 +1,129 @@
+"""Memories of normal stress with which a law that has none fits as well: what they change is not determined.
+
+A step of normal stress is answered by the memory (α) and by a, b, d_c and the spring together. A law without a memory
+takes α to be 0, and then tells the others with small errors that hold only if α is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.experiments.fitting.effort import Budget, Effort
+from steadyslip.experiments.fitting.estimates import LEAST_CHANGE, Combination, combination, is_time
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.remedies import Remedy, remedy, with_words
+from steadyslip.experiments.fitting.unknowns import Space
+from steadyslip.experiments.numerics.least_squares import minimise
+
+SIZES = (0.5, 1.0, 1.5, 2.5)  # natural sizes of a memory that are tried: α .1 to .5, as laboratories find
+AS_GOOD = 3.84  # rise of −2 log likelihood up to which a fit is as good: 95 %
+FAR = 4.0  # errors by which a memory moves what is then not determined: its error is less than half of what it must be
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Minimum with a memory of normal stress of one size, which fits as well as none.
+
+    Attributes
+    ----------
+    remedy : Remedy
+    space : Space
+        Unknowns of the law with the memory.
+    moved : ndarray (p,)
+        Its coordinates less those without a memory.
+    """
+
+    remedy: Remedy
+    space: Space
+    moved: Array
+
+    def far(self, space: Space, deviations: Array) -> Array:
+        """Mask (p,) of the unknowns without a memory that it moves far beyond their errors, if they have any."""
+        moved = {u.name: abs(x) for u, x in zip(self.space.unknowns, self.moved, strict=True) if not is_time(u)}
+        own = np.array([moved.get(u.name, 0.0) for u in space.unknowns])
+        return np.asarray((own > LEAST_CHANGE) & ((own > FAR * deviations) | ~np.isfinite(deviations)))
+
+
+def forgets_changes(plan: Plan) -> bool:
+    """True if the normal stress changes in a record, drives the contact, and the law has no memory of it."""
+    changes = any(record.stress_changes for record in plan.records)
+    return changes and plan.pressed and bool(plan.rig.friction.forgets_stress())
+
+
+def equal_memories(
+    plan: Plan, ssq: float, values: Mapping[str, float], deviations: Array, independent: float
+) -> list[Rival]:
+    """Minima with a memory of normal stress held at each of several sizes, that fit as well as none and change much.
+
+    Parameters
+    ----------
+    plan : Plan
+    ssq : float
+        Sum of squares of the fit of the plan itself.
+    values : mapping of str to float
+        Values of that fit, by name of the unknown.
+    deviations : ndarray (p,)
+        Standard deviations of its coordinates.
+    independent : float
+        Number of independent samples in its residuals.
+    """
+    space, most = plan.space(), ssq * np.exp(AS_GOOD / independent)
+    found = [one for own in _with_memory(plan) for one in _rivals(plan, own, ssq, values)]
+    found = [one for one in found if one.remedy.ssq < most and np.any(one.far(space, deviations))]
+    return sorted(found, key=lambda one: -one.remedy.gain)
+
+
+def _with_memory(plan: Plan) -> Iterator[Plan]:
+    for words in product(*plan.rig.friction.decided_by_stress.values()) if forgets_changes(plan) else ():
+        own = with_words(plan, words)
+        if not own.rig.friction.forgets_stress():
+            yield own
+
+
+def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float]) -> Iterator[Rival]:
+    space, addresses = own.space(), own.rig.parameters()
+    idle, tried = np.zeros(len(space)), np.zeros(len(space))
+    for i, one in enumerate(space.unknowns):
+        known = values[one.name] if one.name in values else addresses[one.parameter].value
+        none = addresses[one.parameter].role.idle if one.name not in values else None
+        if none is not None:
+            known, tried[i] = none, 1.0 if none < one.high else -1.0
+        idle[i] = float(one.coordinate(known))
+    budget = Budget.of_fit(sum(map(len, own.records)), len(space))
+    comparison = own.comparison(Effort(budget=budget))
+    begin, held = idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1))
+    low, high = np.transpose([one.bounds for one in space.unknowns])
+    ends = minimise(lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=budget.part(np.inf))
+    for z in ends.coordinates[np.isfinite(ends.ssq)]:
+        yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - idle)
+
+
+def opened(space: Space, deviations: Array, rivals: list[Rival]) -> tuple[Array, tuple[Combination, ...]]:
+    """Mask (p,) of what a memory of equal fit moves far beyond its error, and the combination that it leaves open.
+
+    Parameters
+    ----------
+    space : Space
+        Unknowns of the law without a memory.
+    deviations : ndarray (p,)
+        Their standard deviations, in coordinates.
+    rivals : list of Rival
+    """
+    lost, best = np.zeros(len(space), dtype=bool), (-np.inf, 0.0)
+    found: tuple[Combination, ...] = ()
+    own = [u.name for u in space.unknowns]
+    for one in rivals:
+        far = one.far(space, deviations)
+        lost |= far
+        names = {name for name, is_far in zip(own, far, strict=True) if is_far}
+        inside, added = (np.array([u.name in some for u in one.space.unknowns]) for some in (names, own))
+        reach = (-len(one.space), float(np.linalg.norm(one.moved[inside])))  # of the simplest memory, the furthest
+        if reach > best:
+            direction = np.where(inside | ~added, one.moved, 0.0)
+            best, found = reach, (combination(direction, float(np.linalg.norm(direction)), one.space, direction != 0),)
+    return lost, found

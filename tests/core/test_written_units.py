@@ -1,6 +1,7 @@
 """Rigs, their results and figures are told in the units of the file that the rig was read from."""
 
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -47,6 +48,26 @@ def test_texts_of_results_keep_the_units_of_the_file(axis):
     assert "N/um" in str(ss.boundary(axis, "stiffness")[0])
     assert "mm/min" in str(ss.simulate(axis, until=0.1))
     assert "mm/min" not in str(ss.analyze(plain(axis)))
+
+
+def test_friction_per_load_is_told_at_the_load_that_was_named(axis):
+    told = str(ss.analyze(axis))
+    assert "bristle_damping" in told
+    assert re.search(r"bristle_damping +0 N s/mm at 3\.2 kN +-> [\d.]+ N s/mm at 3\.2 kN", told)
+    assert " s/m " not in told
+
+
+def test_stored_results_are_told_in_them(axis, tmp_path):
+    over = {"stiffness": ["10 N/um", "14 N/um"]}  # totals, as in the file
+    found, run = ss.run_map(ss.Map(axis, over), tmp_path / "map.zarr"), ss.simulate(axis, until=0.1)
+    assert found.dataset["slider.stiffness"].values * 0.02 == pytest.approx([10e6, 14e6])
+    run.save(tmp_path / "run.nc")
+    for one, again in ((found, ss.open_map(tmp_path / "map.zarr")), (run, ss.load_history(tmp_path / "run.nc"))):
+        assert str(again) == str(one)
+        assert set(again.rig.written_in) >= {"N/um", "mm/min", "N/um at 3.2 kN"}
+    assert "N/um" in str(found)
+    with pytest.raises(ss.ParameterError, match="has the wrong dimension"):
+        ss.Map(axis, {"stiffness": ["10 N"]})
 
 
 def test_units_are_no_part_of_the_value_and_leak_nowhere(axis):

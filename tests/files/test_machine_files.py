@@ -315,6 +315,22 @@ def test_the_feed_of_any_body_is_the_velocity_of_its_drive(tmp_path):
     assert ss.rig_from_text(ss.rig_to_text(fed)) == fed
 
 
+def test_a_verdict_tells_the_speed_of_the_body_whose_feed_was_given():
+    fed = ss.rig_from_text(
+        FEED.replace("600 N m/rad", "20 N m/rad").replace("1 mm/s", "3 mm/s") + 'kd = "0.1 N m s/rad"'
+    )
+    edge = next(one for one in ss.analyze(fed).margins if one.parameter == "drive.velocity").edge.value
+    feed = format_quantity(edge / fed.drive.velocity * 0.5 / 60, "m/s")
+    for rig, speed in (
+        (fed, "8.333 mm/s"),
+        (fed.with_values({"drive.velocity": 2 * fed.drive.velocity}), "16.67 mm/s"),
+    ):
+        text = str(ss.analyze(rig))
+        assert text.splitlines()[0].endswith(f"steady sliding at {speed}")
+        assert re.search(rf"drive\.velocity +{speed} +-> {feed} ", text)
+        assert "rad/s" not in text
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

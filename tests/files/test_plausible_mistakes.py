@@ -61,3 +61,25 @@ def test_a_mistake_is_answered_by_what_to_write(text, right, wrong, answer):
     with pytest.raises(ss.RigFileError, match=re.escape(answer)) as raised:
         ss.rig_from_text(mistaken)
     assert text is AXIS or "per unit area" not in str(raised.value)  # a machine's sizes are totals
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("[bodies.", "[body."), ("[links.", "[link."), ("[contacts.", "[contact."), ("[drive]", "[drives]")],
+)
+@pytest.mark.parametrize("count", [1, -1])
+def test_a_misspelt_table_is_one_problem_on_its_line(right, wrong, count):
+    mistaken = MACHINE.replace(right, wrong, count)
+    name = wrong.strip("[].")
+    line = next(i for i, one in enumerate(mistaken.splitlines(), start=1) if one.startswith(wrong))
+    with pytest.raises(ss.RigFileError) as raised:
+        ss.rig_from_text(mistaken)
+    (problem,) = raised.value.problems
+    assert problem.line == line
+    assert f"unknown table {name!r}; did you mean {right.strip('[].')!r}?" in problem.message
+
+
+def test_a_misspelt_table_hides_no_other_problem():
+    with pytest.raises(ss.RigFileError) as raised:
+        ss.rig_from_text(MACHINE.replace("[bodies.", "[body.").replace('"300 kg"', '"300 m"'))
+    assert [one.name for one in raised.value.problems] == ["body", "bodies.table.mass"]

@@ -8,7 +8,7 @@ import pytest
 import steadyslip as ss
 from command import run
 from machines import ACROSS, ALONG, BLOCK, block
-from steadyslip.linear.coupling import is_undamped
+from steadyslip.linear.undamped import is_undamped
 from steadyslip.model.point import operating_point
 
 EXACT = 1e-13  # a double root is told from a close pair to within rounding of the polynomial
@@ -133,3 +133,23 @@ def test_a_page_refuses_what_nothing_damps(tmp_path):
     assert done.returncode == 2
     assert "nothing damps this machine" in done.stderr
     assert run("explore", path, "--set", "normal_damping=0.1", "-o", tmp_path / "damped.html").returncode == 0
+
+
+def test_a_map_tells_where_nothing_grows_from_where_two_modes_couple(tmp_path):
+    """Its edge is that of `boundary`, where `status` said "unstable" throughout; the least damping decides anew."""
+    grids = {"mu_coulomb": ss.maps.Grid(0.2, 2.0, 10), "one.stiffness": ss.maps.Grid(2.0, 5.0, 4)}
+    found = ss.run_map(ss.Map(block(), grids, ["status"]), tmp_path / "undamped.zarr")
+    words = np.array(found.words("status"))[found.dataset["status"].values]
+    for j, stiffness in enumerate(found.dataset["links.one.stiffness"].values):
+        edge = edges(block().with_values({"one.stiffness": stiffness}))
+        below = found.dataset["contacts.belt.friction.mu_coulomb"].values < (edge[0] if edge else np.inf)
+        assert words[:, j].tolist() == np.where(below, "undamped", "unstable").tolist()
+    axes = found.plot()
+    line = next(one for one in axes.lines if one.get_label().startswith("edge of stability"))
+    x, y = line.get_xdata(), line.get_ydata()
+    for i in np.flatnonzero(np.isfinite(x))[::5]:
+        assert min(abs(x[i] - edges(block().with_values({"one.stiffness": y[i]})))) < 1e-6 * x[i]
+    refined = ss.refine(found, 1)
+    assert len(refined.sides)
+    assert ss.stability(block(ALONG.format(0.05)), {"mu_coulomb": [0.8, 0.95]}).tolist() == ["stable", "unstable"]
+    assert ss.stability(block(), {"mu_coulomb": [0.95, 1.1]}).tolist() == ["undamped", "unstable"]

@@ -145,6 +145,10 @@ class UndecidedWarning(UserWarning):
     """Part of the answer is not known: edges in a part of a range, eigenvalues among infinitely many."""
 
 
+class UnitWarning(UserWarning):
+    """A number in a rig file may have been meant in another unit."""
+
+
 class NotKeptWarning(UserWarning):
     """The kernel cache cannot be written, so every process compiles its kernels again."""
 

@@ -12,6 +12,9 @@ from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
 from steadyslip.core.written import display_names
 
+_PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "N s/mm"))}
+"""Units of the force of bristles and of viscous friction, by the dimension that they have per load."""
+
 
 @lru_cache(maxsize=256)
 def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
@@ -19,6 +22,10 @@ def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     found: dict[Dimension, set[str]] = {}
     for name in names:
         found.setdefault(unit(name)[1], set()).add(name)
+    loads = {name.partition(" at ")[2] for name in names if " at " in name}
+    for kind, si in _PER_LOAD.items():  # what is told at a load is so throughout
+        if loads and not any(" at " in name for name in found.get(kind, ())):
+            found[kind] = {f"{si} at {load}" for load in loads}
     for several in found.values():
         if named := {name for name in several if " at " in name}:
             several &= named

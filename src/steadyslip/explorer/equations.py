@@ -19,10 +19,10 @@ from steadyslip.explorer.sliding import needs_search, steady_programs
 from steadyslip.kernels.nodes import Node, Program, Value, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing, cubic
-from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.response import has_closed_form, response
 from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.linear.stiffness import interval_ingredients
+from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model

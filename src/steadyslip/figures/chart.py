@@ -17,7 +17,7 @@ from steadyslip.figures import regions
 from steadyslip.figures.axis import ChartAxis, chart_axis
 from steadyslip.figures.style import AREAS, CONTOURS, EDGES, HALO, OWN_RIG, SAFETY_LEVELS, add_legend_above, axes_or_new
 from steadyslip.linear.stable_values import safety_factor
-from steadyslip.linear.status import ABSENT, STABLE, status as status_of
+from steadyslip.linear.status import ABSENT, QUIET, STABLE, status as status_of
 from steadyslip.linear.stiffness import eigenvalues
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -108,7 +108,7 @@ def stability_chart(
     gone = regions.edges(inside(ABSENT), grid == ABSENT)
     if np.isfinite(gone).any():
         ax.plot(*place(gone), **EDGES["no steady sliding"], label=f"edge: {reasons}")
-    line = regions.edges(inside(STABLE), grid == STABLE, grid == ABSENT)
+    line = regions.edges(lambda a, b: np.isin(status(a, b), QUIET), np.isin(grid, QUIET), grid == ABSENT)
     draw_edges(ax, rig, line, vary, place)
     _mark_own(ax, rig, first, second)
     written = [words for code, (words, _) in AREAS.items() if write_inside(ax, grid == code, words, place)]

@@ -17,6 +17,7 @@ from steadyslip.linear import Modes
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import Analysis
+from steadyslip.verdict.words import told
 
 _SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
 _MAX_PARAMETERS = 24  # rows of `stable_ranges`, so that the figure fits on a page (by trial)
@@ -132,7 +133,7 @@ def _edge_text(found: Analysis, ax: Axes, row: int, margin: Margin) -> None:
     edge = margin.edge
     if edge is None:
         return
-    text = typeset(format_quantity(edge.value, margin.unit, area=found.rig.printed_area(margin.parameter)))
+    text = typeset(told(found.rig, margin.parameter, edge.value))
     ratio = edge.value / margin.value
     left = (
         1 / _SPAN_FACTOR**0.75 < ratio < 1 or ratio > _SPAN_FACTOR**0.75

@@ -18,7 +18,7 @@ from steadyslip.figures.map_axes import (
     result_label,
 )
 from steadyslip.figures.style import AREAS, OUT_OF_RANGE, axis_label
-from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
+from steadyslip.linear.status import ABSENT, STABLE, UNDAMPED, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
@@ -126,6 +126,7 @@ def draw_scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> No
     kinds = (
         (UNSTABLE, "unstable", ORANGE, "v"),
         (STABLE, "stable", BLUE, "o"),
+        (UNDAMPED, "undamped: nothing grows", BLUE, "."),
         (ABSENT, "no steady sliding", GREY, "x"),
         (UNKNOWN, OUT_OF_RANGE, GREY, "+"),
     )

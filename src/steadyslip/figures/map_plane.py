@@ -32,7 +32,7 @@ from steadyslip.figures.map_axes import (
     short_name,
 )
 from steadyslip.figures.style import AREAS, EDGES, OWN_RIG, SAFETY_LEVELS, axis_label, display_unit
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
+from steadyslip.linear.status import ABSENT, QUIET, STABLE, UNDAMPED, UNSTABLE, status as status_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.view.absence import points_at, without_number
@@ -57,7 +57,10 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
     elif judged:
         _areas(ax, found, view, _Refined(found, view, scales))
     if name is not None and judged:
-        _contours(ax, x, y, view.values[name], name, found, missing_note(view, name))
+        shown = np.where(
+            view.values["status"] == UNDAMPED, np.nan, view.values[name]
+        )  # there a growth rate is rounding
+        _contours(ax, x, y, shown, name, found, missing_note(view, name))
     elif name is not None:
         _colours(ax, found, view, x, y, name, scale)
     if "status" in view.values and not view.shares:
@@ -88,8 +91,8 @@ def _edge(ax: Axes, status: Array, refined: _Refined) -> list[Array]:
     """Draw the edge of stability; return its pieces as vertices of shape (n, 2) in the units of the axes."""
     if min(status.shape) < 2:
         return []
-    left_out = (status != STABLE) & (status != UNSTABLE)
-    line = regions.edges(refined.has(STABLE), status == STABLE, left_out)
+    quiet = np.isin(status, QUIET)
+    line = regions.edges(refined.has(*QUIET), quiet, ~quiet & (status != UNSTABLE))
     if refined.rig is not None:
         draw_edges(ax, refined.rig, line, refined.vary, refined.place)
     elif np.isfinite(line).any():
@@ -130,17 +133,17 @@ class _Refined:
         """Convert fractions of the axes, shape (n, 2), to their units."""
         return self.scales[0](self._values(shares[:, 0], 0)), self.scales[1](self._values(shares[:, 1], 1))
 
-    def has(self, code: int) -> regions.Predicate:
-        """Predicate of the fractions of both axes: whether a rig has this status."""
+    def has(self, *codes: int) -> regions.Predicate:
+        """Predicate of the fractions of both axes: whether a rig has one of these statuses."""
 
         def predicate(a: Any, b: Any) -> Any:
             if self.rig is not None:
-                return status_of(operating_point(self.rig, self.vary(a, b), scan=True)) == code
+                return np.isin(status_of(operating_point(self.rig, self.vary(a, b), scan=True)), codes)
             status = self.view.values["status"]
             row, column = (
                 np.rint(np.asarray(s) * (n - 1)).astype(int) for s, n in zip((b, a), status.shape, strict=True)
             )
-            return status[row, column] == code
+            return np.isin(status[row, column], codes)
 
         return predicate
 

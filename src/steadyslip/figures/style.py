@@ -23,6 +23,7 @@ from steadyslip.core.palette import BLACK, GREY, STABLE, UNSTABLE
 from steadyslip.linear.status import (
     ABSENT as ABSENT_CODE,
     STABLE as STABLE_CODE,
+    UNDAMPED as UNDAMPED_CODE,
     UNKNOWN as UNKNOWN_CODE,
     UNSTABLE as UNSTABLE_CODE,
 )  # fmt: skip
@@ -66,6 +67,7 @@ EDGES: dict[str, dict[str, Any]] = {
 AREAS: dict[int, tuple[str, dict[str, Any]]] = {
     STABLE_CODE: ("stable", {"facecolor": STABLE, "linewidth": 0}),
     UNSTABLE_CODE: ("unstable", {"facecolor": UNSTABLE, "linewidth": 0}),
+    UNDAMPED_CODE: ("undamped: nothing grows", {"facecolor": STABLE, "edgecolor": GREY, "hatch": "..", "linewidth": 0}),
     ABSENT_CODE: ("no steady sliding", {"facecolor": "white", "edgecolor": GREY, "hatch": "///", "linewidth": 0}),
     UNKNOWN_CODE: (OUT_OF_RANGE, {"facecolor": "white", "edgecolor": GREY, "hatch": "xx", "linewidth": 0}),
 }

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.core.format import format_range
 from steadyslip.core.palette import BLACK, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.figures.style import axes_or_new
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
 from steadyslip.verdict.tolerances import Tolerated
+from steadyslip.verdict.words import told_range
 
 COLOURS = {True: STABLE, False: UNSTABLE, None: UNKNOWN}
 WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable in a part"}
@@ -57,7 +57,7 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
             hatch="///",
             label="all together",
         )
-    ranges = [f"{one.parameter}\n{format_range(one.low, one.high, one.unit, one.area)}" for one in shown]
+    ranges = [f"{one.parameter}\n{told_range(found.rig, one.parameter, one.low, one.high)}" for one in shown]
     ax.set_yticks(
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
     )

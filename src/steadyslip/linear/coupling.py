@@ -11,37 +11,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.linear.roots import Array, ComplexArray, roots
+from steadyslip.linear.roots import Array
 from steadyslip.linear.search import SPLIT, Boundary, Search
 from steadyslip.linear.status import ABSENT, UNKNOWN, status
+from steadyslip.linear.undamped import grows, is_undamped, squares
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
-from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic
 
 QUIET, GROWS = 10, 11  # beside the values of `status`
 ROUNDS = 4  # of following dips of the gap between two roots: each narrows it 16 times
-
-
-def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the characteristic polynomial has even powers of s only, one beside the constant at least, (...)."""
-    if point.model.delays or not is_written_out(point.model):
-        return np.zeros(point.shape, dtype=bool)
-    c = characteristic(point)
-    return np.asarray(np.all(c[..., 1::2] == 0, axis=-1) & np.any(c[..., 2::2] != 0, axis=-1))
-
-
-def squares(point: OperatingPoint) -> ComplexArray:
-    """Roots in s² of undamped rigs, (..., n); NaN where there are fewer."""
-    return roots(characteristic(point)[..., ::2])
-
-
-def grows(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where a root of undamped rigs grows, (...): one of the roots in s² is complex or positive."""
-    u = squares(point)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.any((u.imag != 0) | (u.real > 0), axis=-1))
 
 
 def _gap(point: OperatingPoint) -> Array:

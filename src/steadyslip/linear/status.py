@@ -16,6 +16,7 @@ from steadyslip.linear.crossing import share_left
 from steadyslip.linear.response import has_closed_form, response_numbers
 from steadyslip.linear.spectrum import can_be_counted, is_near_edge, is_stable, outgrown, static_sum
 from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
+from steadyslip.linear.undamped import grows, is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -27,9 +28,11 @@ from steadyslip.model.range import in_range
 
 ON_THE_EDGE = 1e-9  # damping ratio, and static stiffness relative to its terms, below which a rig is on the edge
 LAST_DIGITS = 24  # copies of a rig with perturbed last digits; by trial: computing time against a missed change
-ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
-WORDS = ("no steady sliding", "stable", "unstable", "out of range")
-"""Names of the status values; "out of range" means the range of floating point."""
+ABSENT, STABLE, UNSTABLE, UNKNOWN, UNDAMPED = range(5)
+WORDS = ("no steady sliding", "stable", "unstable", "out of range", "undamped")
+"""Names of the status values; "out of range" means the range of floating point, "undamped" that nothing grows."""
+QUIET = (STABLE, UNDAMPED)
+"""Where no disturbance grows."""
 EVERY, NONE = "stable at every stiffness", "stable at no stiffness"
 
 
@@ -46,8 +49,9 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     Returns
     -------
     str, ndarray of str or xarray.DataArray
-        ``stable``, ``unstable`` (ill-posed included), ``no steady sliding`` (lock-up or lift-off), or ``out of range``
-        where numbers leave the range of floating point, so that nothing can be said. Within rounding of an edge the
+        ``stable``, ``unstable`` (ill-posed included), ``undamped`` (nothing damps a machine, and nothing grows),
+        ``no steady sliding`` (lock-up or lift-off), or ``out of range`` where numbers leave the range of floating
+        point, so that nothing can be said. Within rounding of an edge the
         word is that of one side; `analyze` says so.
 
     Raises
@@ -82,9 +86,12 @@ def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
 
 
 def status(point: OperatingPoint) -> NDArray[np.int64]:
-    """Status of rigs (...): ABSENT (no steady sliding), STABLE, UNSTABLE (also ill-posed), UNKNOWN (out of range)."""
+    """Status of rigs (...): one of the codes of `WORDS`; UNSTABLE also ill-posed, UNDAMPED of machines alone."""
     with np.errstate(all="ignore"):
-        return _status(point, is_stable(point))
+        found = _status(point, is_stable(point))
+        if point.model.is_single or not np.any(found == UNSTABLE):
+            return found
+        return np.where((found == UNSTABLE) & is_undamped(point) & ~grows(point), UNDAMPED, found)
 
 
 def status_where_counted(point: OperatingPoint) -> NDArray[np.int64]:
@@ -113,7 +120,9 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     others = point.with_arguments(arguments, (LAST_DIGITS,))
     if static_sum(point) == 0 and not np.all(outgrown(others, True, ON_THE_EDGE)):  # a root of zero, and none grows
         return True
-    return bool(np.any((status_where_counted(others) != status(point)) & can_be_counted(others)))
+    with np.errstate(all="ignore"):
+        own = _status(point, is_stable(point))
+    return bool(np.any((status_where_counted(others) != own) & can_be_counted(others)))
 
 
 @question

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -53,6 +53,9 @@ class Machine(Rig):
     """Area of a slider, by which its stresses are shown as forces; results of a machine are forces already."""
     in_forces: ClassVar[bool] = True
 
+    fed: ClassVar[str | None] = None
+    """Body whose speed was given in place of the drive's, by which the drive's is told; no part of the value."""
+
     words: ClassVar[Mapping[str, str]] = {
         "rig": "machine", "block": "body", "place": "bodies.{}", "damping": "a dashpot to the ground",
         "mass": "the body that slips there a mass (or a damped link to the ground)",
@@ -83,6 +86,18 @@ class Machine(Rig):
         given = self.drive.velocity
         own = 0.0 if self.holds else given * (given / speed)
         object.__setattr__(self, "drive", replace(self.drive, velocity=own, velocity_of=None))
+        object.__setattr__(self, "fed", name)
+
+    def with_values(self, changes: Mapping[str, Any]) -> Self:
+        made = super().with_values(changes)
+        object.__setattr__(made, "fed", self.fed)
+        return made
+
+    def told(self, name: str, value: float) -> tuple[float, str]:
+        if name != "drive.velocity" or self.fed is None or self.holds:
+            return super().told(name, value)
+        speed = float(self._speeds()[0][self.fed])
+        return value / float(self.drive.velocity) * speed, "rad/s" if self.bodies[self.fed].turns else "m/s"
 
     def inconsistencies(self) -> Iterator[Problem]:
         faults = [*self._name_problems(), *self._end_problems()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
@@ -134,6 +135,10 @@ class Rig(FrozenRecord, Keeper):
         """Collect the parameters (uncached)."""
         return parameters(self)
 
+    def told(self, name: str, value: float) -> tuple[float, str]:
+        """Value of a parameter and its unit, as people are told it: the speed of the body whose speed they gave."""
+        return value, self.parameters()[name].role.unit
+
     def gain_name(self) -> str | None:
         """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
         return None
@@ -161,7 +166,8 @@ class Rig(FrozenRecord, Keeper):
         return resolve(name, self.parameters())
 
     def read(self, name: str, value: Any) -> Any:
-        """Convert a value of a parameter to SI units; text may give a total of a contact with an area.
+        """Convert a value of a parameter to SI units; text may give a total of a contact with an area, and the speed
+        of the body by which that of the drive is `told`.
 
         Raises
         ------
@@ -170,8 +176,11 @@ class Rig(FrozenRecord, Keeper):
         """
         if not isinstance(value, str):
             return value
+        factor, unit = self.told(name, 1.0)
+        role = self.parameters()[name].role
         try:
-            return self.parameters()[name].role.read(value, self.area_of(name))
+            found = (role if unit == role.unit else replace(role, unit=unit)).read(value, self.area_of(name))
+            return found if factor == 1.0 else found / factor
         except ParameterError as error:
             raise ParameterError([problem.under(name) for problem in error.problems]) from error
 

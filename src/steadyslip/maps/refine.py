@@ -77,9 +77,10 @@ class Refined(ReadOnly):
             f"edge of {self.of}{'' if self.level is None else f' at {self.level:.4g}'}: {count:,} new points, "
             f"where the whole grid would have {full:,.4g}"
         ]
+        wide = max([24, *(len(name) + 2 for name in self.spacing)])
         for name, size in self.spacing.items():
             lines.append(
-                f"  {name:<24}known to "
+                f"  {name:<{wide}}known to "
                 f"{format_quantity(0.5 * size, self.map.unit(name), 3, self.map.area(name))} or better"
             )
         lines.append(f"  {len(self.sides):,} points on the edge")

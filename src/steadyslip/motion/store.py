@@ -43,7 +43,7 @@ def to_dataset(history: HistoryData) -> Any:
     """xarray.Dataset of a history; see `History.to_xarray`."""
     import xarray as xr
 
-    from steadyslip.files.specifications import rig_to_text
+    from steadyslip.files.specifications import stored_text
 
     variables = {
         name: ("time", values, {"units": history.units[name]}) for name, values in history.data.items() if name != "t"
@@ -61,7 +61,7 @@ def to_dataset(history: HistoryData) -> Any:
         for i, name in enumerate(("lowest_velocity", "peak_velocity")):
             variables[name] = ("contact", np.array([own[i] for own in history.velocities.values()]), {"units": "m/s"})
     attributes = {
-        "rig": rig_to_text(history.rig, history.protocol),
+        "rig": stored_text(history.rig, history.protocol),
         "status": history.status,
         "end": history.end,
         "method": history.method,

@@ -15,7 +15,7 @@ from steadyslip.reports.elements import figure, heading, table
 from steadyslip.reports.sections import assumptions, motion, recommendation, references
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.whole_text import facts
-from steadyslip.verdict.words import headline
+from steadyslip.verdict.words import headline, told
 
 
 def verdict_parts(
@@ -23,8 +23,7 @@ def verdict_parts(
 ) -> Parts:
     """Contents of the document of a verdict on a machine, with tolerances if given."""
     machine = analysis.rig
-    drive = machine.parameters()["drive.velocity"]
-    speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
+    speed = told(machine, "drive.velocity", float(machine.drive.velocity))
     body = [
         *recommendation(analysis, tuple(order.adjustable)),
         *assumptions(machine, analysis.warnings, rig_report.VALIDITY),

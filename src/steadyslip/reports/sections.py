@@ -14,7 +14,7 @@ import sympy as sp
 from steadyslip import figures
 from steadyslip.core.areas import outside, stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError, SteadyslipError
-from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.format import format_range
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.boundary import Margin
@@ -32,6 +32,7 @@ from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, motion_after
+from steadyslip.verdict.words import told
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
 _ROWS = 4  # changes that are recommended, nearest first
@@ -95,7 +96,7 @@ def _change(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:
-    return format_quantity(value, margin.unit, area=analysis.rig.printed_area(margin.parameter))
+    return told(analysis.rig, margin.parameter, value)
 
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:

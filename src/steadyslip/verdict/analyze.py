@@ -15,12 +15,12 @@ from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.linear.boundary import Margin, margins, margins_and_missing, oscillatory_edge
-from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.mode_table import growth_origin
 from steadyslip.linear.modes import Mode, matrix_mode, mode_of
 from steadyslip.linear.pencil import GOOD
 from steadyslip.linear.status import decided_by_rounding, on_edge
+from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider

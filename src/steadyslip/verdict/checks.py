@@ -23,11 +23,11 @@ from steadyslip.core.questions import question
 from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.linear.allowance import at_most
 from steadyslip.linear.boundary import Margin, without_edges
-from steadyslip.linear.coupling import is_undamped
 from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral
+from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.rig import Rig
 from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint, operating_point

@@ -26,7 +26,7 @@ from steadyslip.verdict.export import finite
 from steadyslip.verdict.findings import Findings
 from steadyslip.verdict.support import support_stiffness
 from steadyslip.verdict.tolerances import Tolerated, format_chance, tolerate
-from steadyslip.verdict.words import edge_rows, headline
+from steadyslip.verdict.words import edge_rows, headline, told
 
 PAIR = Tested("two of them, for the first and the second rig", lambda v: isinstance(v, (tuple, list)) and len(v) == 2)
 NONE = (None, None)
@@ -284,7 +284,7 @@ def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
     known = rig.parameters().get(name)
     if known is None or not isinstance(value, float):
         return str(value)
-    words = format_quantity(value, known.role.unit, area=rig.printed_area(name))
+    words = told(rig, name, value)
     return f"{name.rpartition('.')[2]} {words}" if named else words
 
 

@@ -17,7 +17,7 @@ from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
-from steadyslip.linear.boundary import boundary, margins
+from steadyslip.linear.boundary import REMOTE, boundary, margins
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.chances import Chances, chances_of
@@ -30,6 +30,7 @@ FROM_ZERO = 145  # values of a parameter that is zero, over the twelve decades t
 BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is looked at too
 HALVINGS, FEW_HALVINGS = 52, 12  # of a bracket: to the last digit of one rig, to 1e-5 of many
 NEAR = np.linspace(-0.02, 0.02, 5)  # relative places about an edge where the whole sample is judged
+FAR = math.log2(REMOTE)  # doublings beyond which no loss of stability is told
 PAIRS = 3  # cheapest pairs of the coarse search that are narrowed
 PRELOAD = "normal stress"  # kind of the parameters that press a contact, whatever a law calls them
 DESIGN = (
@@ -67,6 +68,8 @@ class Window(Displayed):
     limits: tuple[float, float]
     cost: float
     area: float | None = field(default=None, repr=False)
+    told: tuple[float, str] | None = field(default=None, repr=False)
+    """Factor and unit in which the values are told; those of `Rig.told`."""
 
     @property
     def nearest(self) -> float | None:
@@ -103,7 +106,8 @@ class Window(Displayed):
 
     def written(self, value: float) -> str:
         """Format a value of the parameter."""
-        return format_quantity(value, self.unit, area=self.area)
+        factor, unit = self.told or (1.0, self.unit)
+        return format_quantity(value * factor, unit, area=self.area)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +153,11 @@ class Cures(ReadOnly):
         now = format_chance(self.chance, self.error) if self.error else "stable" if self.chance else "unstable"
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
         if self.chance >= self.sure:
-            lines = [f"Already {wanted} (now {now}). What would lose it first:"]
-            lines += [
-                f"{one.parameter:<{wide}}{_change(one, one.leaves)}" for one in self.fails if one.leaves is not None
-            ]
-            return "\n".join(lines if self.fails else [f"Already {wanted} (now {now}), whatever single value changes"])
+            already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
+            near = [one for one in self.fails if one.leaves is not None and distance(one.value, one.leaves) <= FAR]
+            lines = [f"{one.parameter:<{wide}}{_change(one, one.leaves)}" for one in near]
+            whatever = f"whatever single value changes by less than a factor of {REMOTE}"
+            return "\n".join([f"{already}. What would lose it first:", *lines] if near else [f"{already}, {whatever}"])
         lines = [f"To be {wanted} (now {now})"]
         if (best := self.best) is not None:
             lines.append(
@@ -323,9 +327,12 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
     """All windows of one parameter."""
     low, high = _limits(chances, name, one)
     values = _scan(chances, name, (low, high))
-    role, area = chances.rig.parameters()[name].role, chances.rig.printed_area(name)
+    unit, about = (
+        chances.rig.parameters()[name].role.unit,
+        (chances.rig.printed_area(name), chances.rig.told(name, 1.0)),
+    )
     if not values.size:
-        return Window(name, role.unit, chances.own(name), (), (low, high), math.inf, area)
+        return Window(name, unit, chances.own(name), (), (low, high), math.inf, *about)
 
     def reached(at: Array) -> Array:
         return np.asarray(chances.few({name: at}) >= sure)
@@ -340,7 +347,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
         for i, (first, last) in enumerate(itertools.pairwise(ends))
         if (bool(inside[0]) ^ bool(i % 2)) and first <= last
     )
-    found = Window(name, role.unit, chances.own(name), windows, (float(values[0]), float(values[-1])), 0.0, area)
+    found = Window(name, unit, chances.own(name), windows, (float(values[0]), float(values[-1])), 0.0, *about)
     if not windows:
         return replace(found, cost=math.inf)
     return found if found.nearest is None else replace(found, cost=one.cost * distance(found.value, found.nearest))

@@ -16,7 +16,7 @@ from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.verdict.causes import why_delay_is_ill_posed
 from steadyslip.verdict.measured import response_facts
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
-from steadyslip.verdict.words import BEYOND, QUIET, beyond, instead, unlikely_speed
+from steadyslip.verdict.words import BEYOND, QUIET, beyond, instead, told
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
@@ -90,7 +90,7 @@ def _nearest(found: Findings, margin: Margin) -> str:
     if edge is None:
         return ""
     side = "above" if edge.value > margin.value else "below"
-    value = format_quantity(edge.value, margin.unit, area=found.rig.printed_area(margin.parameter))
+    value = told(found.rig, margin.parameter, edge.value)
     what = PHRASES["stable"] if edge.stable == side else QUIET if edge.quiet == side else beyond(edge)
     return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=what)
 
@@ -105,15 +105,12 @@ def _sliding(steady: SteadyMachine) -> str:
 
 
 def warnings(analysis: Findings, states: Sequence[SteadyMachine]) -> Iterator[str]:
-    """Warnings: contacts whose friction is not positive, their speeds, and those whose law has no memory."""
+    """Warnings: contacts whose friction is not positive, and those whose law has no memory."""
     contacts = states[0].contacts
     for name, one in contacts.items():
         if one.friction <= 0:
             yield f"friction of contact {name} is not positive in steady sliding; check its level and the velocity"
-    touching = analysis.rig.contacts
-    for name, one in contacts.items():
-        yield from unlikely_speed(f"contact {name} slides at", one.slip_rate, touching[name].friction)
-    blind = [name for name, touch in touching.items() if not touch.friction.memory()]
+    blind = [name for name, touch in analysis.rig.contacts.items() if not touch.friction.memory()]
     if blind:
         alone = len(blind) == 1
         which = f"law of contact {blind[0]} has" if alone else f"laws of contacts {', '.join(blind)} have"

@@ -20,7 +20,7 @@ from steadyslip.verdict.checks import critical_check
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import in_stiffness
 from steadyslip.verdict.support import support_stiffness
-from steadyslip.verdict.words import instead, unlikely_speed
+from steadyslip.verdict.words import instead
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
@@ -158,7 +158,6 @@ def warnings(analysis: Findings, states: Sequence[SteadySliding]) -> Iterator[st
             f"steady sliding is possible at {len(states)} values of {stress_name('normal stress', rig.area)} "
             f"({', '.join(stresses)}); this verdict is for the one at {stresses[analysis.branch]}"
         )
-    yield from unlikely_speed("the drive's velocity is", float(rig.drive.velocity), rig.friction)
     if not rig.friction.memory() and rig.friction.lateness() == 0:
         yield (
             "this friction law has no memory of sliding, so it cannot predict a critical stiffness; "

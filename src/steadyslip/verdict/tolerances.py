@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array, valid_together
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_percent, format_quantity, format_range
+from steadyslip.core.format import format_percent, format_range
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -25,6 +25,7 @@ from steadyslip.model.build import model_of
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
+from steadyslip.verdict.words import told, told_range
 
 # Numbers of rigs, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
 LOG2_CLOSED, LOG2_OTHERS = 12, 8  # rigs of one group: 2**12 where the verdict has a closed form, else 2**8
@@ -139,7 +140,7 @@ class Tolerated(ReadOnly):
             else:
                 beside = f", growth rate {format_range(*one.growth, '1/s')}" if not self.along else ""
             word = {True: "stable", False: "unstable", None: "stable in a part of it"}[one.stable]
-            ends = format_range(one.low, one.high, one.unit, one.area)
+            ends = told_range(self.rig, one.parameter, one.low, one.high)
             lines.append(f"{one.parameter:<{wide}}{ends} alone: {word}{beside}")
         if len(self.alone) > 1:
             lines.append(f"{'measure next':<{wide}}{self._next()}")
@@ -152,11 +153,7 @@ class Tolerated(ReadOnly):
             return f"Stable in {format_chance(share, self.error)} of {count} rigs within the tolerances"
         words = f"Stable in {'all' if share else 'none of'} {count} rigs within the tolerances"
         if self.otherwise:
-            known = self.rig.parameters()
-            values = (
-                f"{name} {format_quantity(value, known[name].role.unit, area=self.rig.printed_area(name))}"
-                for name, value in self.otherwise.items()
-            )
+            values = (f"{name} {told(self.rig, name, value)}" for name, value in self.otherwise.items())
             kind = "but not in every one: unstable" if share else "but in another one: stable"
             return f"{words}, {kind} at {', '.join(values)}"
         if not self.corners:

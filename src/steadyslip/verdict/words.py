@@ -8,22 +8,18 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
-from steadyslip.core.format import format_quantity
-from steadyslip.core.records import parameters
+from steadyslip.core.format import format_quantity, format_range
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.verdict.reasons import NEXT_TO_IT
 from steadyslip.verdict.support import gain_words
 
 if TYPE_CHECKING:
-    from steadyslip.laws.friction import FrictionLaw
     from steadyslip.linear.boundary import Margin
     from steadyslip.linear.search import Boundary
+    from steadyslip.machine.rig import Rig
     from steadyslip.nonlinear.kicks.threshold import Threshold
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings
-
-FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
-BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
 _ONSETS = {
     "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
@@ -84,8 +80,7 @@ HEADLINES = {
 
 def headline(analysis: Findings, capitals: bool = True) -> str:
     """First line of a verdict: stable, unstable, on the edge, not decided, or no steady sliding; with the speed."""
-    drive = analysis.rig.parameters()["drive.velocity"]
-    speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
+    speed = told(analysis.rig, "drive.velocity", float(analysis.rig.drive.velocity))
     if analysis.stable is None:
         kind = "undecided" if is_undecided(analysis) else "none"
     else:
@@ -95,22 +90,20 @@ def headline(analysis: Findings, capitals: bool = True) -> str:
     return (first.upper() if capitals else first) + rest.format(speed=f"at {speed}")
 
 
+def told(rig: Rig, name: str, value: float) -> str:
+    """Value of a parameter in words."""
+    return format_quantity(*rig.told(name, value), area=rig.printed_area(name))
+
+
+def told_range(rig: Rig, name: str, low: float, high: float) -> str:
+    """Range of a parameter in words."""
+    (first, unit), (last, _) = rig.told(name, low), rig.told(name, high)
+    return format_range(first, last, unit, rig.printed_area(name))
+
+
 def is_undecided(analysis: Findings) -> bool:
     """True if there is no verdict because one of its checks failed."""
     return analysis.reason.startswith(UNDECIDED)
-
-
-def unlikely_speed(what: str, speed: float, friction: FrictionLaw) -> tuple[str, ...]:
-    """Question whether a speed (m/s) far beyond those of a friction law was meant; empty if it is not."""
-    kinds = ("reference rate", "velocity scale")
-    own = {name: one.value for name, one in parameters(friction).items() if one.role.kind in kinds and one.value}
-    if not own or speed < FAST or speed < BEYOND_LAW * max(own.values()):
-        return ()
-    name, scale = max(own.items(), key=lambda item: item[1])
-    return (
-        f"{what} {speed:.4g} m/s? That is {speed / scale:.2g} times {name} of its friction, "
-        f"{format_quantity(scale, 'm/s')}; a number without a unit is read in m/s",
-    )
 
 
 def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
@@ -125,9 +118,10 @@ def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
     windows = [between for between, up_to_its_end, from_its_start in sides if up_to_its_end or from_its_start]
     parts = []
     for low, high in windows:
-        first, last = format_quantity(low, margin.unit), format_quantity(high, margin.unit)
+        first, last = (told(analysis.rig, margin.parameter, end) for end in (low, high))
         parts.append(f"above {first}" if high == math.inf else f"{first} to {last}" if low else f"below {last}")
-    return [("stable speeds", ", or ".join(parts) or f"none up to {format_quantity(margin.searched[1], margin.unit)}")]
+    none = f"none up to {told(analysis.rig, margin.parameter, margin.searched[1])}"
+    return [("stable speeds", ", or ".join(parts) or none)]
 
 
 def onset_words(onset: Onset) -> str:
@@ -256,8 +250,8 @@ def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str
         words = beyond(edge)
     return (
         margin.parameter,
-        format_quantity(margin.value, margin.unit, area=analysis.rig.printed_area(margin.parameter)),
-        format_quantity(edge.value, margin.unit, area=analysis.rig.printed_area(margin.parameter)),
+        told(analysis.rig, margin.parameter, margin.value),
+        told(analysis.rig, margin.parameter, edge.value),
         change,
         words,
     )

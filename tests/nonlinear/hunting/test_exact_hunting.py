@@ -168,3 +168,7 @@ def test_a_controller_without_samples_is_the_limit_of_short_ones(more):
     ours = np.array([1 - one.ends for one in found])
     assert np.abs(short - ours).max() < 3e-3
     assert 2 * shorter - short == pytest.approx(ours, abs=3e-4)
+
+
+def test_the_usual_step_is_a_round_number():
+    assert [one.by for one in ss.hunt(ss.read_rig(EXAMPLES / "hunting-axis.toml"), until=0.01).protocol.pieces] == [1.0]

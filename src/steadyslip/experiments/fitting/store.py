@@ -63,7 +63,7 @@ def to_dataset(fit: FitNumbers) -> Any:
     """Fit as an xarray.Dataset."""
     import xarray as xr
 
-    from steadyslip.files.specifications import rig_to_text
+    from steadyslip.files.specifications import stored_text
 
     names = list(fit.names)
     variables: dict[str, Any] = {
@@ -89,7 +89,7 @@ def to_dataset(fit: FitNumbers) -> Any:
     options["weighted"] = fit.plan.weights is not None
     options["columns"] = [[n for n in _COLUMNS if getattr(r, n) is not None] for r in fit.plan.records]
     attributes = {
-        "rig": rig_to_text(fit.plan.rig, fit.plan.protocol),
+        "rig": stored_text(fit.plan.rig, fit.plan.protocol),
         "options": json.dumps(options),
         "ssq": fit.ssq,
         "search": json.dumps(vars(fit.search)),

@@ -8,7 +8,7 @@ registered name or installed entry point.
 from steadyslip.files.specifications.changes import named_value
 from steadyslip.files.specifications.protocols import piece_from_text, protocol_from_text, read_protocol
 from steadyslip.files.specifications.read import read_rig, read_slider, rig_from_text, slider_from_text
-from steadyslip.files.specifications.write import rig_to_text, write_rig
+from steadyslip.files.specifications.write import rig_to_text, stored_text, write_rig
 
 __all__ = [
     "named_value",
@@ -20,5 +20,6 @@ __all__ = [
     "rig_from_text",
     "rig_to_text",
     "slider_from_text",
+    "stored_text",
     "write_rig",
 ]

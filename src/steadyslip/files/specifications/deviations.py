@@ -70,7 +70,8 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
     def half_width(text: str) -> float:
         if text.endswith("%"):
             return 0.01 * float(text[:-1]) * abs(value)
-        return Parameter(one.role.unit, nonnegative, "tolerance").read(text, rig.area_of(name))
+        factor, unit = rig.told(name, 1.0)
+        return Parameter(unit, nonnegative, "tolerance").read(text, rig.area_of(name)) / factor
 
     low, high = value - half_width(tolerance.below), value + half_width(tolerance.above)
     if not low < high:

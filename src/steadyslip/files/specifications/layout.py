@@ -51,6 +51,8 @@ UNKNOWN_SCHEMA = {
     "description": "intervals of parameters that are not known, by dotted name: two numbers, or texts with units",
 }
 
+TOLD_IN = "# told in: "
+"""Beginning of the first line of a stored rig, before the units in which it and its results are told."""
 MAP = "map"
 """Name of the table of maps, which others ignore."""
 

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from os import PathLike
 from typing import Any, cast
 
@@ -26,11 +27,13 @@ from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
+from steadyslip.files.specifications.bare_speeds import question_speeds
 from steadyslip.files.specifications.changes import apply, full_name, split
 from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, taken_out, wrong_ends
 from steadyslip.files.specifications.layout import (
     MAP,
     PROTOCOL,
+    TOLD_IN,
     UNKNOWN,
     Section,
     is_machine,
@@ -48,6 +51,8 @@ from steadyslip.machine.rig import Rig
 from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
+
+LIKE = 0.6  # likeness of a misspelt table's name to the one that is meant: body and bodies
 
 
 @checked()
@@ -231,7 +236,11 @@ def read_contents(
         tables = tables_of(text)
     except NotToml as error:
         raise _failed(source, f"is not TOML: {error}") from error
-    return read_tables(tables, key_lines(text), source, changes, further, complete, rig_needed)
+    found = read_tables(tables, key_lines(text), source, changes, further, complete, rig_needed)
+    first, _, rest = text.partition("\n")
+    if found.rig is not None and rest and first.startswith(TOLD_IN):
+        found.rig.told_in(sorted(units_in([f"1 {name}" for name in first.removeprefix(TOLD_IN).split("; ")])))
+    return found
 
 
 def read_tables(
@@ -265,6 +274,8 @@ def read_tables(
     if rig is not None:
         rig.told_in(sorted(units_in(tables)))
         faults += wrong_ends(rig, tolerances)
+        if rig.written_in:  # numbers alone are SI units, as programs write them
+            question_speeds(rig, reader.speeds)
     wrong = {one.name for one in faults}  # told once, as a tolerance
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
     return RigFileContents(source, rig, protocol, said, problems, changed, lines, tables, tolerances)
@@ -291,6 +302,12 @@ def _rigid(links: Any) -> tuple[Any, list[str]]:
     return links | {name: links[name] | {"stiffness": 1.0} for name in names}, names
 
 
+def _joined(first: Table, second: Table) -> Table:
+    """Both tables in one, and of the values that both have the first's."""
+    both = {key: _joined(first[key], one) for key, one in second.items() if isinstance(first.get(key), dict)}
+    return {**second, **first, **both}
+
+
 def _is_quantity(value: Any, unit: str) -> bool:
     """True for text with a number and a unit of the dimension of `unit`."""
     try:
@@ -307,15 +324,31 @@ class _ContentsReader(TableReader):
         self.tables = tables
 
     def rig(self, further: Iterable[str]) -> Slider | Machine | None:
-        self.sections = machine_sections() if is_machine(self.tables) else sections()
-        self._unknown_tables(self.sections, further)
-        return self._machine() if is_machine(self.tables) else self._slider()
-
-    def _unknown_tables(self, own: Iterable[Section], further: Iterable[str]) -> None:
-        known = {section.name for section in (*own, PROTOCOL)} | {MAP, UNKNOWN, *TOLERANCES, *further}
+        others = {PROTOCOL.name, MAP, UNKNOWN, *TOLERANCES, *further}
+        for name in list(self.tables):
+            self._misspelt(name, others)
+        self.sections = self._own_sections()
+        known = others.union(section.name for section in self.sections)
         for name in self.tables:
             if name not in known:
                 self.problem(name, unknown_name("table", name, sorted(known), taken=self.tables))
+        return self._machine() if is_machine(self.tables) else self._slider()
+
+    def _own_sections(self) -> tuple[Section, ...]:
+        return machine_sections() if is_machine(self.tables) else sections()
+
+    def _misspelt(self, name: str, others: set[str]) -> None:
+        """Report a table nearly named as one of a rig's, and read it as that one, as nothing else follows from it."""
+        table, own = self.tables[name], {section.name for section in self._own_sections()}
+        keyed = {section.name for section in machine_sections() if section.keyed}
+        meant = next(iter(get_close_matches(name, own | keyed, n=1, cutoff=LIKE)), None)
+        if name in own | others or meant is None or not isinstance(table, dict):
+            return
+        if meant in self.tables and meant not in keyed:
+            return
+        self.problem(name, unknown_name("table", name, sorted(own | others | {meant})))
+        rest = {key: one for key, one in self.tables.items() if key != name}
+        self.tables = _joined(rest, {meant: table})
 
     def _machine(self) -> Machine | None:
         """Read a machine; if tables are faulty, references of the others to absent bodies and links are still

@@ -14,6 +14,7 @@ from steadyslip.core.errors import ParameterError, Problem, legible, repr_short,
 from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
+from steadyslip.files.specifications.bare_speeds import SPEEDS
 from steadyslip.files.specifications.layout import (
     Section,
     find_law,
@@ -40,6 +41,8 @@ class TableReader:
         self.acted_on: Rig | None = None
         self.sections: tuple[Section, ...] = ()
         """Tables of the file, where hints look for a key in the wrong one."""
+        self.speeds: dict[str, tuple[Any, str]] = {}
+        """Speeds that were read: as written, and their SI unit."""
         self.twisted = False
         """True while a torque is read in place of a force."""
 
@@ -209,10 +212,13 @@ class TableReader:
         if isinstance(role, Parameter):
             role = self.in_file_unit(role)
         try:
-            return role.read(raw, self.area)
+            value = role.read(raw, self.area)
         except ParameterError as error:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
+        if isinstance(role, Parameter) and role.unit in SPEEDS:
+            self.speeds.setdefault(name, (raw, role.unit))
+        return value
 
     def in_file_unit(self, role: Parameter) -> Parameter:
         """Parameter in the unit that this file uses for it."""

@@ -114,7 +114,10 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 def line_of(name: str, lines: dict[str, int]) -> int | None:
-    """Line of a key, or of the nearest table around it; None if there is none."""
+    """Line of a key, of the first in a table that has no line, or of the nearest table around it; else None."""
+    inside = [line for key, line in lines.items() if key.startswith(f"{name}.")]
+    if name not in lines and inside:
+        return min(inside)
     while name:
         if name in lines:
             return lines[name]

@@ -8,12 +8,14 @@ from os import PathLike
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.format import own_units
 from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Named, key_of
 from steadyslip.core.roles import Entry
 from steadyslip.files.output import write_text
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
+    TOLD_IN,
     Section,
     has_choice,
     machine_sections,
@@ -100,6 +102,12 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     if protocol is not None:
         blocks.append(_table(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, rig.protocol_area))
     return "\n".join(blocks)
+
+
+def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
+    """Text of `rig_to_text` for stored results, with the units in which the rig is told."""
+    units = sorted(name for names in own_units(frozenset(rig.written_in)).values() for name in names)
+    return (f"{TOLD_IN}{'; '.join(units)}\n" if units else "") + rig_to_text(rig, protocol)
 
 
 def settings_to_text(section: Section, settings: FrozenRecord) -> str:

@@ -24,7 +24,18 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan import edges, held  # noqa: F401 -- register their measures
-from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
+from steadyslip.maps.plan.axes import (
+    COMPLETE,
+    SAMPLE,
+    SPACINGS,
+    Axis,
+    Generated,
+    Grid,
+    Samples,
+    Sampling,
+    make_axis,
+    make_sampling,
+)
 from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
 from steadyslip.model.point import operating_point
 from steadyslip.protocol import Protocol
@@ -200,10 +211,22 @@ class Map(Displayed):
                 full = resolve(str(name), self.known())
                 if full in found:
                     problems.append(Problem(f"{place}.{full}", "is named twice; name it once"))
-                found[full] = value
+                found[full] = self._per_area(full, value)
             except UnknownNameError as error:
                 problems.append(Problem(f"{place}.{name}", str(error)))
+            except ParameterError as error:
+                problems += [p.under(place) for p in error.problems]
         return found
+
+    def _per_area(self, name: str, given: Any) -> Any:
+        """Values with their texts converted as `Rig.read` does: totals of a contact with an area, the axis's speed."""
+        if name.startswith("protocol."):
+            return given
+        if isinstance(given, Grid):
+            return replace(given, start=self.rig.read(name, given.start), stop=self.rig.read(name, given.stop))
+        if isinstance(given, (list, tuple)):
+            return type(given)(one if one in SPACINGS else self.rig.read(name, one) for one in given)
+        return given
 
     def _allowed(self, name: str, values: Any) -> tuple[Problem, ...]:
         """Problems of varying a parameter through these values."""

@@ -20,7 +20,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.files.inputs import read_bytes
 from steadyslip.files.sealed import fingerprint
-from steadyslip.files.specifications import rig_to_text
+from steadyslip.files.specifications import stored_text
 from steadyslip.files.tables import fits_form
 from steadyslip.maps.plan.axes import COMPLETE, MOST_POINTS, SAMPLE, Generated
 from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
@@ -243,7 +243,7 @@ def new_layout(plan: Map) -> MapLayout:
     from steadyslip import __version__
 
     try:
-        rig = rig_to_text(plan.rig, plan.protocol)
+        rig = stored_text(plan.rig, plan.protocol)
     except ParameterError:
         rig = ""
     outputs = plan.outputs()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError
-from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, WORDS, status, without_edge
+from steadyslip.linear.status import ABSENT, STABLE, UNDAMPED, UNKNOWN, UNSTABLE, WORDS, status, without_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.maps.view.cut import View
 from steadyslip.maps.view.map_result import MapResult
@@ -18,6 +18,7 @@ _REASONS = {
     UNKNOWN: WORDS[UNKNOWN],
     STABLE: "stable at every value",
     UNSTABLE: "stable at no value",
+    UNDAMPED: "nothing damps it",
 }
 WITHOUT = dict.fromkeys(("hunt_amplitude", "hunt_period"), "does not hunt") | dict.fromkeys(
     ("settling_time", "rest_error"), "does not settle"

@@ -134,7 +134,7 @@ def _usual_step(plant: Plant) -> float:
         raise ParameterError(
             [Problem("protocol", "missing; no gain kp or spring tells how far a step of the target is")]
         )
-    return float(step)
+    return float(f"{step:.6g}")  # as people write it: how far exactly does not matter
 
 
 def cycle_length(strokes: Sequence[Stroke], close: float) -> int:

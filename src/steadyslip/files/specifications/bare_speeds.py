@@ -1,0 +1,53 @@
+"""Questions about speeds without a unit, asked once where a rig file is read."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from steadyslip.core.errors import UnitWarning
+from steadyslip.core.format import format_quantity
+from steadyslip.core.quantities import units_in
+from steadyslip.machine.rig import Rig
+
+SPEEDS = ("m/s", "rad/s")
+LEAST = 1e-3  # least number questioned beside other units: a smaller one is written so in m/s alone
+FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
+BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
+
+
+def question_speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
+    """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
+
+    Parameters
+    ----------
+    rig : Slider or Machine
+    read : mapping of str to (object, str)
+        Names of the values read, each as it was written and with its SI unit.
+    """
+    for text in _questions(rig, read):
+        warnings.warn(text, UnitWarning, stacklevel=2)
+
+
+def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    for si in SPEEDS:
+        own = {name: raw for name, (raw, unit) in read.items() if unit == si}
+        bare = {name: raw for name, raw in own.items() if isinstance(raw, (int, float)) and raw}
+        written = sorted(units_in([raw for raw in own.values() if isinstance(raw, str)]))
+        for name, raw in bare.items():
+            was = f"{name} = {raw:g} has no unit and is read as {raw:g} {si}"
+            if written and si not in written and abs(raw) >= LEAST:
+                yield f"{was}; other speeds of the file are in {', '.join(written)}: write the unit that is meant"
+            elif name == "drive.velocity" and si == "m/s" and (law := _outrun(rig, abs(raw))):
+                yield f"{was}, {law}: write the unit that is meant"
+
+
+def _outrun(rig: Rig, speed: float) -> str:
+    """How far a speed is beyond those of the friction; empty if it is not."""
+    kinds = ("reference rate", "velocity scale")
+    own = {name: float(rig.value(name) or 0.0) for kind in kinds for name in rig.of_kind(kind)}
+    if not any(own.values()) or speed < FAST or speed < BEYOND_LAW * max(own.values()):
+        return ""
+    name, scale = max(own.items(), key=lambda item: item[1])
+    return f"{speed / scale:.2g} times {name}, {format_quantity(scale, 'm/s')}"

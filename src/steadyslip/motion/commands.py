@@ -106,6 +106,12 @@ def _pieces(texts: Iterable[str], rig: Slider | Machine) -> list[Piece]:
     """Parse pieces; raises all problems together."""
     found, problems = [], []
     for text in texts:
+        if text.endswith(".toml"):
+            message = (
+                'is a file; allowed: a piece such as "hold at=10s". The protocol of a file is its table [protocol]'
+            )
+            problems.append(Problem(repr(text), f"{message}: copy that into the rig's"))
+            continue
         try:
             found.append(piece_from_text(text, rig.area, rig))
         except ParameterError as error:

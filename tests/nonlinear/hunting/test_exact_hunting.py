@@ -172,3 +172,25 @@ def test_a_controller_without_samples_is_the_limit_of_short_ones(more):
 
 def test_the_usual_step_is_a_round_number():
     assert [one.by for one in ss.hunt(ss.read_rig(EXAMPLES / "hunting-axis.toml"), until=0.01).protocol.pieces] == [1.0]
+
+
+def test_bristles_that_creep_to_the_target_settle():
+    """The integral brings them there; it was run on for 31 years, and the last of nine strokes told as hunting."""
+    axis = ss.rig_from_text("""
+    contact = {law = "constant", preload = "3.2 kN"}
+    slider = {area = "200 cm^2", mass = "240 kg", stiffness = "12 N/um", damping = "5 N s/mm"}
+    drive = {control = "pid", velocity = 0, kp = "12 N/um", kd = "5 N s/mm", ki = "20 N/um/s"}
+    [friction]
+    law = "lugre"
+    mu_coulomb = 0.11
+    mu_static = 0.19
+    v_stribeck = "8 mm/min"
+    viscous = "1.25 s/m"
+    bristle_stiffness = 125000
+    """)
+    found = ss.hunt(axis)
+    assert found.hunts is False
+    assert found.sentence == f"SETTLES on the target after {found.settled_at:.2f} s"
+    late = found.time > 0.5 * found.settled_at
+    assert np.abs(found.error[late]).max() < 1e-3 * np.abs(found.error).max()
+    assert found.settled_at == found.time[-1] < 60.0

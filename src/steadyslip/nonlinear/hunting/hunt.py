@@ -166,7 +166,8 @@ def _result(
     period = own[-1].start - own[-1 - count].start if count else np.nan
     hunts: bool | None = False if at_rest else True if count or motion.runs_away else _trend(own)
     rested = max([since, *(one.end for one in strokes if np.isfinite(one.end))])
-    settled = (motion.time if any(motion.mode.contacts) else rested) if at_rest else np.nan
+    creeps = any(motion.mode.contacts) or not motion.exact
+    settled = (motion.time if creeps else rested) if at_rest else np.nan
     if at_rest:
         seen = -motion.watched[0:1] @ motion.state
     elif motion.runs_away:

@@ -12,7 +12,7 @@ from steadyslip.core.results import ReadOnly
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.plant import Array
-from steadyslip.nonlinear.hunting.stick_and_slip import Stroke
+from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke
 from steadyslip.protocol import Protocol
 
 SYMMETRIC = 1e-3  # relative difference of the two sides up to which they are written as one: four digits are printed
@@ -95,11 +95,14 @@ class Hunt(ReadOnly):
             else:
                 size = f"±{size}"
             often = f"every {format_quantity(self.period, 's')}" if np.isfinite(self.period) else "without a period"
+            often += "" if self.repeats or np.isnan(self.period) else " on average"
             return f"HUNTS {size} about the target {often}"
         if self.hunts is None:
             return f"NOT DECIDED by {format_quantity(self._end, 's')}: the last strokes reach {size} from the target"
         if np.isfinite(self.settled_at):
-            return f"SETTLES within {size} of the target after {format_quantity(self.settled_at, 's')}"
+            there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # the rest is when it was stopped
+            where = "on the target" if there else f"within {size} of the target"
+            return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
 
     @property

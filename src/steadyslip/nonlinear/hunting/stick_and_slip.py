@@ -226,7 +226,8 @@ class Motion:
     def at_rest(self) -> bool:
         """True if nothing moves any more and the controller's integral is constant.
 
-        Sliding that ever slower approaches the target counts as rest where the error is `STILL` of the largest.
+        Sliding, or bristles, that ever slower approach the target count as at rest where the error is `STILL` of the
+        largest.
         """
         plant, n = self.plant, self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
@@ -238,7 +239,7 @@ class Motion:
             return self.sampled.constant and not any(self.mode.contacts)
         rates = self._piece().matrix @ self.state
         if not any(self.mode.contacts):
-            return not rates[2 * n]
+            return bool(abs(rates[2 * n]) <= (0.0 if self.exact else STILL * self.farthest))
         creeps = np.any(np.abs(rates[n : 2 * n]) > pace * self._piece().fastest)
         return not (creeps or abs(rates[2 * n]) > STILL * self.farthest)
 

@@ -196,6 +196,8 @@ def test_shortened_code_says_the_same():
     assert minify(nested) == "const t=`a ${b ? `- ${c} ` : \" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ +1- -f;"
     sums = "    var t2 = ((R[0] * x) + R[1]);\n    var t3 = ((t2 - (x * x)) < (t2 * (x + 1)));\n"
     assert minify_generated(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));"
+    negative = "    var t1 = R[0] + (-R[1]) * x + (-1.0);\n    var t2 = (-x) - 20.0;\n"
+    assert minify_generated(negative) == "var t1=R[0]-R[1]*x-1,t2=-x-20;"
     generated = "function f(R, x, y) {\n    var t1 = R[0] - (-2.5e-07);\n    y[0] = (t1 >= 0) ? t1 : (1 / x);\n}\n"
     assert minify_generated(generated) == "function f(R,x,y){var t1=R[0]-(-2.5e-07);y[0]=(t1>=0)?t1:1/x;}\n"
 
@@ -222,7 +224,7 @@ def test_no_two_parameters_of_a_part_are_called_the_same():
     known = page_parts(rig(friction=own), "A rig", 0)[1]["parameters"]
     called = [(one["name"].partition(".")[0], one["title"]) for one in known]
     assert len(set(called)) == len(called)
-    titles = {"direct effect a", "evolution effect b (1)", "evolution effect b (2)"}
+    titles = {"direct effect a", "evolution effect b₁", "evolution effect b₂"}
     assert {("friction", title) for title in titles} <= set(called)
 
 

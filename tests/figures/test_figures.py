@@ -326,7 +326,7 @@ def test_the_locus_shows_the_eigenvalues_of_every_stiffness():
     np.testing.assert_array_equal(np.asarray(drawn), expected[np.isfinite(expected)])
     np.testing.assert_allclose(np.unique(points.get_array()), k / GPa)
     bar = ax.figure.axes[1]
-    assert bar.get_ylabel() == "slider.stiffness (GPa/m)"
+    assert bar.get_ylabel() == "stiffness k (GPa/m)"
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("growth rate Re s (1/s)", "angular frequency Im s (rad/s)")
 
 

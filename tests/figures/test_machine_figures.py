@@ -10,7 +10,10 @@ import pytest
 import steadyslip as ss
 from command import run
 from machines import at_random, brake, rate_state, three_bodies, two_blocks, two_mass
+from read_pages import words
 from steadyslip import figures
+from steadyslip.figures.style import parameter_label
+from steadyslip.machine.letters import said
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
 MACHINES = {path.stem: ss.read_rig(path) for path in EXAMPLES} | {
@@ -73,7 +76,7 @@ def test_bars_are_the_stable_values():
         known = {m.parameter: m for m in found.margins}
         seen = 0
         for row, label in enumerate(rows):
-            full = next(n for n in known if n == label or n.partition(".")[2] == label)
+            full = next(n for n in known if parameter_label(found.rig, n) == label)
             bars = [p for p in ax.patches if abs(p.get_y() + p.get_height() / 2 - row) < 0.01]
             bars = sorted((p.get_x(), p.get_x() + p.get_width()) for p in bars[1:])
             try:
@@ -97,7 +100,8 @@ def test_what_bars_leave_out_is_said():
     assert len(ax.get_yticks()) == len(drawn)
     assert f"{len(left)} more edges not drawn" in ax.get_xlabel()
     document = ss.report(found, explorer=False).html
-    assert f"the edge of {', '.join(undrawn_edges(found))}: a factor of 100 away or more" in document
+    named = ", ".join(said(found.rig, name) for name in left)
+    assert f"the edge of {named}: a factor of 100 away or more" in words(document)
 
 
 def test_the_leading_mode_and_the_eigenvalues_are_those_of_the_analysis():

@@ -31,4 +31,4 @@ class Balanced(HTMLParser):
 
 def words(text):
     """Visible text of a page, with its elements checked."""
-    return re.sub(r"\s+", " ", " ".join(Balanced(text.replace("<wbr>", "")).words))
+    return re.sub(r"\s+", " ", " ".join(Balanced(re.sub(r"<sub>(\w+)</sub>", r"_\1", text).replace("<wbr>", "")).words))

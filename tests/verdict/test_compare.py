@@ -139,7 +139,7 @@ def test_files_are_compared_with_their_tolerances(tmp_path):
     assert "slider.stiffness  12 N/um -> 25 N/um" in done.stdout
     assert "a becomes stable with that of b in slider.stiffness" in done.stdout
     assert re.search(r"stable in +24\.\d+ ± 0\.\d+ % +\w", done.stdout)
-    assert "slider.stiffness" in page.read_text()
+    assert "a becomes stable with that of b in stiffness k" in page.read_text()
 
 
 def test_json_has_both_rigs_and_their_differences():

@@ -79,7 +79,7 @@ def test_tolerances_that_cannot_be_are_refused(given, words):
 def test_reports_say_how_sure_the_verdict_is():
     document = ss.report(ss.tolerate(OWN, GIVEN), explorer=False).html
     assert "How sure is that, within the tolerances?" in document
-    assert "friction.a" in document
+    assert "direct effect a" in document
     assert "all together" in document
 
 

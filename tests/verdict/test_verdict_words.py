@@ -258,6 +258,6 @@ angle = "-20 deg"
 velocity = "1 m/s"
 """
     words = " ".join(str(ss.analyze(ss.rig_from_text(text))).split())
-    assert "the pull T the normal force of foot follows T, the pull of links.arm a disturbance" in words
+    assert "the pull T the normal force of foot follows T, the pull of arm a disturbance" in words
     plain = text.replace('law = "inclined-spring"', 'law = "constant"').replace('angle = "-20 deg"', "")
     assert "the pull T" not in str(ss.analyze(ss.rig_from_text(plain)))

@@ -8,6 +8,7 @@ import re
 import pytest
 
 import steadyslip as ss
+from steadyslip.machine.letters import said
 
 SHEETS = {
     "feed axis": """
@@ -219,4 +220,4 @@ def test_the_edge_of_the_first_line_is_that_of_the_first_row(name):
     first = next(row.split()[0] for row in rows if " -> " in row)
     assert with_edge[0].parameter.endswith(first)
     if "nearest edge is that of" in " ".join(text.split()):
-        assert f"nearest edge is that of {first}" in " ".join(text.split())
+        assert f"nearest edge is that of {said(found.rig, with_edge[0].parameter)}" in " ".join(text.split())

@@ -59,7 +59,10 @@ MODULES = (
 """Modules of the page in `web/`, each after those that it imports."""
 ENTRIES = ("mount", "render")
 """Functions of the modules that the page and its widget call."""
-DEFAULTS = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
+DEFAULTS = {
+    "factor": 1.0, "low": 0, "high": None, "lowAllowed": False, "highAllowed": True, "whole": False,
+    "allowed": "a finite number > 0",
+}  # fmt: skip
 """Entries of a parameter that a page leaves out; `web/rig.js` has the same defaults."""
 WORKER_MODULES = ("motion",)
 """Modules of the worker, which also gets the runtime and the driver, as text from the page."""
@@ -183,7 +186,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     from steadyslip import __version__
 
     names = list(_variable_parameters(rig, facts))
-    places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
+    places = [names.index(name) if name in names else name for name in facts["parameters"]]
     point = operating_point(rig, None, rig.kept_zeros(), branch)
     hints = [one.contact.lock_up for one in rig.laws_by_contact().values()]
     axial, file = "slider.axial_stiffness", own_file(rig, names, text)
@@ -193,7 +196,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "branch": branch,
         "area": rig.area,
         "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],
-        "facts": dict(facts),
+        "facts": {key: value for key, value in facts.items() if key != "parameters"},  # the page has them from `places`
         "places": places,
         "fixed": [float(np.asarray(value)) for value in point.arguments],
         "axial": names.index(axial) if axial in names else -1,
@@ -272,17 +275,15 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     domain, value = one.role.domain, float(one.value or 0.0)
     factor, unit = display_unit(rig, one.role.unit)
     natural = Search(rig, name, rig.kept_zeros(), branch).natural_size()
-    group = _group(rig, name)
     found = {
         "name": name,
-        "group": group,
         "title": said(rig, name),
         "letter": letter_of(rig, name),
         "doc": one.role.doc,
         "unit": unit,
         "factor": factor,
         "value": value,
-        "natural": natural if math.isfinite(natural) else 1.0,
+        "natural": _rounded(natural, 4) if math.isfinite(natural) else 1.0,
         "low": domain.low if math.isfinite(domain.low) else None,
         "high": domain.high if math.isfinite(domain.high) else None,
         "lowAllowed": domain.low_allowed and not (one.role.adds_state and domain.low == 0),
@@ -293,13 +294,8 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     return {key: value for key, value in found.items() if key not in DEFAULTS or value != DEFAULTS[key]}
 
 
-_MEMBERS = {"bodies": "body", "links": "link", "contacts": "contact"}
-
-
-def _group(rig: Slider | Machine, name: str) -> str:
-    """Heading of a parameter on the page."""
-    kind, _, rest = name.partition(".")
-    return f"{_MEMBERS[kind]} {rest.partition('.')[0]}" if kind in _MEMBERS else kind
+def _rounded(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
@@ -313,14 +309,14 @@ def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[s
     for change in changes:
         other = rig.with_values(change) if change else rig
         word = " and ".join(f"{name} = {value!r}" for name, value in change.items()) or "the rig itself"
-        found.append({"name": word, **_answer(other, names, branch, stiff)})
+        changed = {names.index(name): float(other.value(name) or 0.0) for name in change}
+        found.append({"name": word, "values": changed, **_answer(other, branch, stiff)})
     return found
 
 
-def _answer(rig: Slider | Machine, names: list[str], branch: int, bar: str | None) -> dict[str, Any]:
+def _answer(rig: Slider | Machine, branch: int, bar: str | None) -> dict[str, Any]:
     point = operating_point(rig, None, rig.kept_zeros(), branch)
     answer: dict[str, Any] = {
-        "values": [float(rig.value(name) or 0.0) for name in names],
         "status": int(status(point)),
         "critical": None,
         "eigenvalues": [],
@@ -329,7 +325,7 @@ def _answer(rig: Slider | Machine, names: list[str], branch: int, bar: str | Non
     if answer["status"] in (STABLE, UNSTABLE):
         with np.errstate(all="ignore"):
             answer["critical"], eigenvalues = ways_of(rig).judged(rig, point, bar)
-        answer["eigenvalues"] = [[s.real, s.imag] for s in eigenvalues]
+        answer["eigenvalues"] = [[_rounded(s.real, 12), _rounded(s.imag, 12)] for s in eigenvalues]
     return answer
 
 

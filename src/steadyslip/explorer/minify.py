@@ -14,6 +14,8 @@ _LITERAL = re.compile(
 # products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order of rounding
 _PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
 _SUM = re.compile(r"(?<=[\[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|\]])")
+# + (-a) b is - a b, to the last digit
+_NEGATIVE = re.compile(r"(?:\+|(?<=[=(,?:]))\(-([\w.\[\]]+)\)(?=[-+*/),;])")
 _LINE_END = re.compile(r"([;{,\n])\n+")  # line ends that end no statement
 _SPACED_SIGNS = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
@@ -88,9 +90,10 @@ def _strip_spaces(found: re.Match[str]) -> str:
 def minify_generated(text: str) -> str:
     """Minified generated code, which has no strings: no spaces at signs, adjacent declarations joined."""
     bare = re.sub(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *", r"\1", re.sub(r"^ +", "", text, flags=re.M))
+    bare = re.sub(r"(?<![\w.])(\d+)\.0(?![\de])", r"\1", bare)
     before = ""
     while before != bare:
-        before, bare = bare, _SUM.sub(r"\1", _PRODUCT.sub(r"\1", bare))
+        before, bare = bare, _SUM.sub(r"\1", _PRODUCT.sub(r"\1", _NEGATIVE.sub(r"-\1", bare)))
     bare = _drop_brackets(bare)
     rows: list[str] = []
     for declared, lines in groupby(bare.split("\n"), lambda line: line.startswith("var ") and line.endswith(";")):

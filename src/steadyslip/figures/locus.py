@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.palette import BLACK, VERMILION
-from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit
+from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
 from steadyslip.linear import eigenvalues, stable_stiffness, stable_values
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -81,7 +81,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     )
     figure = ax.get_figure()
     if figure is not None:
-        figure.colorbar(points, ax=ax, label=axis_label(along, unit_name))
+        figure.colorbar(points, ax=ax, label=axis_label(parameter_label(rig, along), unit_name))
     for edge, at in zip(edges, crossings, strict=True):
         what = f"gain {along.rpartition('.')[2]}" if along == name else "stiffness"
         label = f"critical {what} {edge / factor:.4g} {unit_name}"

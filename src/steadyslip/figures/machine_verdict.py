@@ -12,7 +12,7 @@ from matplotlib.ticker import NullLocator
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLUE, GREY, ORANGE, SKY, STABLE, VERMILION
-from steadyslip.figures.style import axes_or_new
+from steadyslip.figures.style import axes_or_new, parameter_label
 from steadyslip.linear import Modes
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
@@ -42,8 +42,9 @@ def machine_verdict(found: Analysis) -> np.ndarray:
     rows = max(len(_drawn_margins(found)), 4)
     if found.mode is None:
         return np.array([stable_ranges(found, axes_or_new(None, 1.4 + 0.32 * rows))])
-    figure = plt.figure(figsize=(9.6, 1.6 + 0.34 * rows), layout="constrained")
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.5, 1))
+    beside = 3.6 + 0.28 * len(found.mode.amplitudes)  # inches for the mode, its energies and the eigenvalues
+    figure = plt.figure(figsize=(9.6, max(1.6 + 0.34 * rows, beside)), layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.5, 1), height_ratios=(1.3, 1))
     axes = [figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])]
     for draw, ax in zip((stable_ranges, mode_shape, eigenvalue_plane), axes, strict=True):
         draw(found, ax)
@@ -87,7 +88,7 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     ax.set_xscale("log")
     ax.set_xlim(1 / _SPAN_FACTOR, _SPAN_FACTOR)
     ax.set_xticks([0.01, 0.1, 1, 10, 100], ["1/100", "1/10", "as it is", "× 10", "× 100"])
-    _label_rows(ax, [_label(margin.parameter) for margin in margins])
+    _label_rows(ax, [parameter_label(found.rig, margin.parameter) for margin in margins])
     left = len(undrawn_edges(found))
     more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
     ax.set_xlabel(f"value over its own; blue: stable, hatched: unstable or none{more}")
@@ -113,11 +114,6 @@ def _label_rows(ax: Axes, labels: list[str]) -> None:
     ax.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):
         ax.spines[side].set_visible(False)
-
-
-def _label(name: str) -> str:
-    parts = name.split(".")
-    return ".".join(parts[1:]) if parts[0] in ("bodies", "links", "contacts") else name
 
 
 def _stable_intervals(margin: Margin) -> list[tuple[float, float]]:

@@ -13,8 +13,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
-from steadyslip.figures.map_axes import is_geometric, short_name
-from steadyslip.figures.style import axes_or_new, axis_label, display_unit
+from steadyslip.figures.map_axes import is_geometric
+from steadyslip.figures.style import axes_or_new, axis_label, display_unit, parameter_label
 from steadyslip.machine.machine import Machine
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     >>> axes.figure.savefig("cycle-branch.svg")
     """
     ax = axes_or_new(ax)
-    area, origin, along = branch.rig.printed_area(branch.along), 0.0, short_name(branch.along)
+    area, origin, along = branch.rig.printed_area(branch.along), 0.0, parameter_label(branch.rig, branch.along)
     factor, unit = display_unit(branch.unit, branch.onset.value, area)
     reach = max((abs(one.value - branch.onset.value) for one in branch.cycles), default=0.0)
     if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # all ticks of an axis of values would read alike
@@ -160,7 +160,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
     for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
         factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.printed_area(name))
         factors.append(factor)
-        names.append(axis_label(short_name(name), shown_unit))
+        names.append(axis_label(parameter_label(curve.rig, name), shown_unit))
     x, y = curve.first / factors[0], curve.second / factors[1]
     for kind, colour in _COLOURS.items():
         here = curve.kind == kind

@@ -9,6 +9,7 @@ from steadyslip.core.palette import BLACK, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.figures.style import axes_or_new
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
+from steadyslip.machine.letters import said
 from steadyslip.verdict.tolerances import Tolerated
 from steadyslip.verdict.words import told_range
 
@@ -57,7 +58,9 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
             hatch="///",
             label="all together",
         )
-    ranges = [f"{one.parameter}\n{told_range(found.rig, one.parameter, one.low, one.high)}" for one in shown]
+    ranges = [
+        f"{said(found.rig, one.parameter)}\n{told_range(found.rig, one.parameter, one.low, one.high)}" for one in shown
+    ]
     ax.set_yticks(
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
     )
@@ -66,7 +69,11 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     ax.axvline(1.0 if edges else 0.0, color=BLACK, linewidth=1)
     own = safety_factor(found.rig, along=found.along) if edges else growth_rate(found.rig)
     ax.axvline(float(own), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")
-    ratio = "stiffness over critical stiffness" if found.along == STIFFNESS else f"{found.along} over its edge"
+    ratio = (
+        "stiffness over critical stiffness"
+        if found.along == STIFFNESS
+        else f"{said(found.rig, found.along)} over its edge"
+    )
     ax.set_xlabel(f"{ratio} (1)" if edges else "growth rate of disturbances (1/s)")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small")
     return ax

@@ -34,13 +34,14 @@ class Body(FrozenRecord, family="body"):
 class SlidingBody(Body, name="slide"):
     """A body that moves along the slide only."""
 
-    mass: float = parameter("kg", nonnegative, "mass m", default=0.0, structural=True)
+    mass: float = parameter("kg", nonnegative, "mass m", default=0.0, structural=True, letter="m")
     force: float = parameter(
         "N",
         real,
         "constant force in the direction of motion (weight on a slope, process)",
         default=0.0,
         structural=True,
+        letter="F",
     )
 
     def inertia_of(self) -> Any:
@@ -54,7 +55,7 @@ class PlanarBody(SlidingBody, name="plane"):
     """A body that moves along the slide and away from the surface; a compliant contact carries it."""
 
     press: float = parameter(
-        "N", real, "constant force towards the surface (weight, piston)", default=0.0, structural=True
+        "N", real, "constant force towards the surface (weight, piston)", default=0.0, structural=True, letter="P"
     )
     lifts: ClassVar[bool] = True
 
@@ -65,8 +66,10 @@ class PlanarBody(SlidingBody, name="plane"):
 class RotatingBody(Body, name="rotation"):
     """A body that rotates: motor, screw, gear wheel."""
 
-    inertia: float = parameter("kg m^2", nonnegative, "moment of inertia J", default=0.0, structural=True)
-    torque: float = parameter("N m", real, "constant torque in the direction of motion", default=0.0, structural=True)
+    inertia: float = parameter("kg m^2", nonnegative, "moment of inertia J", default=0.0, structural=True, letter="J")
+    torque: float = parameter(
+        "N m", real, "constant torque in the direction of motion", default=0.0, structural=True, letter="M"
+    )
     turns: ClassVar[bool] = True
 
     def inertia_of(self) -> Any:

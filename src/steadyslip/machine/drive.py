@@ -22,7 +22,7 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
     turns: ClassVar[bool] = False
     """True of a machine's load point that rotates."""
 
-    velocity: float = parameter("m/s", moving, "velocity of the load point in steady sliding")
+    velocity: float = parameter("m/s", moving, "velocity of the load point in steady sliding", letter="v_0")
 
     def proportional(self) -> Any:
         """Stiffness added by the controller (Pa/m)."""
@@ -52,13 +52,23 @@ class SteadyDrive(Drive, name="steady", kw_only=False):
 class PD(Holding, Drive, name="pd", kw_only=False):
     """A position controller with proportional and derivative gain, following the ramp v0 t."""
 
-    velocity: float = parameter("m/s", speed, "velocity of the load point in steady sliding; 0 to hold a place")
+    velocity: float = parameter(
+        "m/s", speed, "velocity of the load point in steady sliding; 0 to hold a place", letter="v_0"
+    )
     force_limit: float | None = limit("Pa")
     integral_limit: float | None = windup("Pa")
-    kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True, kind="stiffness")
-    kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True)
+    kp: float = parameter(
+        "Pa/m", nonnegative, "proportional gain", default=0.0, structural=True, kind="stiffness", letter="k_p"
+    )
+    kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
     delay: float = parameter(
-        "s", nonnegative, "dead time between measuring and acting", default=0.0, structural=True, kind="delay"
+        "s",
+        nonnegative,
+        "dead time between measuring and acting",
+        default=0.0,
+        structural=True,
+        kind="delay",
+        letter="t_d",
     )
 
     def proportional(self) -> Any:
@@ -74,7 +84,9 @@ class PD(Holding, Drive, name="pd", kw_only=False):
 class PID(PD, name="pid", kw_only=False):
     """A position controller with proportional, integral and derivative gain, following the ramp v0 t."""
 
-    ki: float = parameter("Pa/m/s", nonnegative, "integral gain", default=0.0, structural=True, adds_state=True)
+    ki: float = parameter(
+        "Pa/m/s", nonnegative, "integral gain", default=0.0, structural=True, adds_state=True, letter="k_i"
+    )
 
     def integral(self) -> Any:
         return None if self.ki == 0 else self.ki

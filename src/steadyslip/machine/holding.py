@@ -41,7 +41,7 @@ def encoder(unit: str) -> Any:
 class Holding(FrozenRecord):
     """Base of controllers, which hold a place at velocity 0; with `sample_time` they act by differences over it."""
 
-    velocity: float = parameter("m/s", speed, "velocity v0 in steady sliding; 0 to hold a place")
+    velocity: float = parameter("m/s", speed, "velocity v0 in steady sliding; 0 to hold a place", letter="v_0")
     derivative: str = option(
         "error", "measurement", doc="at velocity 0: of what the derivative is taken", default="error"
     )

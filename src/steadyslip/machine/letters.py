@@ -7,27 +7,34 @@ from typing import Final
 
 from steadyslip.machine.rig import Rig
 
-LETTERS: Final = {
-    "slider.stiffness": "k",
-    "slider.mass": "m",
-    "slider.damping": "c",
-    "slider.radiation_damping": "eta",
-    "drive.velocity": "v_0",
-}
-"""Letters of a slider's own parameters in equations; those of laws are declared with their parameters."""
-_UNWRITTEN: Final = {"slider.axial_stiffness": "k_s"}
-"""Letters of parameters that are not in the equations themselves."""
-_WORDS = {
+_BY_KIND = {
     "friction level": "friction",
     "direct effect": "direct effect",
     "evolution effect": "evolution effect",
     "slip distance": "slip distance",
     "reference rate": "reference rate",
     "stress share": "stress share",
-}  # fmt: skip -- words for a kind of parameter whose name is its letter
-_GREEK = dict(zip("alpha beta gamma delta eta theta mu sigma tau psi".split(), "αβγδηθμστψ", strict=True))  # noqa: SIM905
+}
+"""Words for a kind of parameter whose name is its letter."""
+_BY_NAME = {
+    "kp": "proportional gain",
+    "kd": "derivative gain",
+    "ki": "integral gain",
+    "kv": "position gain",
+    "tn": "reset time",
+    "delay": "dead time",
+    "viscous": "viscous friction",
+    "mu_coulomb": "Coulomb friction",
+    "mu_static": "static friction",
+    "v_stribeck": "Stribeck velocity",
+    "sigma_ref": "reference stress",
+    "press": "pressing force",
+}
+"""Words for names that are short for them."""
+_GREEK = dict(zip("alpha beta gamma delta eta theta mu phi sigma tau psi".split(), "αβγδηθμφστψ", strict=True))  # noqa: SIM905
 _DIGITS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_MEMBERS = ("bodies", "links", "contacts")
+MEMBERS: Final = ("bodies", "links", "contacts")
+"""First parts of the names of parameters of a machine's members, which are followed by the member's name."""
 
 
 def letter_of(rig: Rig, name: str) -> str:
@@ -38,11 +45,17 @@ def letter_of(rig: Rig, name: str) -> str:
     ['σ_0', 'd_c', 'm']
     """
     last = name.rpartition(".")[2]
-    known = LETTERS.get(name) or _UNWRITTEN.get(name) or rig.parameters()[name].role.letter
+    known = rig.parameters()[name].role.letter
     base, line, below = (known or last).partition("_")
     if not known and len(base) > 1 and base not in _GREEK:
         return ""
-    return _GREEK.get(base, base) + line + below
+    number = _number_in(name)
+    return "".join([_GREEK.get(base, base), line or "_" * bool(number), _GREEK.get(below, below), number])
+
+
+def _number_in(name: str) -> str:
+    """Number of one of several states in the name of its parameter; empty for others."""
+    return next((part for part in name.split(".") if part.isdigit()), "")
 
 
 def words_of(rig: Rig, name: str) -> str:
@@ -53,30 +66,55 @@ def words_of(rig: Rig, name: str) -> str:
     ['preload', 'slip distance', 'drive velocity']
     """
     part, *between, last = name.split(".")
-    base = last.partition("_")[0]
-    words = last.replace("_", " ")
-    if len(base) == 1 or base in _GREEK:
-        words = _WORDS.get(rig.parameters()[name].role.kind, "")
+    base, role, own = last.partition("_")[0], rig.parameters()[name].role, part in MEMBERS
+    words = _BY_NAME.get(last, "") if role.letter else ""  # without a letter it is a user's, of the same name
+    if not words and (len(base) == 1 or base in _GREEK):
+        words = _BY_KIND.get(role.kind, "reference velocity" if last == "v_ref" else "" if own else part)
     elif part == "drive":
-        words = f"drive {words}"
-    return f"{between[0]} {words}".strip() if part in _MEMBERS and between else words
+        words = f"drive {words or last.replace('_', ' ')}"
+    words = words or last.replace("_", " ") * (len(base) > 1)
+    member = ".".join([between[0], *(between[2:3] if between[1:2] == ["points"] else [])]) if own and between else ""
+    return f"{member} {words}".strip()
 
 
 def said(rig: Rig, name: str) -> str:
-    """Words and letter of a parameter as plain text; its dotted name if these are not those of one parameter alone.
+    """Words and letter of a parameter as plain text, after its part of the rig where these alone name two parameters.
+
+    What differs between rigs but is no number, such as a choice of law, is named by the words of its path; names joined
+    by + are told one by one.
 
     >>> from steadyslip.reproduce import paper_rig
     >>> said(paper_rig(), "contact.preload"), said(paper_rig(), "contact.angle"), said(paper_rig(), "friction.d_c")
     ('preload σ₀', 'angle ψ', 'slip distance d_c')
+    >>> said(paper_rig(), "friction.evolution")
+    'friction evolution'
     """
+    if "+" in name:
+        return " and ".join(said(rig, one) for one in name.split("+"))
+    if name not in rig.parameters():
+        return name.replace(".", " ").replace("_", " ")
     text = _said(rig, name)
-    return text if text and [_said(rig, other) for other in rig.parameters()].count(text) == 1 else name
+    if text and [_said(rig, other) for other in rig.parameters()].count(text) == 1:
+        return text
+    return f"{name.partition('.')[0]} {text}"
+
+
+def worded(rig: Rig, text: str) -> str:
+    """Text with words and letters instead of the dotted names of parameters.
+
+    >>> from steadyslip.reproduce import paper_rig
+    >>> worded(paper_rig(), "measure friction.d_c (67 %) next")
+    'measure slip distance d_c (67 %) next'
+    """
+    return re.sub(
+        r"(?<![\w.-])\w+(?:\.[\w-]+)+",
+        lambda found: said(rig, found[0]) if found[0] in rig.parameters() else found[0],
+        text,
+    )
 
 
 def _said(rig: Rig, name: str) -> str:
-    number = re.search(r"\.(\d+)\.", name)  # of one of several states
-    text = f"{words_of(rig, name)} {plain(letter_of(rig, name))}".strip()
-    return f"{text} ({number[1]})" if number else text
+    return f"{words_of(rig, name)} {plain(letter_of(rig, name))}".strip()
 
 
 def plain(letter: str) -> str:

@@ -58,11 +58,20 @@ class Link(FrozenRecord, family="link"):
 class Spring(Link, name="spring"):
     """A spring and a dashpot between bodies that slide; at an angle where they move in the plane."""
 
-    stiffness: float | None = parameter("N/m", positive, "stiffness k along the link", default=None, kind="stiffness")
-    damping: float = parameter("N s/m", nonnegative, "damping c along the link", default=0.0, structural=True)
+    stiffness: float | None = parameter(
+        "N/m", positive, "stiffness k along the link", default=None, kind="stiffness", letter="k"
+    )
+    damping: float = parameter(
+        "N s/m", nonnegative, "damping c along the link", default=0.0, structural=True, letter="c"
+    )
     direction: str = option("slide", "normal", doc="along the slide, or away from the surface", default="slide")
     angle: float = parameter(
-        "rad", line, "by which the second end lies higher, seen along the slide", default=0.0, structural=True
+        "rad",
+        line,
+        "angle φ by which the second end lies higher, seen along the slide",
+        default=0.0,
+        structural=True,
+        letter="phi",
     )
 
     def inconsistencies(self) -> Iterator[Problem]:
@@ -96,10 +105,14 @@ class Screw(Link, name="screw"):
     turning: ClassVar[tuple[bool | None, bool | None]] = (True, False)
 
     lead: float = parameter(
-        "m/rad", positive, "travel for an angle, such as '5 mm/rev' (the pitch of a screw of one start)"
+        "m/rad", positive, "travel h for an angle, such as '5 mm/rev' (the pitch of a screw of one start)", letter="h"
     )
-    stiffness: float | None = parameter("N/m", positive, "stiffness k along the slide", default=None, kind="stiffness")
-    damping: float = parameter("N s/m", nonnegative, "damping c along the slide", default=0.0, structural=True)
+    stiffness: float | None = parameter(
+        "N/m", positive, "stiffness k along the slide", default=None, kind="stiffness", letter="k"
+    )
+    damping: float = parameter(
+        "N s/m", nonnegative, "damping c along the slide", default=0.0, structural=True, letter="c"
+    )
 
     def rigidity(self) -> Any:
         return self.stiffness
@@ -117,12 +130,14 @@ class Shaft(Link, name="shaft"):
     turning: ClassVar[tuple[bool | None, bool | None]] = (True, True)
 
     gear: float | None = parameter(
-        "1", positive, "gear ratio, turns of the second body for one turn of the first", default=None
+        "1", positive, "gear ratio i, turns of the second body for one turn of the first", default=None, letter="i"
     )
     stiffness: float | None = parameter(
-        "N m/rad", positive, "torsional stiffness at the second body", default=None, kind="stiffness"
+        "N m/rad", positive, "torsional stiffness k at the second body", default=None, kind="stiffness", letter="k"
     )
-    damping: float = parameter("N m s/rad", nonnegative, "torsional damping there", default=0.0, structural=True)
+    damping: float = parameter(
+        "N m s/rad", nonnegative, "torsional damping c there", default=0.0, structural=True, letter="c"
+    )
 
     def rigidity(self) -> Any:
         return self.stiffness

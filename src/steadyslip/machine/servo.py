@@ -26,7 +26,7 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
     turns: ClassVar[bool] = False
 
-    velocity: float = parameter("m/s", moving, "velocity v0 in steady sliding")
+    velocity: float = parameter("m/s", moving, "velocity v0 in steady sliding", letter="v_0")
     velocity_of: str | None = setting(
         Text("the body whose velocity is given, in m/s or rad/s; that on which the drive acts unless given"),
         default=None,
@@ -61,7 +61,7 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
     """A shaft end that turns at constant speed; links tie bodies to it as ``drive``."""
 
     turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", moving, "speed of the load point in steady sliding")
+    velocity: float = parameter("rad/s", moving, "speed of the load point in steady sliding", letter="v_0")
 
 
 class _Controller(Holding, MachineDrive):
@@ -72,7 +72,13 @@ class _Controller(Holding, MachineDrive):
         Text("the body whose place it measures; that on which it acts unless given"), default=None
     )
     delay: float = parameter(
-        "s", nonnegative, "dead time between measuring and acting", default=0.0, structural=True, kind="delay"
+        "s",
+        nonnegative,
+        "dead time between measuring and acting",
+        default=0.0,
+        structural=True,
+        kind="delay",
+        letter="t_d",
     )
 
     def lateness(self) -> Any:
@@ -88,8 +94,8 @@ class _Controller(Holding, MachineDrive):
 class PositionPD(_Controller, name="pd"):
     """A position controller with proportional and derivative gain."""
 
-    kp: float = parameter("N/m", positive, "proportional gain", kind="stiffness")
-    kd: float = parameter("N s/m", nonnegative, "derivative gain", default=0.0, structural=True)
+    kp: float = parameter("N/m", positive, "proportional gain", kind="stiffness", letter="k_p")
+    kd: float = parameter("N s/m", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
 
     def gains(self) -> tuple[Any, Any, Any, Any]:
         return self.kp, self.kd, 0, None
@@ -98,7 +104,7 @@ class PositionPD(_Controller, name="pd"):
 class PositionPID(PositionPD, name="pid"):
     """A position controller with proportional, integral and derivative gain."""
 
-    ki: float = parameter("N/(m s)", positive, "integral gain")
+    ki: float = parameter("N/(m s)", positive, "integral gain", letter="k_i")
 
     def gains(self) -> tuple[Any, Any, Any, Any]:
         return self.kp, self.kd, 0, self.ki
@@ -114,9 +120,9 @@ class Cascade(_Controller, name="p-pi"):
     speed_measured: str | None = setting(
         Text("the body whose speed it measures; that on which it acts unless given"), default=None
     )
-    kv: float = parameter("1/s", positive, "gain Kv of the position loop")
-    kp: float = parameter("N s/m", positive, "gain Kp of the speed loop")
-    tn: float = parameter("s", positive, "reset time Tn of the speed loop")
+    kv: float = parameter("1/s", positive, "gain Kv of the position loop", letter="K_v")
+    kp: float = parameter("N s/m", positive, "gain Kp of the speed loop", letter="K_p")
+    tn: float = parameter("s", positive, "reset time Tn of the speed loop", letter="T_n")
 
     def watched(self) -> tuple[str, str]:
         return self.measured or self.body, self.speed_measured or self.body
@@ -129,7 +135,7 @@ class _Rotary(_Controller):
     """Base of controllers that act on a body that rotates."""
 
     turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", speed, "speed of the body in steady sliding; 0 to hold a place")
+    velocity: float = parameter("rad/s", speed, "speed of the body in steady sliding; 0 to hold a place", letter="v_0")
     force_limit: float | None = limit("N m")
     integral_limit: float | None = windup("N m")
     dead_band: float | None = band("rad")
@@ -139,22 +145,22 @@ class _Rotary(_Controller):
 class RotaryPD(_Rotary, PositionPD, name="rotary-pd"):
     """`PositionPD` of a body that rotates."""
 
-    kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness")
-    kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True)
+    kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness", letter="k_p")
+    kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
 
 
 class RotaryPID(_Rotary, PositionPID, name="rotary-pid"):
     """`PositionPID` of a body that rotates."""
 
-    kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness")
-    kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True)
-    ki: float = parameter("N m/(rad s)", positive, "integral gain")
+    kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness", letter="k_p")
+    kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
+    ki: float = parameter("N m/(rad s)", positive, "integral gain", letter="k_i")
 
 
 class RotaryCascade(_Rotary, Cascade, name="rotary-p-pi"):
     """`Cascade` of a body that rotates."""
 
-    kp: float = parameter("N m s/rad", positive, "gain Kp of the speed loop")
+    kp: float = parameter("N m s/rad", positive, "gain Kp of the speed loop", letter="K_p")
 
 
 def control_for(control: str, turns: bool) -> str:

@@ -45,21 +45,37 @@ class Slider(Rig, section="slider"):
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
     stiffness: float | None = parameter(
-        "Pa/m", nonnegative, "stiffness k along the sliding direction", default=None, kind="stiffness", standing=1e10
+        "Pa/m",
+        nonnegative,
+        "stiffness k along the sliding direction",
+        default=None,
+        kind="stiffness",
+        standing=1e10,
+        letter="k",
     )
     axial_stiffness: float | None = parameter(
-        "Pa/m", nonnegative, "stiffness along the axis of spring, rod or press, instead", default=None, kind="stiffness"
+        "Pa/m",
+        nonnegative,
+        "stiffness along the axis of spring, rod or press, instead",
+        default=None,
+        kind="stiffness",
+        letter="k_s",
     )
-    mass: float = parameter("kg/m^2", nonnegative, "mass m; 0 is quasistatic", default=0.0, structural=True)
-    damping: float = parameter("Pa s/m", nonnegative, "dashpot c beside the spring", default=0.0, structural=True)
+    mass: float = parameter("kg/m^2", nonnegative, "mass m; 0 is quasistatic", default=0.0, structural=True, letter="m")
+    damping: float = parameter(
+        "Pa s/m", nonnegative, "dashpot c beside the spring", default=0.0, structural=True, letter="c"
+    )
     radiation_damping: float = parameter(
         "Pa s/m",
         nonnegative,
         "damping η to the ground (radiation, viscous guide)",
         default=0.0,
         structural=True,
+        letter="eta",
     )
-    area: float | None = parameter("m^2", positive, "contact area, to report forces as well", default=None, gauge=True)
+    area: float | None = parameter(
+        "m^2", positive, "contact area, to report forces as well", default=None, gauge=True, letter="A"
+    )
     drive: Drive = part(Drive, "drive")
 
     def inconsistencies(self) -> Iterator[Problem]:

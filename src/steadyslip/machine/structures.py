@@ -170,10 +170,17 @@ class StructurePoint(FrozenRecord):
     x: int | None = setting(Whole("degree of freedom along x, counted from 1", 1), default=None)
     y: int | None = setting(Whole("degree of freedom along y, counted from 1", 1), default=None)
     angle: float = parameter(
-        "rad", line, "from the structure's x to the direction of the slide, towards y", default=0.0, structural=True
+        "rad",
+        line,
+        "angle φ from the structure's x to the direction of the slide, towards y",
+        default=0.0,
+        structural=True,
+        letter="phi",
     )
-    force: float = parameter("N", real, "constant force in the direction of the slide", default=0.0, structural=True)
-    press: float = parameter("N", real, "constant force towards the surface", default=0.0, structural=True)
+    force: float = parameter(
+        "N", real, "constant force in the direction of the slide", default=0.0, structural=True, letter="F"
+    )
+    press: float = parameter("N", real, "constant force towards the surface", default=0.0, structural=True, letter="P")
 
 
 class StructureBody(Body, name="structure"):

@@ -25,9 +25,15 @@ class Surface(FrozenRecord):
     against: str = setting(Text("what it slides on: a body, ground or drive"), default=GROUND)
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
-    area: float | None = parameter("m^2", positive, "contact area; without one the laws are in forces", default=None)
+    area: float | None = parameter(
+        "m^2", positive, "contact area A; without one the laws are in forces", default=None, letter="A"
+    )
     radius: float | None = parameter(
-        "m", positive, "radius of the contact, of a body that turns; slip is radius times angle", default=None
+        "m",
+        positive,
+        "radius r of the contact, of a body that turns; slip is radius times angle",
+        default=None,
+        letter="r",
     )
     loaded_by: str | None = setting(
         Text("the link whose force the contact law sees as T; what pulls at the body unless given"), default=None

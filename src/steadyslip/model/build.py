@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
 
@@ -13,7 +13,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import checked
 from steadyslip.core.records import Address, parameters, shape_of, with_values
 from steadyslip.core.symbols import Letters
-from steadyslip.machine.letters import LETTERS
+from steadyslip.machine.letters import MEMBERS
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -109,7 +109,10 @@ def _build_cached(structure: _Structure) -> Model:
         given.pop(name, None)
     roles = {name: address.role for name, address in rig.parameters().items()}
     mechanism = with_values(rig, symbols).mechanism()
-    return assemble(mechanism, given, roles, Letters({*RESERVED, *known.values()}, known), structure.drive)
+    laws = [law for one in rig.laws_by_contact().values() for law in (one.friction, one.contact)]
+    several = {name for name, many in Counter(name for law in laws for name in law.memory()).items() if many > 1}
+    taken = {*RESERVED, *known.values(), *several, *(("a",) if rig.contact_names else ())}  # a: an acceleration
+    return assemble(mechanism, given, roles, Letters(taken, known), structure.drive)
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:
@@ -117,25 +120,32 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
     symbols: dict[str, Any] = {}
     every = parameters(rig)
     declared = Counter(address.role.letter for address in every.values())
-    letters = Letters({*RESERVED, *LETTERS.values(), *declared})
+    shared = Counter(_plain_letter(name, one) for name, one in every.items() if one.value is not None)
+    letters = Letters({*RESERVED, *declared, *(letter for letter, many in shared.items() if many > 1)})
     for place, (name, address) in enumerate(every.items()):
-        called, letter = f"parameter_{place:03d}", LETTERS.get(name) or _declared_letter(address, declared)
-        before = name.rpartition(".")[0]
-        dotted = f"{before}.{address.role.letter}" if address.role.letter else name
+        called = f"parameter_{place:03d}"
         if name in rig.always_symbols:
-            symbols[name] = letters.symbol(called, dotted, rig.always_symbols[name], nonnegative=True)
+            symbols[name] = letters.symbol(called, name, rig.always_symbols[name], nonnegative=True)
         elif name in rig.not_in_model or address.value is None:
             continue
         elif address.role.structural and address.value == 0 and name not in present:
             symbols[name] = sp.Integer(0)
         else:
+            letter = address.role.letter
+            letter = letter if declared[letter] == 1 and letter not in RESERVED else ""
             low, reached = address.role.domain.low == 0, address.role.domain.low_allowed
             signs = {"positive": True if low and not reached else None, "nonnegative": True if low else None}
-            symbols[name] = letters.symbol(called, dotted, letter, real=True, **signs)
+            symbols[name] = letters.symbol(called, _owned(name, address), letter, real=True, **signs)
     return symbols, letters.known
 
 
-def _declared_letter(address: Address, declared: Mapping[str, int]) -> str:
-    """Letter declared for a parameter; empty if another parameter or the equations use the same."""
-    letter = address.role.letter
-    return letter if declared[letter] == 1 and letter not in (*RESERVED, *LETTERS.values()) else ""
+def _plain_letter(name: str, address: Address) -> str:
+    return address.role.letter or name.rpartition(".")[2]
+
+
+def _owned(name: str, address: Address) -> str:
+    """Letter of a parameter after what tells it from others with the same: its member of a machine, a number."""
+    before = name.split(".")[:-1]
+    if before[0] in MEMBERS:
+        before = [*before[:2], *(one for one in before[2:] if one.isdigit())]
+    return ".".join([*before, _plain_letter(name, address)])

@@ -63,14 +63,16 @@ def _of_coordinate(one: Coordinate, only: bool) -> dict[sp.Symbol, Meaning]:
 
 def _of_contact(one: Contact, only: bool) -> dict[sp.Symbol, Meaning]:
     at = "" if only else f" at {one.name}"
+    unit, load = ("N", "force") if not only and one.area == 1 else ("Pa", "stress")
+    pull = "of spring and drive on the block" if only else "of links and drive against friction"
     found = {
         one.velocity: ("m/s", f"slip rate{at}"),
-        one.spring: ("Pa", f"stress of spring and drive on the block{at}"),
-        one.friction: ("Pa", f"friction stress{at}"),
-        one.normal: ("Pa", f"normal stress{at}"),
-        one.sigma_ss: ("Pa", f"normal stress in steady sliding{at}"),
-        one.press: ("Pa", f"disturbance: normal stress added{at}"),
+        one.spring: (unit, f"{load} {pull}{at}"),
+        one.friction: (unit, f"friction {load}{at}"),
+        one.normal: (unit, f"normal {load}{at}"),
+        one.sigma_ss: (unit, f"normal {load} in steady sliding{at}"),
+        one.press: (unit, f"disturbance: normal {load} added{at}"),
     }
     if one.outside is not None:
-        found[one.outside] = ("Pa", f"change of the surrounding pressure{at}")
+        found[one.outside] = (unit, f"change of the surrounding pressure{at}")
     return found

@@ -28,11 +28,11 @@ from steadyslip.model import Model
 from steadyslip.reports.elements import (
     STYLE,
     Markup,
+    equation as equation_html,
     figure,
     heading,
     html_text,
     inline_math,
-    math as formula,
     paragraph,
     table,
 )
@@ -111,6 +111,15 @@ def result_html(result: Any) -> str:
     return "".join(_record_html(result) if isinstance(result, FrozenRecord) else _result_html(result))
 
 
+def sketch_of(record: Any) -> str:
+    """HTML figure of a rig as a sketch; empty for other records."""
+    if isinstance(record, Slider):
+        return figure(sketch(record))
+    if isinstance(record, Machine):
+        return figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCH_CAPTION)
+    return ""
+
+
 def text_html(text: str) -> str:
     """HTML of printed text: lines with two or more columns (two spaces apart) as tables, the others as paragraphs."""
     parts: list[str] = []
@@ -155,7 +164,7 @@ def _model_html(model: Model) -> Iterator[str]:
     kind = "with inertia" if model.inertial else "quasistatic"
     yield heading(f"Model, {kind}", 3)
     for equation in model.equations():
-        yield f'<div class="formula" tabindex="0">{formula(equation)}</div>'
+        yield equation_html(equation)
     yield table(
         [(inline_math(model.written(one.symbol)), one.unit, one.doc) for one in model.variables],
         ("variable", "unit", "meaning"),
@@ -170,10 +179,7 @@ def _model_html(model: Model) -> Iterator[str]:
 def _record_html(record: FrozenRecord) -> Iterator[str]:
     name = getattr(record, "name", "")
     yield heading(f"{type(record).__name__}{f' ({name})' if isinstance(name, str) and name else ''}", 3)
-    if isinstance(record, Slider):
-        yield figure(sketch(record))
-    if isinstance(record, Machine):
-        yield figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCH_CAPTION)
+    yield sketch_of(record)
     rows = []
     for path, one in (record.parameters() if isinstance(record, Rig) else parameters(record)).items():
         if one.value is not None:

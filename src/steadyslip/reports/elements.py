@@ -14,12 +14,14 @@ from steadyslip.core.expressions import asinh_exp
 
 _REPLACEMENTS = (
     (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
-    (r"^x (?=\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
+    (r"^x (?=-?\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
 )  # fmt: skip
 _EXPONENT, _SUPERSCRIPTS = (
     re.compile(r"(?<![\w./=-])(−?\d(?:\.\d+)?)e([+-]\d+)(?![\w./-])"),
     str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
 )
+_SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
+_LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
 .steadyslip-told { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b2430; }
@@ -41,6 +43,7 @@ STYLE = """
 .steadyslip-told .warning { background: #fff3d6; border-left: 5px solid #d97f12; padding: 6px 12px; margin: 8px 0; }
 .steadyslip-told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
   white-space: pre-wrap; overflow-wrap: anywhere; }
+.steadyslip-told sub { line-height: 0; }
 .steadyslip-told math { font-size: 17px; }
 @supports not (-moz-appearance: none) { .steadyslip-told msub > :last-child { transform: translateY(.18em); } }
 .steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 6px 0; padding: 4px 0 10px; }
@@ -56,8 +59,8 @@ def typographic(text: Any) -> str:
 
 
 def html_text(text: Any) -> str:
-    """Text with print typography, escaped for HTML."""
-    return html.escape(typographic(text), quote=True)
+    """Text with print typography, escaped for HTML; subscripts of letters, such as d_c, stand below the line."""
+    return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", html.escape(typographic(text), quote=True))
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -106,11 +109,47 @@ class Markup(str):
 
 def math(expression: Any, display: bool = True) -> Markup:
     """MathML of a SymPy expression, which browsers show without fonts or scripts."""
+    return _mathml(_presented(expression), display)
+
+
+def equation(one: sp.Eq) -> str:
+    """HTML of an equation on lines of its own: long sums go on below, as paper has no bar to scroll by."""
+    left, right = one.args
+    side, end = (left, "<mo>=</mo><mn>0</mn>") if right == 0 else (right, "")
+    lines = [_presented(sp.Add(*terms, evaluate=False)) for terms in _lines(sp.Add.make_args(side))]
+    if len(lines) == 1:
+        return f'<div class="formula" tabindex="0">{math(one)}</div>'
+    before = [f"{_presented(left)}<mo>=</mo>" if right != 0 else "", *("" for _ in lines[1:])]
+    signs = ["", *("" if re.sub("<.*?>", "", text).startswith("−") else "<mo>+</mo>" for text in lines[1:])]
+    after = [*("" for _ in lines[1:]), end]
+    rows = (
+        f'<mtr><mtd style="text-align:right">{a}</mtd><mtd style="text-align:left">{b}{text}{c}</mtd></mtr>'
+        for a, b, text, c in zip(before, signs, lines, after, strict=True)
+    )
+    return f'<div class="formula" tabindex="0">{_mathml("<mtable>" + "".join(rows) + "</mtable>", True)}</div>'
+
+
+def _lines(terms: Iterable[sp.Expr]) -> list[list[sp.Expr]]:
+    """Terms of a sum, parted into lines of `_LINE` characters at most, or of one term."""
+    lines: list[list[sp.Expr]] = [[]]
+    for term in terms:
+        if lines[-1] and len(" + ".join(map(str, [*lines[-1], term]))) > _LINE:
+            lines.append([])
+        lines[-1].append(term)
+    return lines
+
+
+def _presented(expression: Any) -> str:
+    """Presentation MathML of an expression without the element around it."""
     if isinstance(expression, sp.Basic):  # asinh_exp(x, y) avoids overflow in computing; print it as asinh(x exp(y))
         expression = expression.replace(asinh_exp, lambda x, y: sp.asinh(x * sp.exp(y)))
-    text = MathMLPresentationPrinter().doprint(expression)
+    text: str = MathMLPresentationPrinter().doprint(expression)
     for entity, character in _ENTITIES.items():
         text = text.replace(entity, character)
+    return text
+
+
+def _mathml(text: str, display: bool) -> Markup:
     style = ' display="block"' if display else ""
     return Markup(f'<math xmlns="http://www.w3.org/1998/Math/MathML"{style}>{text}</math>')
 

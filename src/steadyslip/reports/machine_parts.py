@@ -8,11 +8,12 @@ from steadyslip import figures
 from steadyslip.core.format import format_quantity
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.machine_verdict import undrawn_edges
+from steadyslip.machine.letters import said
 from steadyslip.reports import rig as rig_report
-from steadyslip.reports.brief import result_html
+from steadyslip.reports.brief import sketch_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, table
-from steadyslip.reports.sections import assumptions, motion, recommendation, references
+from steadyslip.reports.sections import assumptions, motion, notes_of, recommendation, references, tolerances_of
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.whole_text import facts
 from steadyslip.verdict.words import headline, told
@@ -27,12 +28,13 @@ def verdict_parts(
     body = [
         *recommendation(analysis, tuple(order.adjustable)),
         *assumptions(machine, analysis.warnings, rig_report.VALIDITY),
-        heading("The machine"), result_html(machine),
+        heading("The machine"), sketch_of(machine),
+        rig_report.input_table(machine, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), *_verdict_section(analysis),
         heading("How far is the edge?"), _verdict_figure(analysis),
         *rig_report.edge_table(analysis), *rig_report.checks_line(analysis),
         *rig_report.tolerance_section(tolerated),
-        *motion(analysis), *references(machine),
+        *motion(analysis), heading("The formulas"), *rig_report.motion_equations(machine), *references(machine),
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
@@ -42,8 +44,9 @@ def verdict_parts(
 def _verdict_figure(analysis: Analysis) -> str:
     words = "Where it is stable in each parameter, how it moves in its leading mode, and its eigenvalues."
     if far := undrawn_edges(analysis):
+        names = ", ".join(said(analysis.rig, name) for name in far)
         words += (
-            f" Not drawn, but in the list below, is the edge of {', '.join(far)}: a factor of 100 away or more, or not "
+            f" Not drawn, but in the list below, is the edge of {names}: a factor of 100 away or more, or not "
             "of a positive value."
         )
     return figure(figure_html(lambda: figures.machine_verdict(analysis), words, 8.0), words)

@@ -17,12 +17,11 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, Population, predict
-from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.hunting import hunting
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.maps import MAX_FACETS
 from steadyslip.files.specifications.layout import own_fields
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import said, worded
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -35,7 +34,7 @@ from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.protocol import Protocol
 from steadyslip.reports import machine_parts as machine_report, rig as rig_report
-from steadyslip.reports.brief import kind_of, result_html, text_html
+from steadyslip.reports.brief import kind_of, result_html, sketch_of, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.sections import notes_of, references
@@ -68,19 +67,20 @@ def parts_of(result: Any, **options: Any) -> Parts:
     kind = kind_of(result).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr
         first = kind
-    body = [*rig_section(rig), heading("What was found"), result_html(result)]
+    body = [
+        *rig_section(rig),
+        heading("What was found"),
+        worded(rig, result_html(result)) if rig else result_html(result),
+    ]
     return Parts(sentence(first).rstrip("."), "", f"What does the {kind} say?", body, rig)
 
 
 def rig_section(rig: Slider | Machine | None, source: str = "") -> list[str]:
     """HTML of the sketch and inputs of a rig, with comments of its file if its text is given; empty for None."""
-    if isinstance(rig, Machine):
-        return [heading("The machine"), result_html(rig)]
-    return (
-        []
-        if rig is None
-        else [heading("The rig"), figure(sketch(rig)), rig_report.input_table(rig, {}, notes_of(source))]
-    )
+    if rig is None:
+        return []
+    what = "The machine" if isinstance(rig, Machine) else "The rig"
+    return [heading(what), sketch_of(rig), rig_report.input_table(rig, {}, notes_of(source))]
 
 
 @parts_of.register
@@ -132,7 +132,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
     known = result.rig.parameters()
     ranges = [
         (
-            name,
+            said(result.rig, name),
             format_range(low, high, known[name].role.unit, result.rig.printed_area(name)),
             spacing,
             known[name].role.doc,
@@ -149,7 +149,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
         for parameter in result.ranked(name):
             i = result.parameters.index(parameter)
             (least, most), (low, high) = result.first_interval[name][:, i], result.total_interval[name][:, i]
-            rows.append((parameter, f"{result.first[name][i]:.3f}", f"{least:.3f} to {most:.3f}",
+            rows.append((said(result.rig, parameter), f"{result.first[name][i]:.3f}", f"{least:.3f} to {most:.3f}",
                          f"{result.total[name][i]:.3f}", f"{low:.3f} to {high:.3f}"))  # fmt: skip
         columns = ("parameter", "alone", "95 %", "with others", "95 %")
         body += [heading(name.replace("_", " ").capitalize()), table(rows, columns)]
@@ -160,7 +160,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
     if result.interrupted:
         body.append(paragraph("It was stopped before all points were done.", "warning"))
     (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
-    head = f"{result.ranked(first)[0]} decides most about the {first.replace('_', ' ')}"
+    head = f"{said(result.rig, result.ranked(first)[0])} decides most about the {first.replace('_', ' ')}"
     return Parts(head, "", question, body, result.rig)
 
 
@@ -211,7 +211,8 @@ def _hunt(result: Hunt, source: str = "") -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     words = "How far it is from its target, and the force of the drive, over time."
     body = [
-        heading("What was found"), text_html(rest), figure(figure_html(lambda: hunting(result), words, 7.0), words),
+        heading("What was found"), text_html(worded(rig, rest)),
+        figure(figure_html(lambda: hunting(result), words, 7.0), words),
         *rig_section(rig, source), *references(rig),
     ]  # fmt: skip
     question = "Does this axis come to rest at the place that it holds, or does it hunt: how far, and how often?"
@@ -221,7 +222,7 @@ def _hunt(result: Hunt, source: str = "") -> Parts:
 @parts_of.register
 def _comparison(result: RigComparison) -> Parts:
     rigs: list[Any] = [one.rig for one in result.verdicts]
-    rows = [(one.parameter if one.parameter not in rigs[0].parameters() else said(rigs[0], one.parameter),
+    rows = [(said(rigs[0], one.parameter),
              one.first, one.second, result.part_in_words(one), one.first_with, one.second_with)
             for one in result.differences]  # fmt: skip
     a, b = result.names
@@ -231,7 +232,7 @@ def _comparison(result: RigComparison) -> Parts:
     body = [
         heading("Side by side"), table(told, (label, *names), caption="The two rigs."),
         heading("What differs?"), table(rows, head, caption="Differences, the one with the largest part first."),
-        *map(paragraph, result.decisive()),
+        *(paragraph(worded(rigs[0], text)) for text in result.decisive()),
         *(part for name, rig in zip(result.names, rigs, strict=True)
           for part in (heading(f"Inputs of {name}"), *rig_section(rig)[1:])),
         *references(*rigs),
@@ -273,7 +274,7 @@ def _history(result: History) -> Parts:
     body = [
         *rig_section(rig),
         heading("What was done to it"), *protocol_table(rig, result.protocol),
-        heading("What it did"), text_html(result.summary()),
+        heading("What it did"), text_html(worded(rig, result.summary())),
         figure(figure_html(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load_name(rig)}."),
         plane,
         *_slip_table(result),
@@ -339,6 +340,7 @@ def _branch(result: CycleBranch) -> Parts:
     along, unit, area = result.along, result.unit, result.rig.printed_area(result.along)
     stress, drop = result.rig.result_unit("Pa"), result.rig.result_name("stress swing")
     first, _, rest = str(result).partition("\n")
+    words = said(result.rig, along)
     rows = [
         (format_quantity(one.value, unit, area=area), format_quantity(one.period, "s"),
          format_quantity(one.peak_velocity, "m/s"),
@@ -353,17 +355,17 @@ def _branch(result: CycleBranch) -> Parts:
     ]
     body = [
         *rig_section(result.rig),
-        heading("The cycles"), text_html(rest),
+        heading("The cycles"), text_html(worded(result.rig, rest)),
         figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5),
-               f"Cycles along {said(result.rig, along)}."),
-        table(special, ("special", along, "period")),
-        table(listed, (along, "period", "peak velocity", drop, ""), left=False),
+               f"Cycles along {words}."),
+        table(special, ("special", words, "period")),
+        table(listed, (words, "period", "peak velocity", drop, ""), left=False),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
-    question = f"Which stick-slip cycles does this rig have as {along} varies?"
+    question = f"Which stick-slip cycles does this rig have as {words} varies?"
     own = result.at_rig.sentence
     lead = sentence(first) + (f" The rig itself: {own}." if own else "")
-    return Parts(f"{len(result.cycles)} cycles along {along}", lead, question, body, result.rig)
+    return Parts(f"{len(result.cycles)} cycles along {words}", lead, question, body, result.rig)
 
 
 def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
@@ -377,7 +379,7 @@ def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
 def _map(result: MapResult) -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     about, found = sentence(first).rstrip(".").replace(" x ", " × "), _status_shares(result)
-    body = [*rig_section(rig), heading("The map"), text_html(rest), *_map_figures(result)]
+    body = [*rig_section(rig), heading("The map"), text_html(worded(rig, rest)), *_map_figures(result)]
     question = "How does the answer depend on the numbers that vary here?"
     return Parts(found or about, f"{about}." if found else "", question, body, rig)
 

@@ -13,17 +13,21 @@ from steadyslip.core.areas import stress_name
 from steadyslip.core.checks import in_words
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
+from steadyslip.core.records import Address
+from steadyslip.core.roles import PARAMETER_KINDS
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import said, worded, words_of
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
+from steadyslip.model.numeric import by_matrices
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import figure, heading, inline_math, math, paragraph, table
+from steadyslip.reports.elements import equation as equation_html, figure, heading, inline_math, paragraph, table
 from steadyslip.reports.sections import (
     assumptions,
     input_letter,
@@ -65,7 +69,8 @@ def verdict_parts(
     body = [
         *recommendation(analysis, tuple(order.adjustable)), *assumptions(rig, analysis.warnings, VALIDITY),
         heading("The rig"), figure(sketch(rig)), input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
-        heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
+        heading("The verdict"), table(facts(analysis)),
+        *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # the motion is below
         *_confidence_section(prediction), *tolerance_section(tolerated),
         heading("How far is the edge?"), *edge_table(analysis), *checks_line(analysis),
         *_chart_section(analysis, order), *motion(analysis),
@@ -77,13 +82,15 @@ def verdict_parts(
 
 
 def input_table(
-    rig: Slider, tolerances: Mapping[str, str] = MappingProxyType({}), notes: Mapping[str, str] = MappingProxyType({})
+    rig: Slider | Machine,
+    tolerances: Mapping[str, str] = MappingProxyType({}),
+    notes: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """HTML table of the parameters of a slider: name, symbol, value (totals if it has an area), meaning.
+    """HTML table of the parameters of a rig: words, letter, value (totals if it has an area), meaning.
 
     With its tolerance if one is given, and where it comes from: the comment behind it in the rig file, if there is one.
     """
-    model = None if rig.holds else build_model(rig)
+    model = None if rig.holds or by_matrices(rig) else build_model(rig)
     rows = []
     for name, one in rig.parameters().items():
         if one.value is None:
@@ -91,27 +98,34 @@ def input_table(
         known = inline_math(sp.Symbol(input_letter(model, rig, name)))
         rows.append(
             (
-                name,
+                words_of(rig, name),
                 known,
                 format_quantity(one.value, one.role.unit, 6, rig.printed_area(name)),
-                stress_name(one.role.doc, rig.printed_area(name)),
+                stress_name(_meaning(one), rig.printed_area(name)),
                 *((tolerances.get(name, ""),) if tolerances else ()),
                 *((notes[name] or "rig file" if name in notes else "default",) if notes else ()),
             )
         )
     more = (*(("tolerance",) if tolerances else ()), *(("source",) if notes else ()))
-    return table(rows, ("parameter", "letter", "value", "meaning", *more), caption="Inputs.")
+    return table(rows, ("input", "letter", "value", "meaning", *more), caption="Inputs.")
+
+
+def _meaning(one: Address) -> str:
+    """What a parameter is, and what its kind does, where its words say no more than its name."""
+    kind = one.role.kind
+    return f"{one.role.doc}: {PARAMETER_KINDS[kind]}" if kind and one.role.doc.startswith(kind) else one.role.doc
 
 
 def edge_table(analysis: Analysis) -> Iterator[str]:
     """HTML table of the nearest edge of every parameter, and a line of the parameters without one."""
-    rows, without = edge_rows(analysis)
+    rig, (rows, without) = analysis.rig, edge_rows(analysis)
     if rows:
         head = ("parameter", "now", "edge", "change", "beyond it")
         yield paragraph("The nearest edge in each parameter, the others unchanged.")
-        yield table(rows, head, caption="Nearest edges.")
+        yield table(((said(rig, name), *rest) for name, *rest in rows), head, caption="Nearest edges.")
     if without:
-        yield paragraph(f"No edge within range: {', '.join(without)}.", "small")
+        names = ", ".join(said(rig, name) for name in without)
+        yield paragraph(f"No edge within range: {names}.", "small")
 
 
 def checks_line(analysis: Analysis) -> Iterator[str]:
@@ -143,25 +157,42 @@ def formula_section(analysis: Analysis) -> Iterator[str]:
     try:
         whole, *parts = printed = formula_in_parts(analysis.rig)
         yield paragraph("The critical stiffness of every rig with the same terms, along the sliding direction:")
-        yield f'<div class="formula" tabindex="0">{math(whole)}</div>'
+        yield equation_html(whole)
         if parts:
             yield paragraph("with what friction and contact answer to small changes in steady sliding:")
         for part in parts:
-            yield f'<div class="formula" tabindex="0">{math(part)}</div>'
+            yield equation_html(part)
     except NotAvailable as refused:
-        yield paragraph(f"The critical stiffness has no formula here: {refused}.")
+        why = str(refused).partition("; stable_stiffness")[0]
+        yield paragraph(f"The critical stiffness has no formula here: {why}.")
+    yield from motion_equations(analysis.rig, printed)
+
+
+def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> Iterator[str]:
+    """HTML of the equations of motion, and of the letters in these and those `printed` before."""
+    if by_matrices(rig):
+        yield paragraph("The equations of motion are matrices, too large to be printed.")
+        return
+    equations = build_model(rig).equations()
+    told = [one for one in equations if _is_used(one, equations)]
     yield paragraph("The equations of motion:")
-    equations = build_model(analysis.rig).equations()
-    for equation in equations:
-        yield f'<div class="formula" tabindex="0">{math(equation)}</div>'
-    yield letters(analysis.rig, [*printed, *equations])
+    for equation in told:
+        yield equation_html(equation)
+    yield letters(rig, [*printed, *told])
+
+
+def _is_used(equation: sp.Eq, others: Sequence[sp.Eq]) -> bool:
+    """False for the definition of a symbol that no other equation has."""
+    return not equation.lhs.is_Symbol or any(
+        equation.lhs in one.rhs.free_symbols | one.lhs.free_symbols for one in others if one is not equation
+    )
 
 
 def _confidence_section(prediction: Prediction | None) -> Iterator[str]:
     if prediction is None:
         return
     yield heading("How sure is that?")
-    yield text_html(str(prediction))
+    yield text_html(worded(prediction.rig, str(prediction)))
     yield figure(
         figure_html(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig."
     )
@@ -172,7 +203,7 @@ def tolerance_section(found: Tolerated | None) -> Iterator[str]:
     if found is None:
         return
     yield heading("How sure is that, within the tolerances?")
-    yield text_html(str(found))
+    yield text_html(worded(found.rig, str(found)))
     left = "right of 0 disturbances grow"
     if found.along:
         left = "left of 1 the stiffness is less than critical" if found.along == STIFFNESS else "1 is the edge"

@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import math
 import re
+import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -14,7 +15,7 @@ import sympy as sp
 from steadyslip import figures
 from steadyslip.core.areas import outside, stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError, SteadyslipError
-from steadyslip.core.format import format_range
+from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.boundary import Margin
@@ -27,6 +28,7 @@ from steadyslip.model import Model
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
 from steadyslip.model.numeric import has_structure
+from steadyslip.motion import History
 from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table
 from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
@@ -45,15 +47,8 @@ def recommendation(analysis: Analysis, adjustable: Sequence[str] = ()) -> Iterat
     nothing else helps.
     """
     yield heading("The recommendation")
-    rig = analysis.rig
     if analysis.stable:
-        nearest = next((one for one in analysis.margins if one.edge is not None), None)
-        text = "No parameter has an edge within range."
-        if nearest is not None and nearest.edge is not None:
-            edge, now = (_value(analysis, nearest, value) for value in (nearest.edge.value, nearest.value))
-            name = said(rig, nearest.parameter)
-            text = f"The nearest edge is at {name} {edge}, now {now}: hold this value to a fraction of that distance."
-        yield paragraph(f"Keep it as it is. {text}")
+        yield paragraph(f"Keep it as it is. {_what_to_hold(analysis, adjustable)}")
         return
     curing = [one for one in analysis.margins if _cures(one)]
     chosen = [one for one in curing if one.parameter in adjustable] if adjustable else []
@@ -68,6 +63,30 @@ def recommendation(analysis: Analysis, adjustable: Sequence[str] = ()) -> Iterat
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
     yield table(rows, head, caption="Changes that make it stable.")
+
+
+def _what_to_hold(analysis: Analysis, adjustable: Sequence[str]) -> str:
+    """Sentences on the nearest edge of all, and on that of what can be set, if it is another."""
+    edged = [one for one in analysis.margins if one.edge is not None]
+    if not edged:
+        return "No parameter has an edge within range."
+    can_be_set = set(adjustable) or {one.parameter for one in edged if "friction." not in one.parameter}
+    settable = [one for one in edged if one.parameter in can_be_set]
+    nearest, chosen = edged[0], next(iter(settable), None)
+    if nearest is chosen:
+        return f"The nearest edge is that of {_side(analysis, nearest)}."
+    text = f"The nearest edge is one of friction, {_side(analysis, nearest)}."
+    if chosen is None:
+        return f"{text} Nothing that can be set has one within range."
+    return f"{text} Of what can be set, the nearest is that of {_side(analysis, chosen)}."
+
+
+def _side(analysis: Analysis, margin: Margin) -> str:
+    """Parameter, its own value, and the side of its edge on which sliding stays stable."""
+    edge = margin.edge.value if margin.edge else math.nan
+    side = "below" if edge > margin.value else "above"
+    now, end = (_value(analysis, margin, value) for value in (margin.value, edge))
+    return f"{said(analysis.rig, margin.parameter)}, now {now}: keep it {side} {end}"
 
 
 def _cures(margin: Margin) -> bool:
@@ -125,7 +144,7 @@ def notes_of(text: str) -> dict[str, str]:
     >>> notes_of("[friction]\\na = 0.01  # measured on B819\\nb = 0.02")
     {'friction.a': 'measured on B819', 'friction.b': ''}
     """
-    found, section = {}, ""
+    found, section = dict.fromkeys(_keys(tomllib.loads(text)), ""), ""
     many: Counter[str] = Counter()
     for line in text.splitlines():
         if head := re.match(r"\s*(\[+)([\w.-]+)\]+", line):
@@ -134,8 +153,17 @@ def notes_of(text: str) -> dict[str, str]:
                 many[section] += 1
                 section = f"{section}.{many[section]}"
         elif key := re.match(r"\s*([\w-]+)\s*=\s*(?:\"[^\"]*\"|[^#\"])*(?:#\s*(.*))?$", line):
-            found[f"{section}.{key[1]}"] = (key[2] or "").strip()
+            found |= {name: (key[2] or "").strip() for name in [f"{section}.{key[1]}"] if name in found}
     return found
+
+
+def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
+    """Dotted names of the values of a table, in which tables of an array are counted from 1."""
+    for key, value in table.items():
+        many = isinstance(value, list) and all(isinstance(one, dict) for one in value)
+        inner = {f"{key}.{n}": one for n, one in enumerate(value, 1)} if many else {key: value}
+        for name, one in inner.items():
+            yield from _keys(one, f"{before}{name}.") if isinstance(one, dict) else [before + name]
 
 
 def motion(analysis: Analysis) -> Iterator[str]:
@@ -152,14 +180,26 @@ def motion(analysis: Analysis) -> Iterator[str]:
         yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
         return
     faster = f"After the drive was faster by {100 * (STEP - 1):.0f} % for a while"
-    yield paragraph(f"{faster}: {run.sentence or run.message}.")
+    yield paragraph(f"{faster}: {_told(run, analysis)}.")
     words = "Motion after the drive was faster for a while, over time."
     yield figure(figure_html(lambda: figures.history(run), words, 6.4), words)
     words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
     yield figure(figure_html(lambda: figures.phase_plane(run), words, 5.0), words)
 
 
-def letters(rig: Slider, printed: Iterable[sp.Basic]) -> str:
+def _told(run: History, analysis: Analysis) -> str:
+    """What a run did: its slip events and its early end, or else how near it comes to steady sliding."""
+    ended = [run.message.replace("_", " ")] if run.status != "done" else []
+    if run.sentence or ended:
+        return "; then ".join([run.sentence, *ended] if run.sentence else ended)
+    steady: Any = getattr(analysis, "steady", None)
+    speeds = {f"{name}.slip_rate": one.slip_rate for name, one in steady.contacts.items()} if run.rig.contacts else {}
+    off = max(abs(run[name][-1] / own - 1) for name, own in (speeds or {"v": run.rig.drive.velocity}).items())
+    after = format_quantity(run.end, "s")
+    return f"no slip event; after {after} it slides steadily again to within {max(100 * off, 1e-3):.1g} %"
+
+
+def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
     """HTML table of the letters in printed equations that are not those of the inputs."""
     model = build_model(rig)
     inputs = {input_letter(model, rig, name) for name, one in rig.parameters().items() if one.value is not None}
@@ -171,7 +211,9 @@ def letters(rig: Slider, printed: Iterable[sp.Basic]) -> str:
             if unit:
                 unit = outside(unit, rig.area)[1]
             rows.append((inline_math(sp.Symbol(letter)), unit, stress_name(words, rig.area)))
-    return table(rows, ("letter", "unit", "meaning"), caption="Letters of the equations besides the inputs.")
+    return table(
+        rows, ("letter", "unit", "meaning"), left=False, caption="Letters of the equations besides the inputs."
+    )
 
 
 def input_letter(model: Model | None, rig: Slider | Machine, name: str) -> str:
@@ -186,10 +228,8 @@ def references(*rigs: Slider | Machine) -> Iterator[str]:
     yield heading("References")
     both = [law for rig in rigs for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
     laws = [one for law in both for one in (law, *records_in(law)) if one.name]
-    rows = {law.name: (law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0]) for law in laws}
-    yield table(
-        list(rows.values()), ("law", "what it is"), caption="Laws that were used; their pages have the equations."
-    )
-    yield from map(paragraph, dict.fromkeys(one for _, words in rows.values() for one in cited(words)))
+    rows = dict.fromkeys((law.family, law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0]) for law in laws)
+    yield table(rows, ("part", "law", "what it is"), caption="Laws that were used.")
+    yield from map(paragraph, dict.fromkeys(one for *_, words in rows for one in cited(words)))
     if not any(rig.holds for rig in rigs):
         yield paragraph(f"Method and numbered equations: {METHOD}, eqs 17-32, with corrections.")

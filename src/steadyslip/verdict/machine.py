@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.format import format_quantity
 from steadyslip.linear.boundary import Margin
+from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND
 from steadyslip.model.numeric import by_matrices, has_response, has_structure
@@ -45,7 +46,7 @@ def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
     inside = [surface.loaded_by] if surface.loaded_by else [
         link for link in at if GROUND not in machine.links[link].between
     ]  # fmt: skip
-    parts = [f"links.{link}" for link in inside] + ["the controller"] * (controlled and not surface.loaded_by)
+    parts = [*inside, *["the controller"] * (controlled and not surface.loaded_by)]
     return [("the pull T", f"the normal force of {name} follows T, the pull of {' and '.join(parts)}")]
 
 
@@ -92,7 +93,7 @@ def _nearest(found: Findings, margin: Margin) -> str:
     side = "above" if edge.value > margin.value else "below"
     value = told(found.rig, margin.parameter, edge.value)
     what = PHRASES["stable"] if edge.stable == side else QUIET if edge.quiet == side else beyond(edge)
-    return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=what)
+    return PHRASES["nearest"].format(name=said(found.rig, margin.parameter), side=side, value=value, beyond=what)
 
 
 def _sliding(steady: SteadyMachine) -> str:

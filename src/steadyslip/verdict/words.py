@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from steadyslip.core.checks import UNDECIDED
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.linear.boundary import REMOTE
+from steadyslip.machine.letters import said
 from steadyslip.verdict.reasons import NEXT_TO_IT
 from steadyslip.verdict.support import gain_words
 
@@ -128,7 +129,7 @@ def onset_words(onset: Onset) -> str:
     """Sentence on the kind of onset; for a subcritical one with the size of the unstable oscillation at this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
     if onset.rig.default_along is None:
-        text = text.replace("edge in stiffness", f"edge in {onset.along}")
+        text = text.replace("edge in stiffness", f"edge in {said(onset.rig, onset.along)}")
     elif onset.along == onset.rig.gain_name():
         text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.along)}")
     own = onset.rig.parameters()[onset.along].value

@@ -33,7 +33,7 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
         assert said(machine, first) in bar, "the bar begins with the nearest edge"
         visit.page.get_by_label("parameter of the bar").select_option("drive.kp")
         bar = visit.page.locator(".bar").get_attribute("aria-label")
-        assert "drive kp" in bar
+        assert "proportional gain k_p" in bar
         assert "above 0.4362 N/µm" in bar
         visit.page.get_by_label("parameter of the bar").select_option("contacts.mesh.friction.a")
         assert "above 0.02108" in visit.page.locator(".bar").get_attribute("aria-label")
@@ -83,16 +83,16 @@ def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
     assert next(one for one in ss.analyze(machine).margins if one.parameter == "bodies.pad.press").edge.value == 0
     ss.explore(machine).save(tmp_path / "pad.html")
     with Visit(browser, tmp_path / "pad.html") as visit:
-        assert "pad press → 0\u00a0N" in visit.page.locator(".edges button").all_text_contents()
+        assert "pad pressing force\u00a0P → 0\u00a0N" in visit.page.locator(".edges button").all_text_contents()
         edges = visit.page.locator(".edges li")
-        assert any(re.search("pad press → 0\u00a0N .*: disc lifts off", one) for one in edges.all_text_contents())
+        assert any(re.search("force\u00a0P → 0\u00a0N .*: disc lifts off", one) for one in edges.all_text_contents())
         push = visit.page.get_by_label("after a disturbance").locator("option[value=push][disabled]")
         push.wait_for(state="attached")  # through the dashpot of the arm it would be an infinite force
-        visit.page.get_by_role("button", name="lining stiffness →").click()
-        edges.filter(has_text=re.compile("caliper stiffness → 6.138.* an oscillation grows")).wait_for()
-        edges.filter(has_text=re.compile("lining stiffness → 7.328.* an oscillation grows")).wait_for()
+        visit.page.get_by_role("button", name="lining stiffness\u00a0k →").click()
+        edges.filter(has_text=re.compile(r"caliper stiffness\sk → 6.138.* an oscillation grows")).wait_for()
+        edges.filter(has_text=re.compile(r"lining stiffness\sk → 7.328.* an oscillation grows")).wait_for()
         assert "--unstable" in visit.slider("links.caliper.stiffness").get_attribute("style"), "a band 9 % wide"
         visit.page.get_by_role("button", name="undo").click()
         visit.type("bodies.pad.press", "-1 N")
-        edges.filter(has_text="pad press").filter(has_text="slides steadily, but unstable").wait_for()
+        edges.filter(has_text="pad pressing force").filter(has_text="slides steadily, but unstable").wait_for()
         assert visit.reason().startswith("Lift-off at contact disc.")

@@ -49,6 +49,9 @@ def test_every_control_has_a_name(browser, file):
         controls = "[...document.querySelectorAll('button, input, select')]"
         nameless = "e => !(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.length)"
         assert visit.page.evaluate(f"{controls}.filter({nameless}).length") == 0
+        otherwise = "e => e.textContent.length > 1 && e.ariaLabel && !e.ariaLabel.includes(e.textContent)"
+        buttons = "[...document.querySelectorAll('button')]"
+        assert visit.page.evaluate(f"{buttons}.filter({otherwise}).map((e) => e.textContent)") == []
         assert visit.page.locator("h1").count() == 1
 
 

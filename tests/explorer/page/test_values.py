@@ -28,7 +28,7 @@ def test_values_can_be_typed_with_units_and_taken_back(browser, file):
         assert visit.sentence().startswith("Unstable")
         visit.page.get_by_role("button", name="redo").click()
         assert visit.sentence().startswith("Stable")
-        visit.page.get_by_role("button", name="back to the values").click()
+        visit.page.get_by_role("button", name="reset").click()
         assert visit.sentence().startswith("Unstable")
 
 
@@ -40,7 +40,7 @@ def test_sliders_and_the_chart_work_by_keyboard_and_by_pointer(browser, file):
             visit.page.keyboard.press("PageUp")
         assert visit.sentence().startswith("Stable")
         assert "GPa/m" in stiffness.get_attribute("aria-valuetext")
-        visit.page.get_by_role("button", name="back to the values").click()
+        visit.page.get_by_role("button", name="reset").click()
         chart = visit.page.locator("svg[role=application]")
         chart.focus()
         for _ in range(10):
@@ -97,7 +97,7 @@ def test_a_value_far_away_leaves_nothing_behind(browser, file, far):
         visit.type(*far)
         if far[0] == "friction.b":
             assert edges_of(visit)["friction.b"] == before["friction.b"], "edges are exact on every range"
-        for back in ("back to the values", "undo"):
+        for back in ("reset", "undo"):
             visit.page.get_by_role("button", name=back).click()
             if back == "undo":
                 visit.page.get_by_role("button", name=back).click()
@@ -137,7 +137,7 @@ def test_ranges_follow_a_link_and_the_critical_stiffness(browser, file):
         assert edge > 4 * 0.016, "beyond its range too"
         assert float(edges_of(visit)["friction.b"]) == pytest.approx(edge, rel=1e-3)
         visit.type("friction.a", "0.0145")
-        row = next(line for line in visit.saved("values and edges").splitlines() if "slider.stiffness" in line)
+        row = next(line for line in visit.saved("edges CSV").splitlines() if "slider.stiffness" in line)
         assert float(row.split(",")[2]) == pytest.approx(critical, rel=1e-12)
 
 
@@ -151,15 +151,15 @@ def test_files_and_links_carry_every_digit(browser, file, tmp_path):
         visit.type("friction.a", "0.0123456789012345")
         visit.slider("contact.angle").focus()
         visit.page.keyboard.press("PageUp")
-        (tmp_path / "rig.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+        (tmp_path / "rig.toml").write_text(visit.saved("rig file"), encoding="utf-8")
         end = time.time() + 10  # browsers take long over it
         while not visit.page.evaluate("location.hash.includes('contact.angle')"):
             assert time.time() < end
         link = visit.page.evaluate("location.hash")
         critical = visit.reason()
-        table = visit.saved("values and edges")
-        picture = visit.saved("as a drawing")
-        pixels = visit.saved("as a picture", "latin-1")
+        table = visit.saved("edges CSV")
+        picture = visit.saved("chart SVG")
+        pixels = visit.saved("chart PNG", "latin-1")
     again = ss.read_rig(tmp_path / "rig.toml")
     assert again.friction.a == 0.0123456789012345
     assert f"{ss.analyze(again).critical_stiffness / 1e9:.4g} GPa/m" in critical
@@ -169,7 +169,7 @@ def test_files_and_links_carry_every_digit(browser, file, tmp_path):
     assert pixels.startswith("\x89PNG")
     with Visit(browser, file, link) as visit:
         assert visit.reason() == critical
-        (tmp_path / "rig2.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+        (tmp_path / "rig2.toml").write_text(visit.saved("rig file"), encoding="utf-8")
     assert ss.read_rig(tmp_path / "rig2.toml") == again
 
 
@@ -219,7 +219,7 @@ def test_that_a_link_is_copied_is_said_for_a_while(browser, file):
     with Visit(browser, file, permissions=["clipboard-write", "clipboard-read"]) as visit:
         before = visit.page.locator("main").bounding_box()["y"]
         visit.page.clock.install()
-        visit.page.get_by_role("button", name="copy a link").click()
+        visit.page.get_by_role("button", name="link", exact=True).click()
         said = visit.page.get_by_text("The link is copied.")
         said.wait_for()
         assert visit.page.locator("main").bounding_box()["y"] == before
@@ -245,7 +245,7 @@ def test_a_refused_entry_says_so_until_it_goes(browser, file):
             assert words in visit.page.inner_text(".fault:not(:empty)")
             assert field.input_value() == wrong
             if wrong == "x":
-                visit.page.get_by_role("button", name="back to the values").click()
+                visit.page.get_by_role("button", name="reset").click()
             else:
                 field.press("Escape")
             assert field.get_attribute("aria-invalid") is None
@@ -323,15 +323,15 @@ def test_units_and_comments_of_the_file_stay(browser, tmp_path):
         assert visit.sentence() == "Unstable: steady sliding at 3.6 mm/h"
         assert visit.field("slider.stiffness").input_value() == "9 N/µm"
         assert "N/µm" in visit.reason()
-        assert visit.saved("save as a rig file") == text
+        assert visit.saved("rig file") == text
         visit.type("slider.stiffness", "12.3")
         visit.type("drive.velocity", "7.2")
         visit.type("contact.preload", "10 kN")
         changed = text.replace('"9 N/um"', '"12.3 N/um"').replace("9e3", "10000")
         changed = changed.replace('velocity = "3.6 mm/h"', 'velocity = "7.2 mm/h"')
-        assert visit.saved("save as a rig file") == changed
+        assert visit.saved("rig file") == changed
         visit.type("slider.damping", "1 N s/m")
         visit.page.get_by_role("button", name=re.compile("^evolution effect b →")).click()
-        (tmp_path / "again.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+        (tmp_path / "again.toml").write_text(visit.saved("rig file"), encoding="utf-8")
         values = dict(one.split("=") for one in linked(visit, "friction.b")[1:].split("&"))
     assert ss.read_rig(tmp_path / "again.toml") == own.with_values({k: float(v) for k, v in values.items()})

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from explored import Explored, page_modules
 from explored_pages import INCLINED, Visit, edges_of, middle
+from javascript import Script
 from rigs_of_theory import ONE_MEMORY, SIGMA, rig
+from steadyslip.model.point import operating_point
 
 
 def test_the_page_says_what_python_says_and_asks_for_nothing(browser, file):
@@ -47,6 +50,42 @@ def explained(visit):
     ):
         assert words in marks.inner_text()
     assert marks.locator("svg path").count() == 5
+
+
+@pytest.mark.parametrize("name", ["inclined-spring", "slow-axis", "machines/brake-pad"])
+def test_contours_are_of_what_python_computes(name):
+    """The stiffness over the critical one, with the gain of a controller counted in; of machines the growth rate."""
+    own = ss.read_rig(f"examples/{name}.toml")
+    for factor in (0.2, 1.0, 3.0):
+        other = own.with_values({"drive.velocity": factor * own.drive.velocity})
+        point = operating_point(other, None, own.kept_zeros())
+        values = list(map(float, point.arguments))
+        found = Explored(own).script("linear.set(values).status() && linear.strength()", values=values)
+        expected = ss.growth_rate(other)
+        if other.default_along is not None:
+            expected = np.log(ss.safety_factor(other))
+        assert found == pytest.approx(float(expected), rel=1e-9)
+
+
+def test_lines_of_levels_are_where_a_plane_has_them():
+    """A plane has straight lines; cells without a number have none."""
+    grid = "Array.from({ length: 5 }, (_, j) => Array.from({ length: 7 }, (_, i) => (j > 3 ? NaN : i + j)))"
+    found = Script(page_modules())(f"line({grid}, 3.5, 60, 40)")
+    places = np.array(re.findall(r"[\d.]+", found["path"]), dtype=float).reshape(-1, 2)
+    assert len(places) == 2 * len(found["middles"]) > 6
+    np.testing.assert_allclose(places[:, 0] / 10 + (4 - places[:, 1] / 10), 3.5, atol=0.02)
+    assert places[:, 1].min() >= 10
+
+
+def test_contours_are_drawn_while_nothing_moves(browser, file):
+    with Visit(browser, file) as visit:
+        lines = visit.page.locator(".map .contours")
+        assert lines.locator("path").count() == 6
+        assert set(lines.locator("text").all_text_contents()) >= {"0.5", "0.2", "0.1"}
+        visit.slider("friction.a").evaluate("e => { e.value = 480; e.dispatchEvent(new Event('input')); }")
+        assert lines.locator("path").count() == 0
+        visit.slider("friction.a").evaluate("e => e.dispatchEvent(new Event('change'))")
+        assert lines.locator("path").count() == 6
 
 
 def test_tracks_are_painted_as_python_judges(browser, file):
@@ -100,7 +139,7 @@ def test_other_rigs_have_pages_too(browser, tmp_path, name):
         assert visit.page.inner_text(".notice") == ""
         visit.told("slip event|runs away|No motion|ends at")
         assert (visit.page.locator(".strips .curve").count() > 0) == (analysis.stable is not None)
-        text = visit.saved("save as a rig file")
+        text = visit.saved("rig file")
     again = ss.rig_from_text(text)
     assert ss.analyze(again).critical_stiffness == analysis.critical_stiffness
     assert ss.analyze(again).eigenvalues == analysis.eigenvalues
@@ -115,7 +154,10 @@ def test_the_bar_of_a_gain_is_that_of_the_gain(browser, tmp_path):
         assert "The gain kp, 900 GPa/m, is 108 times the critical 8.357 GPa/m" in visit.reason()
         bar = visit.page.locator(".bar")
         assert "now 900 GPa/m" in bar.inner_text()
-        assert bar.get_attribute("aria-label") == f"stable values of drive kp: above {edge / 1e9:.4g} GPa/m"
+        assert (
+            bar.get_attribute("aria-label")
+            == f"stable values of drive proportional gain k_p: above {edge / 1e9:.4g} GPa/m"
+        )
 
 
 def test_numbers_off_every_scale_are_drawn_at_its_end(browser, file):

@@ -72,7 +72,7 @@ export class Banner {
     const { rig } = this.page, own = Array.from(rig.set(rig.values).R);
     if (!first) return reason({ ...answer, own }, this.data);
     const one = this.data.parameters[first.i], beyond = first.beyond === STABLE ? this.data.phrases.stable : beyondWords(first, this.page);
-    const edge = { name: one.name, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at), beyond };
+    const edge = { name: one.title, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at), beyond };
     return reason({ ...answer, own }, this.data, edge);
   }
 

@@ -67,6 +67,25 @@ export function regions(status, rows, width, height) {
   return { paths, outline, lost, places: widest(grid, width / columns, height / rows) };
 }
 
+/** SVG path of the line of a level over a grid of numbers, straight within its cells, and the middles of its pieces. @param {number[][]} grid @param {number} at */
+export function line(grid, at, width, height) {
+  const rows = grid.length - 1, columns = grid[0].length - 1, middles = /** @type {[number, number][]} */ ([]);
+  let path = "";
+  for (let j = 0; j < rows; j++) {
+    for (let i = 0; i < columns; i++) {
+      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+      const ends = corners.flatMap(([x, y], k) => {
+        const [u, v] = corners[(k + 1) % 4], a = grid[y][x] - at, b = grid[v][u] - at, t = a / (a - b);
+        return a * b < 0 ? [[((x + t * (u - x)) / columns) * width, (1 - (y + t * (v - y)) / rows) * height]] : [];
+      });
+      if (ends.length !== 2) continue;
+      path += `M${ends.map((one) => one.map((v) => v.toFixed(1)).join(" ")).join("L")}`;
+      middles.push([0.5 * (ends[0][0] + ends[1][0]), 0.5 * (ends[0][1] + ends[1][1])]);
+    }
+  }
+  return { path, middles };
+}
+
 const HALF_LINE = 11, HALF_LETTER = 4.2; // half the height of a line and half the width of a letter of words in areas, SVG units
 
 /** Places for the words of the areas: where they are furthest from all outlines, if there is room. @param {number[][]} grid of statuses */

@@ -5,6 +5,7 @@ import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
 import { named } from "./words.js";
 
+const MEMBERS = { bodies: "body", links: "link", contacts: "contact" }; // of a machine, whose parts are groups
 const EDGE = "1.5px", HATCH = 0.02; // EDGE: width of the mark of an edge; HATCH: period of the hatching, share of the track
 const THIN = 0.006; // least share of a track for a visible colour
 const ROOM = 15; // letters that fit into a field
@@ -15,11 +16,12 @@ export class Controls {
   /** @param {import("./page.js").Page} page */
   constructor(page) {
     this.page = page;
-    this.box = make("section", { className: "controls", "aria-label": "parameters" }, make("p", { className: "invites", textContent: "Drag a slider and watch the verdict; or type a value with its unit, as 2.5 kN." }));
-    let group = "";
+    this.box = make("section", { className: "controls", "aria-label": "parameters" }, make("p", { className: "invites", textContent: "Drag a slider and watch the verdict; or type a value with its unit, as 2.5\u00a0kN." }));
+    let before = "";
     this.rows = page.rig.data.parameters.map((one, i) => {
-      if (one.group !== group) this.box.append(make("h2", { textContent: one.group }));
-      group = one.group;
+      const [part, member] = one.name.split("."), group = part in MEMBERS ? `${MEMBERS[part]} ${member}` : part;
+      if (group !== before) this.box.append(make("h2", { textContent: group }));
+      before = group;
       const row = this.row(one, i);
       this.box.append(row.box);
       return row;
@@ -51,7 +53,7 @@ export class Controls {
     text.addEventListener("input", () => tell(taken, this.taken(i)));
     text.addEventListener("blur", () => tell(taken, ""));
     const about = named(one.doc, one.unit); // left out where it says no more than the title
-    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", { textContent: about.startsWith(one.title.split(" ")[0]) ? "" : about }));
+    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", { textContent: about.startsWith(one.title.split(" ")[0]) || one.title.endsWith(about) ? "" : about }));
     return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
   }
 
@@ -121,8 +123,8 @@ function filled({ from, to, status }) {
 
 /** Title of a parameter with its letter, the subscript below the line. @param {any} one @returns {(string | Node)[]} */
 export function lettered({ title, letter }) {
-  const [base, below] = letter.split("_");
-  return below && title.includes(letter) ? [title.slice(0, title.indexOf(letter)) + base, make("sub", { textContent: below })] : [title];
+  const [base, below] = letter.split("_"), words = title.replace(/ (?=\S+$)/, "\u00a0"); // the letter stays with the last word
+  return below && title.includes(letter) ? [words.slice(0, title.indexOf(letter)) + base, make("sub", { textContent: below })] : [words];
 }
 
 /** Parts of a track, thin ones widened to be visible, but never over the position of the rig. @param {{from: number, to: number, status: number}[]} parts @param {number} own */

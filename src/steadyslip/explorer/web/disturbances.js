@@ -57,7 +57,7 @@ export function asked(page, motion, { kind, on, size: text, length }) {
   if (!(until > 0)) throw new Refused("length", "the length of a run is above 0 s");
   if (ratio && !(size > 0)) throw new Refused("size", "the velocity is multiplied by a number above 0");
   if (positive && !(size > 0)) throw new Refused("size", "a hold lasts for more than 0 s");
-  const from = Number((until / BEFORE).toPrecision(4)), at = kind === "blow" ? 0 : from, much = ratio ? `× ${digits(size)}` : shown(size, si);
+  const from = Number((until / BEFORE).toPrecision(4)), at = kind === "blow" ? 0 : from, much = ratio ? `×\u00a0${digits(size)}` : shown(size, si);
   return {
     disturbance: kind, on, size: size / per, at: from, from: at, until, file: asFile(page, { kind, on, size, si, at: from, until }),
     words: `${at ? `At ${shown(at, "s")} (dashed line)` : "At the start"}: ${called(kind, data)}${on ? ` ${on}` : ""}, ${much}.`,

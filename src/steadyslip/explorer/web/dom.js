@@ -21,9 +21,9 @@ export function svg(name, attributes = {}, ...children) {
   return made;
 }
 
-/** Button with a label for screen readers. @param {string} text @param {string} label @param {() => void} action */
-export function button(text, label, action) {
-  return make("button", { type: "button", textContent: text, title: label, "aria-label": label, onclick: action });
+/** Button; what it does is its name for screen readers where its text is a sign. @param {string} text @param {string} title @param {() => void} action */
+export function button(text, title, action) {
+  return make("button", { type: "button", textContent: text, title, onclick: action, ...(text.length > 1 ? {} : { "aria-label": title }) });
 }
 
 /** Copy a text to the clipboard. @param {string} text */

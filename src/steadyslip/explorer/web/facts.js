@@ -60,7 +60,7 @@ export class Facts {
     this.sliding.hidden = this.swings.hidden = absent;
     tell(this.shape, answer.mode ? `In the leading mode ${words(answer.mode, rig.data.facts.shape)}.` : "");
     const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/_/g, " "), answer.observed[name], unit, meaning])];
-    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(named(name, area && unit === "Pa" ? "N" : unit) + (meaning && `: ${meaning}`)).replace(/Theta/g, "Θ").replace(/theta/g, "θ"), quantity(value, unit, area)]),
+    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(named(name, area && unit === "Pa" ? "N" : unit) + (meaning && `: ${meaning}`)).replace(/Theta/g, "Θ").replace(/theta/g, "θ").replace(/sigma.e\b/g, "σₑ").replace(/_(\d)|(?<=Θ|θ) (\d)/gi, (_, a, b) => "₀₁₂₃₄₅₆₇₈₉"[a ?? b]), quantity(value, unit, area)]),
       () => [make("dt", {}), make("dd", {})], 2);
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {

@@ -170,6 +170,14 @@ export class Linear {
     };
   }
 
+  /** What contours show, where there is steady sliding: the logarithm of a slider's stiffness over the critical one, else the growth rate (1/s). */
+  strength(branch = 0) {
+    const c = this.ask("coefficients", this.facts.degree + 1);
+    if (!this.programs.split) return roots(c).reduce((most, { re }) => Math.max(most, re), -Infinity);
+    const { own, gain, intervals, ends } = this.varied(c, branch), { critical } = nearestEnd(intervals, ends, own);
+    return critical === null ? NaN : Math.log((own + gain) / (critical + gain));
+  }
+
   /** Eigenvalues; empty without steady sliding. */
   roots(branch = 0) {
     return this.settle(branch) === STABLE ? roots(this.ask("coefficients", this.facts.degree + 1)) : [];

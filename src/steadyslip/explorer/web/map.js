@@ -1,10 +1,12 @@
 // Stability chart over two parameters with the point of the rig.
-import { CLASSES, regions } from "./chart.js";
+import { CLASSES, line, regions } from "./chart.js";
 import { make, put, putAt, svg } from "./dom.js";
 import { axis, frame } from "./plot.js";
-import { told } from "./quantities.js";
+import { digits, told } from "./quantities.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
+const CELLS = 30, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows, and levels of k/k_cr
+const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
 const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
 const WRITTEN = { stable: "stable", unstable: "unstable", none: "no steady sliding", unknown: "no such rig" }; // words in the areas
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -41,7 +43,7 @@ export class Chart {
     this.key = Object.entries(KEY).map(([name, words]) => make("span", { className: name }, make("i", { className: name }), words));
     this.box = make("section", { className: "map", "aria-label": "chart of stability", tabIndex: -1 }, make("h2", { textContent: "Where is it stable?" }),
       make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys; solid line: edge of stability, dashed: edge of steady sliding" })),
-      this.canvas, make("p", { className: "key" }, ...this.key));
+      this.canvas, make("p", { className: "key" }, ...this.key, make("span", {}, "thin lines: ", ...(page.rig.data.phrases ? ["growth rate, 1/s"] : ["k/k", make("sub", { textContent: "cr" })]))));
   }
 
   /** Put a parameter on an axis; if it is on the other axis, swap the two. @param {number} which @param {number} chosen */
@@ -83,11 +85,29 @@ export class Chart {
       put(this.outline, "d", outline);
       put(this.lost, "d", lost);
       this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, WRITTEN[name])));
+      this.contours(i, x, j, y, places);
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
     putAt(this.point, { cx: box.left + at[0] * box.width, cy: box.top + (1 - at[1]) * box.height });
     const words = [i, j].map((n) => `${parameters[n].title} ${told(parameters[n], rig.values[n])}`);
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
+  }
+
+  /** Draw contours, which are left out while a slider moves; labels stand apart from each other and from words. @param {{x: number, y: number}[]} words */
+  contours(i, x, j, y, words) {
+    const { size: { width, height }, rig, sliding } = this.page, { phrases, facts } = rig.data, columns = Math.round(1.3 * CELLS);
+    this.lines.replaceChildren();
+    if (sliding || facts.searched.some(Boolean)) return;
+    const grid = Array.from({ length: CELLS + 1 }, (_, b) => Array.from({ length: columns + 1 }, (_, a) => rig.strength(i, x.at(a / columns), j, y.at(b / CELLS))));
+    const top = Math.ceil(Math.log10(Math.max(...grid.flat().map(Math.abs).filter(Number.isFinite)))) - 1;
+    const levels = phrases ? [-1, -0.1, 0.1, 1].map((share) => share * 10 ** top) : LEVELS;
+    const drawn = levels.map((level) => line(grid, phrases ? level : Math.log(level), width, height)), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
+    drawn.forEach(({ path, middles }, n) => {
+      const beside = [own, ...words.map((one) => [one.x, one.y]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))];
+      const room = ([u, v]) => Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b]) => Math.hypot(a - u, b - v)));
+      const [u, v] = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
+      this.lines.append(svg("path", { d: path }), ...(room([u, v]) > TIGHT ? [svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))] : []));
+    });
   }
 
   /** Draw axes and labels, which depend on axes, ranges and size only. */
@@ -102,7 +122,8 @@ export class Chart {
     this.outline = svg("path", { class: "outline" });
     this.lost = svg("path", { class: "outline lost" });
     this.words = svg("g", {});
-    inner.append(stripes, this.hatched, this.outline, this.lost, this.words);
+    this.lines = svg("g", { class: "contours" });
+    inner.append(stripes, this.hatched, this.lines, this.outline, this.lost, this.words);
     this.point = svg("circle", { r: 8, class: "point" });
     this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
     this.canvas.replaceChildren(inner,

@@ -1,19 +1,19 @@
 // Rig of a page: values and their domains, status, checks against Python, links and rig files.
-import { Linear, UNKNOWN } from "./linear.js";
+import { ABSENT, Linear, UNKNOWN } from "./linear.js";
 import { exactly, tellIn } from "./quantities.js";
 
 /**
- * @typedef {{name: string, group: string, title: string, letter: string, unit: string, factor: number, value: number, natural: number, doc: string,
+ * @typedef {{name: string, title: string, letter: string, unit: string, factor: number, value: number, natural: number, doc: string,
  *   low: number | null, high: number | null, lowAllowed: boolean, highAllowed: boolean, whole: boolean,
  *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its SI size and the text of the value in the user's file
- * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
+ * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: (number | string)[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
  *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
 export const NEW = /** @type {[string, number, string]} */ (["", 1, ""]); // source of a parameter that the user's file leaves out
-const USUAL = { own: NEW, factor: 1, low: null, high: null, lowAllowed: false, highAllowed: false, whole: false }; // entries that the data of a parameter leave out
+const USUAL = { own: NEW, factor: 1, low: 0, high: null, lowAllowed: false, highAllowed: true, whole: false, allowed: "a finite number > 0" }; // entries that the data of a parameter leave out
 
 export class Rig {
   /** @param {Data} data @param {any} programs */
@@ -21,6 +21,7 @@ export class Rig {
     this.data = data;
     tellIn(data.written);
     for (const one of data.parameters) Object.assign(one, { ...USUAL, ...one });
+    data.facts.parameters = data.places.map((at) => (typeof at === "string" ? at : data.parameters[at].name));
     this.linear = new Linear(programs, data.facts);
     this.values = data.parameters.map((one) => one.value);
     this.vector = new Float64Array(data.facts.parameters.length);
@@ -32,7 +33,7 @@ export class Rig {
   /** Parameters of the Model for values of the page. @param {ArrayLike<number>} values */
   set(values) {
     const { places, fixed, axial } = this.data, model = this.vector;
-    for (let k = 0; k < model.length; k++) model[k] = places[k] >= 0 ? values[places[k]] : fixed[k];
+    for (let k = 0; k < model.length; k++) model[k] = values[places[k]] ?? fixed[k];
     this.linear.set(model);
     if (axial >= 0) {
       model[this.spring] = values[axial] * this.linear.ask("stiffness", 1)[0];
@@ -67,6 +68,12 @@ export class Rig {
     return this.set(this.trial).status(this.data.branch);
   }
 
+  /** What contours show with two values changed; NaN without steady sliding. @param {number} i @param {number} x @param {number} j @param {number} y */
+  strength(i, x, j, y) {
+    const status = this.status(i, x, j, y);
+    return status === ABSENT || status === UNKNOWN ? NaN : this.linear.strength(this.data.branch);
+  }
+
   /** True if the status depends on rounding, with one value changed. @param {number} i @param {number} x */
   onEdge(i, x) {
     this.trial.set(this.values);
@@ -89,7 +96,7 @@ export class Rig {
   differences() {
     const found = /** @type {string[]} */ ([]);
     for (const check of this.data.checks) {
-      const answer = this.assess(check.values), name = check.name;
+      const answer = this.assess(Object.assign(this.values.slice(), check.values)), { name } = check;
       if (answer.status !== check.status) found.push(`${name}: the verdict`);
       if (check.critical !== null && !near(answer.critical, check.critical)) found.push(`${name}: the critical stiffness`);
       const same = check.eigenvalues.length === answer.eigenvalues.length &&

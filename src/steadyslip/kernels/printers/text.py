@@ -29,6 +29,7 @@ class Writer(ABC):
         self.signs: dict[int, str] = {}  # outermost operator of expressions in brackets
         self.depth: dict[int, int] = {}
         self.uses: dict[int, int] = {}
+        self.changed = {array for array, _, _ in program.stores}
         for _, _, node in program.stores:
             self.uses[node.order] = self.uses.get(node.order, 0) + 1
         self._count(program.nodes())
@@ -103,7 +104,8 @@ class Writer(ABC):
             written = self._written(node)
             depth = 1 + max((self.depth.get(a.order, 0) for a in node.operands), default=0)
             often = self.uses.get(node.order, 0) != 1 or depth > _DEEPEST
-            if node.op != "number" and (often or node.op == "load" or loop is not None):
+            early = node.op == "load" and node.args[0] in self.changed  # before it is overwritten
+            if node.op != "number" and (often or early or loop is not None):
                 name = f"t{len(self.lines) + 1}"
                 self.line(level, self.named(name, written[1:-1] if node.op in _SIGNS else written))
                 written, depth = name, 0

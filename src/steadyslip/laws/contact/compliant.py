@@ -8,7 +8,7 @@ from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression
 
 
 class Compliant(ContactLaw, name="compliant"):
-    """Surfaces with a normal stiffness and damping: σ = −k_n u − c_n u̇ with u their distance (theory 11).
+    """Surfaces with a normal stiffness and damping: σ = −k_n u − c_n u̇ with u their distance.
 
     For bodies of a machine that move away from the surface (`PlanarBody`), so that normal and tangential vibration
     couple. The steady normal force follows from the balance of forces, or is given where it is known (a clamping force
@@ -21,7 +21,12 @@ class Compliant(ContactLaw, name="compliant"):
     )
 
     steady_normal_stress: float | None = parameter(
-        "Pa", positive, "normal stress σss in steady sliding, if that is known", default=None, kind="normal stress"
+        "Pa",
+        positive,
+        "normal stress σ_n in steady sliding, if that is known",
+        default=None,
+        kind="normal stress",
+        letter="sigma_n",
     )
 
     def load(self) -> Expression | None:

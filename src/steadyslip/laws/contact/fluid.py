@@ -10,7 +10,7 @@ from steadyslip.laws.contact.law import ContactInputs, Expression, PreloadedCont
 
 
 class PoreFluid(PreloadedContact, name="pore-fluid"):
-    """Pore fluid with dilatancy and drainage (Segall & Rice 1995; theory 4): σ' = σ0 − p, the effective normal stress.
+    """Pore fluid with dilatancy and drainage (Segall & Rice 1995): σ' = σ0 − p, the effective normal stress.
 
     Porosity φ follows slip, φ̇ = −(v/d_c)[φ − φ0 − ε ln(v/v_ref)], and pore pressure p, relative to the surroundings,
     ṗ = −c* p − φ̇/β. The states are both pressures, D = (φ − φ0)/β and p, and `suction` is ε/β, the undrained fall of

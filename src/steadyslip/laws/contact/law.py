@@ -208,9 +208,10 @@ class PreloadedContact(ContactLaw):
     steady_normal_stress: float | None = parameter(
         "Pa",
         positive,
-        "normal stress σss in steady sliding, instead of preload",
+        "normal stress σ_n in steady sliding, instead of preload",
         default=None,
         kind="normal stress",
+        letter="sigma_n",
         standing=1e6,
     )
 

@@ -116,10 +116,14 @@ class Triaxial(ContactLaw, name="triaxial"):
 
     lock_up = "the saw-cut angle must be below arccot μss = {angle} deg"
 
-    angle: float = parameter("rad", acute, "angle θ between saw cut and loading axis", letter="psi")
-    confining_pressure: float | None = parameter("Pa", positive, "confining pressure P_c", default=None)
+    angle: float = parameter("rad", acute, "angle θ between saw cut and loading axis", letter="theta")
+    confining_pressure: float | None = parameter("Pa", positive, "confining pressure P_c", default=None, letter="P_c")
     steady_normal_stress: float | None = parameter(
-        "Pa", positive, "normal stress σss in steady sliding, instead of confining_pressure", default=None
+        "Pa",
+        positive,
+        "normal stress σ_n in steady sliding, instead of confining_pressure",
+        default=None,
+        letter="sigma_n",
     )
 
     def inconsistencies(self) -> Iterator[Problem]:
@@ -153,7 +157,7 @@ class SelfEnergising(PreloadedContact, name="self-energising"):
 
     lock_up = "the gain must be below 1/μss = {inverse}"
 
-    gain: float | None = parameter("1", real, "gain γ of friction on normal stress", default=None)
+    gain: float | None = parameter("1", real, "gain γ of friction on normal stress", default=None, letter="gamma")
     wedge_angle: float | None = parameter("rad", acute, "wedge angle, γ = cot(wedge_angle)", default=None)
     lead_angle: float | None = parameter("rad", angle, "lead angle of a thread, γ = tan(lead_angle)", default=None)
 
@@ -183,8 +187,8 @@ class LeadScrew(ContactLaw, name="lead-screw"):
 
     lock_up = "raising needs a lead angle below arccot μss = {angle} deg"
 
-    lead_angle: float = parameter("rad", acute, "lead angle β of the thread")
-    axial_load: float = parameter("Pa", positive, "axial load W per unit thread area")
+    lead_angle: float = parameter("rad", acute, "lead angle β of the thread", letter="beta")
+    axial_load: float = parameter("Pa", positive, "axial load W per unit thread area", letter="W")
     direction: str = option("raising", "lowering", doc="whether the screw raises or lowers the load", default="raising")
 
     def load(self) -> Expression | None:
@@ -206,8 +210,8 @@ class DilatingLayer(PreloadedContact, name="dilating-layer"):
     e > 0 dilates. `preload` is the normal stress at v_ref. B0...B3 = 0, k_n e/v0, 0, 0.
     """
 
-    ram_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the ram")
-    dilatancy: float = parameter("m", real, "thickening e of the layer per e-fold of velocity")
+    ram_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the ram", letter="k_n")
+    dilatancy: float = parameter("m", real, "thickening e of the layer per e-fold of velocity", letter="e")
     v_ref: float = parameter("m/s", positive, "velocity at which the normal stress is the preload")
 
     def coupling(self, motion: ContactInputs) -> Expression:
@@ -223,7 +227,7 @@ class Lift(PreloadedContact, name="lift"):
     `preload` is the normal stress at v_ref; l >= 0. B0...B3 = 0, −l, 0, 0.
     """
 
-    lift: float = parameter("Pa s/m", nonnegative, "loss of normal stress per unit velocity, l")
+    lift: float = parameter("Pa s/m", nonnegative, "loss of normal stress per unit velocity, l", letter="l")
     v_ref: float = parameter("m/s", positive, "velocity at which the normal stress is the preload")
 
     def coupling(self, motion: ContactInputs) -> Expression:
@@ -239,8 +243,8 @@ class SlopedGuide(PreloadedContact, name="sloped-guide"):
     β > 0 rises in the direction of sliding. The law is local in x. B0...B3 = 0, 0, 0, k_n tan β.
     """
 
-    guide_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the guide")
-    slope: float = parameter("rad", angle, "slope β of the surface along the slide")
+    guide_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the guide", letter="k_n")
+    slope: float = parameter("rad", angle, "slope β of the surface along the slide", letter="beta")
 
     def coupling(self, motion: ContactInputs) -> Expression:
         return self.guide_stiffness * motion.lead * sp.tan(self.slope)

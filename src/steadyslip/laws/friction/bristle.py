@@ -23,12 +23,17 @@ class Coulomb(FrictionLaw, name="coulomb"):
     `mu_static` is given; steady sliding does not depend on it.
     """
 
-    mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
+    mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C", letter="mu_C")
     mu_static: float | None = parameter(
-        "1", positive, "friction coefficient at rest μ_S; μ_C unless given", default=None
+        "1", positive, "friction coefficient at rest μ_S; μ_C unless given", default=None, letter="mu_S"
     )
     viscous: float = parameter(
-        "s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0, kind="viscosity"
+        "s/m",
+        nonnegative,
+        "viscous coefficient s_2 (σ2 of LuGre), per unit normal stress",
+        default=0.0,
+        kind="viscosity",
+        letter="s_2",
     )
 
     def conditions(self) -> Iterator[Condition]:
@@ -60,14 +65,25 @@ class StribeckCurve(FrictionLaw):
     (Armstrong-Hélouvry 1991): with 2, friction is almost flat far below v_S; with 1 or less it falls most at rest.
     """
 
-    mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
-    mu_static: float = parameter("1", positive, "static friction coefficient μ_S")
-    v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S", kind="velocity scale")
+    mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C", letter="mu_C")
+    mu_static: float = parameter("1", positive, "static friction coefficient μ_S", letter="mu_S")
+    v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S", kind="velocity scale", letter="v_S")
     viscous: float = parameter(
-        "s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0, kind="viscosity"
+        "s/m",
+        nonnegative,
+        "viscous coefficient s_2 (σ2 of LuGre), per unit normal stress",
+        default=0.0,
+        kind="viscosity",
+        letter="s_2",
     )
     stribeck_exponent: float | None = parameter(
-        "1", positive, "Stribeck exponent δ_S; 2 unless given", default=None, standing=2.0, kind="exponent"
+        "1",
+        positive,
+        "Stribeck exponent δ_S; 2 unless given",
+        default=None,
+        standing=2.0,
+        kind="exponent",
+        letter="delta_S",
     )
 
     def _curve(self, v: Expression) -> Expression:
@@ -92,7 +108,13 @@ class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
     """
 
     lag: float = parameter(
-        "s", nonnegative, "time δ by which the curve follows velocity late", default=0.0, structural=True, kind="delay"
+        "s",
+        nonnegative,
+        "time δ by which the curve follows velocity late",
+        default=0.0,
+        structural=True,
+        kind="delay",
+        letter="delta",
     )
 
     def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
@@ -114,10 +136,19 @@ class LuGre(StribeckCurve, name="lugre"):
     """
 
     bristle_stiffness: float = parameter(
-        "1/m", positive, "bristle stiffness σ0, per unit normal stress", kind="bristle stiffness"
+        "1/m",
+        positive,
+        "bristle stiffness s_0 (σ0 of LuGre), per unit normal stress",
+        kind="bristle stiffness",
+        letter="s_0",
     )
     bristle_damping: float = parameter(
-        "s/m", nonnegative, "bristle damping σ1, per unit normal stress", default=0.0, kind="bristle damping"
+        "s/m",
+        nonnegative,
+        "bristle damping s_1 (σ1 of LuGre), per unit normal stress",
+        default=0.0,
+        kind="bristle damping",
+        letter="s_1",
     )
 
     def memory(self) -> tuple[str, ...]:

@@ -90,7 +90,7 @@ class Nagata(Aging, name="nagata"):
     The memory variable Ψ = bΘ + c_N τ/σ integrates the extra term exactly; `rate` is the aging part.
     """
 
-    c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N", idle=0.0)
+    c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N", idle=0.0, letter="c_N")
 
     def offset(self, sigma: Expression, tau: Expression) -> Expression:
         return self.c_nagata * tau / sigma

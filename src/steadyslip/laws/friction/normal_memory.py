@@ -103,7 +103,12 @@ class LinkerDieterich(NormalMemory, name="linker-dieterich"):
         kind="stress share", size=0.2, standing=0.3, idle=0.0,
     )  # fmt: skip
     sigma_ref: float = parameter(
-        "Pa", positive, "reference in ln(σ/σ_ref); shifts the memory variable only", default=1e6, gauge=True
+        "Pa",
+        positive,
+        "reference in ln(σ/σ_ref); shifts the memory variable only",
+        default=1e6,
+        gauge=True,
+        letter="sigma_ref",
     )
 
     def offset(self, sigma: Expression) -> Expression:
@@ -138,11 +143,11 @@ class PrakashClifton(NormalMemory, name="prakash-clifton"):
 
     direct_share: float = parameter(
         "1", share, "instantaneous share g of the response", default=0.0,
-        kind="immediate share", size=0.2, standing=0.5, idle=1.0,
+        kind="immediate share", size=0.2, standing=0.5, idle=1.0, letter="g",
     )  # fmt: skip
     slip_distance: float | None = parameter(
         "m", positive, "slip distance d_σ of the lag; d_c unless given", default=None,
-        kind="slip distance", standing=1e-5,
+        kind="slip distance", standing=1e-5, letter="d_sigma",
     )  # fmt: skip
 
     def memory(self) -> tuple[str, ...]:

@@ -228,6 +228,11 @@ slip and the aging law. `[contact]`, `[drive]` and `v_ref` may be missing too: n
 of the records. A `[protocol]` says what moved the load point where the records do not; the rate before it is
 that of the record, or `[drive] velocity` where the record does not show it.
 
+A file with bodies, links and contacts is that of a [machine](../how-to/fit-a-machine.md): it is complete, `[fit] free`
+names what is fitted, the search starts from its values, and `[record]` says which column is what: `columns`, `time`,
+`table`, `between`, `sampling`, `skip_bad_lines`, or `averages` of frequency responses. Of `[fit]` it has `free`,
+`fixed`, `separate`, `trend`, `offset`, `initial`, `errors`, `starts` and `effort`.
+
 ```toml
 [friction]
 evolution = "aging"                # what is missing is fitted

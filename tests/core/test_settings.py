@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from file_schema import file_schema
-from steadyslip.core.entries import Label, LabelledNumbers, Names, Option, Quantity, Span, Text, Whole
+from steadyslip.core.entries import Headings, Label, LabelledNumbers, Names, Option, Quantity, Span, Text, Whole
 from steadyslip.core.records import Named, Part, Settings, is_required, role_of
 from steadyslip.core.roles import Parameter, Placeholder, Series
 from steadyslip.experiments.fitting.settings import FitSettings
@@ -32,6 +32,7 @@ def value_of(role):
         Text: WORD, Names: st.lists(WORD, max_size=3).map(tuple), Label: WORD | st.integers(1, 9),
         Span: st.tuples(NUMBER, NUMBER), Quantity: NUMBER | st.just("1 GPa/m"),
         Series: st.lists(NUMBER, min_size=1, max_size=9).map(tuple),
+        Headings: st.dictionaries(WORD, WORD | st.integers(1, 40) | st.tuples(WORD, WORD), min_size=1, max_size=3),
         LabelledNumbers: st.lists(NUMBER, max_size=3).map(tuple) | st.dictionaries(WORD, NUMBER, max_size=3),
     }  # fmt: skip
     if isinstance(role, Whole):
@@ -209,7 +210,10 @@ def test_columns_may_be_written_short_or_long():
 
 def test_whatever_a_record_is_read_with_may_stand_in_a_file():
     words = {*signature(ss.read_record).parameters} - {"path", "columns"} | {*ROLES, "decimate"}
-    assert {item.name for item in fields(RecordSettings)} == words
+    of_machines = {"columns", "averages"}
+    readers = (ss.experiments.read_motion, ss.experiments.read_frequency_response)
+    assert of_machines <= {name for one in readers for name in signature(one).parameters}
+    assert {item.name for item in fields(RecordSettings)} == words | of_machines
     own = {"states", "windows", "compare"}  # of the file; the others are arguments of fit
     assert {item.name for item in fields(FitSettings)} - own <= {*signature(ss.fit).parameters}
 

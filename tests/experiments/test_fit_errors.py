@@ -11,8 +11,9 @@ from scipy.stats import binom, multivariate_normal
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting.fit import fit_with_errors
+from steadyslip.experiments.fitting.at_minimum import fit_with_errors
 from steadyslip.experiments.fitting.planning import make_plan
+from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.pooling import spread_of_chains
@@ -39,7 +40,7 @@ def test_intervals_cover_as_often_as_they_say():
     inside = np.zeros((count, 2, len(space)))
     for i in range(count):
         own = replace(plan, records=(replace(record, friction=data[i]),))
-        fit = fit_with_errors(own, own.comparison(), found.coordinates[i], search, "auto", (space.low, space.high))
+        fit = fit_with_errors(Fit, own, own.comparison(), found.coordinates[i], search, "auto", (space.low, space.high))
         for k, level in enumerate((0.68, 0.95)):
             ends = np.array([fit.interval(n, level) for n in fit.names])
             values = np.array([rig.value(u.parameter) for u in space.unknowns])
@@ -274,7 +275,7 @@ def pressed_once(seed):
     )
     found = minimise(lambda z, _: comparison.residuals(z), begin, space.low, space.high)
     search = replace(lab.stepped().search, converged=bool(found.converged[0]))
-    fit = fit_with_errors(plan, comparison, found.coordinates[0], search, "auto", (space.low, space.high))
+    fit = fit_with_errors(Fit, plan, comparison, found.coordinates[0], search, "auto", (space.low, space.high))
     return fit, {name: values[name] for name in fit.names if name in values}
 
 

@@ -9,7 +9,8 @@ from scipy.signal import lfilter
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting import fit as fitting
+from steadyslip.experiments.fitting.at_minimum import fit_with_errors
+from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.measured.clipped import clipped
 from steadyslip.experiments.numerics.noise import whiteness
 
@@ -130,7 +131,7 @@ def test_a_search_that_did_not_converge_has_no_errors(tmp_path):
     fit = lab.stepped()
     rough = replace(fit.search, converged=False)
     away = fit.coordinates + np.sqrt(np.diag(fit.covariance))
-    other = fitting.fit_with_errors(fit.plan, fit.comparison, away, rough, "auto", fit.bounds)
+    other = fit_with_errors(Fit, fit.plan, fit.comparison, away, rough, "auto", fit.bounds)
     assert not any(one.determined for one in other.estimates)
     assert other.derived == ()
     assert "95 %" not in str(other)
@@ -144,7 +145,7 @@ def test_a_search_that_rounding_kept_from_its_end_has_errors():
     fit = lab.stepped()
     rough = replace(fit.search, converged=False)
     away = fit.coordinates + 0.01 * np.sqrt(np.diag(fit.covariance))
-    other = fitting.fit_with_errors(fit.plan, fit.comparison, away, rough, "auto", fit.bounds)
+    other = fit_with_errors(Fit, fit.plan, fit.comparison, away, rough, "auto", fit.bounds)
     assert other.search.converged
     for one, same in zip(other.estimates, fit.estimates, strict=True):
         assert one.error == pytest.approx(same.error, rel=0.05)

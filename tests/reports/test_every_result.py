@@ -11,6 +11,7 @@ import lab_records as lab
 import steadyslip as ss
 from dimensionless import A, unit_rig
 from hunting_by_scipy import axis
+from machine_fits_at_random import drawn
 from machines import two_mass
 from public_names import public_results
 from rigs_of_theory import V0, rate_state, rig
@@ -40,6 +41,7 @@ QUICK = {
     "Samples": lambda: ss.maps.Samples({"friction.a": (0.01, 0.02)}, 2), "Explorer": lambda: ss.explore(RIG),
     "ResponseData": lambda: ss.machine.ResponseData(np.arange(9), np.ones((9, 1, 1)), np.zeros((9, 1, 1)), ("p.x",)),
     "StructureData": lambda: ss.machine.StructureData(*np.eye(2)[None].repeat(4, axis=0)),
+    "MotionRecord": lambda: ss.experiments.motion_from_arrays(np.arange(30.0), {"table.x": np.arange(30.0)}),
     "Hunt": lambda: ss.hunt(axis(mass=1.0, rest=1.5, sliding=1.0, viscous=0.4, kp=3.0, kd=6.0, ki=4.0), until=30.0),
 }  # fmt: skip
 LONG = {
@@ -62,6 +64,7 @@ LONG = {
     until=10.0),
     "Record": lambda: lab.record(lab.rig(), lab.STEP, seed=1),
     "Fit": lambda: ss.fit(lab.rig(), made("Record"), free=FREE), "Estimate": lambda: made("Fit")["a"],
+    "MachineFit": lambda: ss.fit(drawn("response", 1).machine, drawn("response", 1).record, ["links.s0.stiffness"]),
     "Draws": lambda: ss.experiments.normal_draws(made("Fit"), 50),
     "Prediction": lambda: ss.predict(lab.rig(), made("Draws")),
     "Profile": lambda: ss.experiments.profile(made("Fit"), "friction.a"),

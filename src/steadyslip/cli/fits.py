@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from steadyslip.cli.answers import output_result, print_json, print_text
 from steadyslip.cli.options import AsJson, outputs
+
+if TYPE_CHECKING:
+    from steadyslip.experiments import Fit
 
 
 def fit(
@@ -38,7 +41,7 @@ def fit(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Which friction do these records show, and how sure is that?"""
+    """Which friction do these records show (or, with SPEC of a machine, which machine), and how sure is that?"""
     if law is not None:
         _fit_speeds(files, law, changes or (), output or (), as_json)
         return
@@ -54,6 +57,7 @@ def fit(
         write_table,
     )
     from steadyslip.experiments.from_files import spec_of
+    from steadyslip.experiments.machine_spec import MachineSpec
     from steadyslip.files.output import check_output
 
     check_output(output or (), ENDINGS)
@@ -62,7 +66,17 @@ def fit(
     if bootstrap == 1:
         raise ParameterError([Problem("--bootstrap", "got 1; allowed: 0 for none, or 2 or more resampled records")])
     records, spec = split_files(files)
-    if spec is not None and spec_of(spec, changes or ()).population is not None:
+    plan = None if spec is None else spec_of(spec, changes or ())
+    if isinstance(plan, MachineSpec):
+        if bootstrap or steps or listed:
+            message = "is for records of sliders; leave --bootstrap, --steps and tables out for a machine"
+            raise ParameterError([Problem("--steps" if steps or listed else "--bootstrap", message)])
+        machine, _ = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
+        for record in () if as_json else machine.plan.records:
+            print_text(f"{record}\n")
+        output_result(machine, output or (), as_json, lambda one, path: write_fit(one, None, path))
+        return
+    if spec is not None and plan is not None and plan.population is not None:
         if bootstrap:
             message = "cannot be combined with [population], whose draws carry the uncertainty"
             raise ParameterError([Problem("--bootstrap", message)])
@@ -73,7 +87,8 @@ def fit(
         members = population_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
         output_result(members, output or (), as_json, write_population)
         return
-    found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
+    fitted, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
+    found = cast("Fit", fitted)
     for path in others:
         write_fit(found, comparison, path)
     if not as_json:

@@ -130,6 +130,37 @@ class LabelledNumbers(Entry):
 
 
 @dataclass(frozen=True)
+class Headings(Entry):
+    """Field type: a column of a file for each name: its heading or number from 1, or a pair of that and its unit."""
+
+    doc: str
+
+    def checked(self, value: Any) -> dict[str, Any]:
+        if not isinstance(value, dict) or not value:
+            raise self.refused(value)
+        found = {}
+        for name, column in value.items():
+            one = tuple(column) if isinstance(column, (list, tuple)) else (column,)
+            place = isinstance(one[0], int) and not isinstance(one[0], bool) if one else False
+            if not (len(one) in (1, 2) and (isinstance(one[0], str) or place) and isinstance(one[-1], (str, int))):
+                raise self.refused(value)
+            found[str(name)] = one if len(one) == 2 else one[0]
+        return found
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        pairs = (f"{json.dumps(name, ensure_ascii=False)} = {json.dumps(column)}" for name, column in value.items())
+        return f"{{ {', '.join(pairs)} }}"
+
+    def allowed(self) -> str:
+        return "a table of names and headings, or of names and [heading, unit]"
+
+    def schema(self) -> Schema:
+        one: Schema = {"type": ["string", "integer"]}
+        pair = {"type": "array", "items": one, "minItems": 2, "maxItems": 2}
+        return {"type": "object", "additionalProperties": {"anyOf": [one, pair]}, "description": self.doc}
+
+
+@dataclass(frozen=True)
 class Whole(Entry):
     """Field type: an integer between two bounds, both included."""
 

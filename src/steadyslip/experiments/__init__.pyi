@@ -13,9 +13,11 @@ from .answers.uncertainty import Draws, bootstrap, load_draws, normal_draws, pos
 from .answers.validation import CrossValidation, cross_validate
 from .fitting.estimates import Estimate
 from .fitting.fit import fit
+from .fitting.machines.machine_result import MachineFit
 from .fitting.result import Fit, load_fit
 from .from_files import fit_files, population_files
 from .from_speeds import fit_friction_table
+from .measured.motion_record import MotionRecord, motion_from_arrays, read_frequency_response, read_motion
 from .measured.read import read_record, record_from_arrays
 from .measured.record import Record
 from .spec import Spec, lab_rig, read_spec
@@ -26,6 +28,8 @@ __all__ = [
     "Estimate",
     "Fit",
     "LawComparison",
+    "MachineFit",
+    "MotionRecord",
     "Population",
     "Precision",
     "Prediction",
@@ -45,6 +49,7 @@ __all__ = [
     "load_draws",
     "load_fit",
     "load_population",
+    "motion_from_arrays",
     "normal_draws",
     "population",
     "population_files",
@@ -52,6 +57,8 @@ __all__ = [
     "precision",
     "predict",
     "profile",
+    "read_frequency_response",
+    "read_motion",
     "read_record",
     "read_spec",
     "record_from_arrays",

@@ -13,6 +13,7 @@ from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.answers.population import Population
 from steadyslip.experiments.answers.step_table import StepTable
 from steadyslip.experiments.answers.uncertainty import Draws
+from steadyslip.experiments.fitting.machines.machine_result import MachineFit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.speed_result import SpeedFit
 from steadyslip.files.output import FIGURES, write_by_ending, write_text
@@ -40,7 +41,7 @@ def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
     return records, specs[0] if specs else None
 
 
-def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Draws | None = None) -> None:
+def write_fit(fit: Fit | MachineFit, comparison: LawComparison | None, path: Path, draws: Draws | None = None) -> None:
     """Write a fit in the format that the file's ending names; an HTML document includes the draws.
 
     Raises
@@ -99,7 +100,7 @@ def write_speeds(found: SpeedFit, path: Path) -> None:
     write_text(path, json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n" if numbers else found.rig_text())
 
 
-def as_json(fit: Fit, comparison: LawComparison | None) -> dict[str, Any]:
+def as_json(fit: Fit | MachineFit, comparison: LawComparison | None) -> dict[str, Any]:
     """Data of a fit for JSON, with those of the laws that it was compared with."""
     data = fit.to_dict()
     if comparison is not None:

@@ -6,16 +6,18 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_text
 from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.answers.population import FEWEST, POPULATION, Population, load_population, population
-from steadyslip.experiments.fitting.result import Fit, load_fit
+from steadyslip.experiments.fitting.machines.machine_result import MachineFit
+from steadyslip.experiments.fitting.result import Fit, load_friction_fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.settings import PopulationSettings
-from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.machine_spec import MachineSpec
 from steadyslip.experiments.spec import Spec, spec_from_text
 from steadyslip.files.sealed import holds
 from steadyslip.files.specifications.read import text_of
@@ -23,7 +25,7 @@ from steadyslip.files.specifications.read import text_of
 Paths = Sequence[str | PathLike[str]]
 
 
-def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Spec:
+def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Spec | MachineSpec:
     """Read a fit file; without one, the one-state slip law at the measured normal stress."""
     text = "[friction]\n" if spec is None else text_of(spec)
     return spec_from_text(text, "default" if spec is None else str(spec), changes)
@@ -32,7 +34,7 @@ def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Sp
 @checked()
 def fit_files(
     paths: Paths, spec: str | PathLike[str] | None = None, changes: Iterable[str] = (), *, skip_bad_lines: bool = False
-) -> tuple[Fit, LawComparison | None]:
+) -> tuple[Fit | MachineFit, LawComparison | None]:
     """Read records and fit them, as the command line does; shows progress on a terminal.
 
     Parameters
@@ -47,8 +49,8 @@ def fit_files(
 
     Returns
     -------
-    fit : Fit
-        The best, where laws are compared.
+    fit : Fit or MachineFit
+        The best, where laws are compared; of a machine if the file describes one.
     comparison : LawComparison or None
         Comparison of the laws that the file lists; if it lists none and the normal stress changes, of the slip and the
         aging law with each memory of it, unless the file chooses a memory. None for a single law.
@@ -68,7 +70,7 @@ def fit_files(
     records = _read(plan, paths, skip_bad_lines)
     with progress_text("searching") as said:
         report = _progress_reporter(said)
-        if plan.compared(records):
+        if isinstance(plan, Spec) and plan.compared(records):
             found = plan.compare(records, progress=report)
             return found.fits[found.best].with_variants(), found
         return plan.fit(records, progress=report), None
@@ -80,41 +82,44 @@ def population_files(
 ) -> Population:
     """Read records, fit each on its own and pool what they say, as the command line does; shows progress on a terminal.
 
-    Parameters
-    ----------
-    paths : sequence of path
-        Records, each an experiment of its own.
-    spec : path
-        The file of the fit; its table ``[population]`` says which parameters differ, and on what they may depend.
-    changes : iterable of str
-        As for `read_spec`.
-    skip_bad_lines : bool
+        Parameters
+        ----------
+        paths : sequence of path
+            Records, each an experiment of its own.
+        spec : path
+            The file of the fit; its table ``[population]`` says which parameters differ, and on what they may depend.
+        changes : iterable of str
+            As for `read_spec`.
+        skip_bad_lines : bool
 
-    Returns
-    -------
-    Population
-        Its experiments labelled by the names of the files.
+        Returns
+        -------
+        Population
+            Its experiments labelled by the names of the files.
 
-    Raises
-    ------
-    ParameterError
-        Listing everything that is wrong with the files, or if they do not determine a population.
-    NotAvailable
-        If emcee is not installed.
+        Raises
+        ------
+        ParameterError
+            Listing everything that is wrong with the files, or if they do not determine a population.
+        NotAvailable
+            If emcee is not installed.
 
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> head, *rows = Path("examples/data/made_velocity_step.csv").read_text().splitlines()
-    >>> paths = [Path(f"part{k}.csv") for k in range(3)]
-    >>> for k, path in enumerate(paths):  # in place of three experiments
-    ...     _ = path.write_text("\\n".join([head, *rows[k::3]]))
-    >>> changes = ["fit.trend=0", "population.parameters=['friction.a', 'friction.b']", "population.draws=100"]
-    >>> pooled = ss.experiments.population_files(paths, "examples/fits/basalt.toml", changes)
-    >>> pooled.names
-    ('friction.a', 'friction.b')
+        Examples
+        --------
+        >>> from pathlib import Path
+    from typing import Any
+        >>> head, *rows = Path("examples/data/made_velocity_step.csv").read_text().splitlines()
+        >>> paths = [Path(f"part{k}.csv") for k in range(3)]
+        >>> for k, path in enumerate(paths):  # in place of three experiments
+        ...     _ = path.write_text("\\n".join([head, *rows[k::3]]))
+        >>> changes = ["fit.trend=0", "population.parameters=['friction.a', 'friction.b']", "population.draws=100"]
+        >>> pooled = ss.experiments.population_files(paths, "examples/fits/basalt.toml", changes)
+        >>> pooled.names
+        ('friction.a', 'friction.b')
     """
     plan = spec_of(spec, changes)
+    if not isinstance(plan, Spec):
+        raise NotAvailable(f"{str(spec)!r} describes a machine; allowed: a slider, one block on one surface")
     members = plan.population or PopulationSettings()
     labels: list[str] = []
     for path in paths:
@@ -150,10 +155,10 @@ def load_friction(path: str | PathLike[str]) -> Fit | Population:
     NotAvailable
         As `load_fit` and `load_population`.
     """
-    return load_population(path) if holds(path, POPULATION) else load_fit(path)
+    return load_population(path) if holds(path, POPULATION) else load_friction_fit(path)
 
 
-def _read(plan: Spec, paths: Paths, skip_bad_lines: bool) -> list[Record]:
+def _read(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> list[Any]:
     """Read all records; one error lists the problems of all files."""
     records, faults = [], []
     for path in paths:

@@ -21,6 +21,7 @@ from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import MOST_STATES, FitSettings, PopulationSettings
+from steadyslip.experiments.machine_spec import MachineSpec, machine_spec
 from steadyslip.experiments.measured.read import read_record
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.settings import RecordSettings
@@ -91,7 +92,8 @@ class Spec(Displayed):
     def fit(self, records: Sequence[Record], **changes: Any) -> Fit:
         """Fit the records with the settings of the file."""
         rig, parts = self._rig_and_records(records)
-        return fit(rig, parts, **self._options(rig), protocol=self.protocol, **changes)
+        found: Fit = fit(rig, parts, **self._options(rig), protocol=self.protocol, **changes)
+        return found
 
     def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
         """Labels of the laws to compare: those of the file, else `undecided` if the normal stress changes."""
@@ -137,11 +139,12 @@ class Spec(Displayed):
 
 
 @checked()
-def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
+def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec | MachineSpec:
     """Read a fit file.
 
     A fit file is a rig file in which fitted values may be missing (a, b, d_c, α, mu_ref, stiffness), and also values
-    that the records give (contact, drive, v_ref). The table ``[record]`` describes the records, ``[fit]`` the fit.
+    that the records give (contact, drive, v_ref). The table ``[record]`` describes the records, ``[fit]`` the fit. That
+    of a machine is complete, and ``[fit] free`` names what is fitted.
 
     Parameters
     ----------
@@ -162,18 +165,21 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
     return spec_from_text(text_of(path), str(path), changes)
 
 
-def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec:
+def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec | MachineSpec:
     """Read the text of a fit file; see `read_spec`."""
     filled = _Placeholders()
-    return _spec(read_contents(text, source, changes, TABLES, filled.complete), filled)
+    found = read_contents(text, source, changes, TABLES, filled.complete)
+    return machine_spec(found) if filled.of_machine else _spec(found, filled)
 
 
 def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
-    found.refuse_machine()
     record, settings = found.further.get("record"), found.further.get("fit")
     settings = settings if isinstance(settings, FitSettings) else FitSettings()
     missing = filled.missing - found.changed
     left = [] if found.problems or found.rig is None else _values_missing(missing, settings, found.rig)
+    if isinstance(record, RecordSettings):
+        left += [Problem(f"record.{name}", "is of a machine's record; leave it out for a slider")
+                 for name in ("columns", "averages") if name in given(record)]  # fmt: skip
     members = found.further.get("population")
     members = members if isinstance(members, PopulationSettings) else None
     if members is not None:
@@ -280,13 +286,17 @@ class _Placeholders:
         self.missing: set[str] = set()
         self.standing: dict[str, str] = {}
         self.friction: set[str] = set()
+        self.of_machine = False
 
     def given(self, kind: str, changed: set[str]) -> bool:
         """True if the file, or a change to it, gives a value that would otherwise come from the records."""
         return kind not in self.standing or self.standing[kind] in changed
 
     def complete(self, tables: Table) -> None:
-        """Fill the tables."""
+        """Fill the tables of a slider; a machine's are complete."""
+        self.of_machine = any(name in tables for name in ("bodies", "links", "contacts"))
+        if self.of_machine:
+            return
         wanted = tables.get("fit", {})
         states = wanted.get("states") if isinstance(wanted, dict) else None
         friction = tables.setdefault("friction", {})

@@ -12,13 +12,14 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.pictures import register_figures, saved_by
 from steadyslip.core.written import in_written_units
-from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction, Profile, Record
+from steadyslip.experiments import Draws, Fit, LawComparison, MachineFit, Population, Prediction, Profile, Record
 from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.experiments.answers import comparison, kicks, prediction, profile, ranking
 from steadyslip.figures.experiments.corners import corner
 from steadyslip.figures.experiments.fits import fit, steps
+from steadyslip.figures.experiments.machine_fits import machine_fit
 from steadyslip.figures.experiments.populations import population
 from steadyslip.figures.experiments.records import record
 from steadyslip.figures.forced import frequency_response, frozen_verdicts
@@ -54,6 +55,7 @@ __all__ = [
     "hopf_curve",
     "journal",
     "kicks",
+    "machine_fit",
     "machine_sketch",
     "machine_verdict",
     "map_figure",
@@ -102,6 +104,7 @@ register_figures(FrequencyResponse, response=frequency_response)
 register_figures(FrozenVerdicts, verdicts=frozen_verdicts)
 register_figures(Record, record=record)
 register_figures(Fit, fit=fit, steps=steps, corner=corner)
+register_figures(MachineFit, fit=machine_fit)
 register_figures(Draws, corner=corner)
 register_figures(Profile, profile=profile)
 register_figures(LawComparison, comparison=comparison)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from steadyslip import figures
 from steadyslip.core.format import format_percent, format_quantity
-from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction
+from steadyslip.experiments import Draws, Fit, LawComparison, MachineFit, Population, Prediction
 from steadyslip.experiments.fitting.words import warnings
 from steadyslip.figures.inline import figure_html
 from steadyslip.reports import rig as rig_report
@@ -47,6 +47,21 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
     lead = ", ".join(f"{one.name} {one.shown()}" for one in result.estimates if one.determined)
     lead = f"{lead}." if lead else "No parameter is determined."
     return Parts(f"Fit to {record_names(result)}", lead, question, body, rig)
+
+
+@parts_of.register
+def _machine_fit(result: MachineFit, comparison: None = None, draws: None = None) -> Parts:
+    rows = [(one.name, one.shown(), one.range() if one.determined else "not determined") for one in result.estimates]
+    body = [heading("What was found"), table(rows, ("parameter", "value", "95 %"))]
+    for i, record in enumerate(result.plan.records):
+        shown = figure_html(lambda i=i: figures.machine_fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
+        body.append(figure(shown, f"{Path(record.source).name}: record and machine."))
+    body += [heading("Details"), result_listing(result)]
+    lead = ", ".join(f"{one.name} {one.shown()}" for one in result.estimates if one.determined)
+    lead = f"{lead}." if lead else "No parameter is determined."
+    names = ", ".join(Path(record.source).name for record in result.plan.records)
+    question = f"Which machine do these records show, and how sure is that: {names}?"
+    return Parts(f"Machine fitted to {names}", lead, question, body, result.rig())
 
 
 def _draws_section(result: Draws) -> list[str]:

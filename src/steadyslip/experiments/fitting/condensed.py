@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading
 
@@ -78,9 +79,9 @@ class Condensed:
         return r, rows
 
 
-def condensed(plan: Plan, whole: Comparison, coordinates: Array) -> Comparison | Condensed:
+def condensed(plan: Any, whole: DataComparison, coordinates: Array) -> DataComparison | Condensed:
     """Condensed comparison near coordinates (m, p), the best first; `whole` itself where condensing does not pay."""
-    if not len(coordinates) or not _possible(plan):
+    if not len(coordinates) or not _possible(plan) or not isinstance(whole, Comparison):
         return whole
     return condensed_along(plan, whole, *whole.model(coordinates[:MAX_REFERENCES]))
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.options import checked
-from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.at_minimum import fit_with_errors
 from steadyslip.experiments.fitting.effort import Budget, Effort
-from steadyslip.experiments.fitting.estimates import combinations, prior_information
+from steadyslip.experiments.fitting.machines.fit_machine import fit_machine
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import check_friction, make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
@@ -21,22 +21,17 @@ from steadyslip.experiments.fitting.search import (
     MAX_ITERATIONS,
     Progress,
     SearchResult,
-    SearchSummary,
     find_minimum,
     first_computable,
-    times_of_changes,
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
-from steadyslip.experiments.fitting.valleys import along_valleys
-from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.least_squares import minimise
-from steadyslip.experiments.numerics.noise import describe, white
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
 MAX_WIDTHS = 6  # widths of a robust loss that are tried at most
 LEAST_NARROWING = 0.8  # a new width is used if it is below this share of the last; chosen by trial, to save searches
 MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a minimum; a search is within 1e-7 of it
@@ -44,8 +39,8 @@ MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a
 
 @checked()  # the options are checked as `FitSettings`, which files use too
 def fit(
-    rig: Slider,
-    records: Record | Sequence[Record],
+    rig: Slider | Machine,
+    records: Any,
     free: Sequence[str] | None = None,
     *,
     fixed: Sequence[str] = (),
@@ -66,7 +61,7 @@ def fit(
     effort: float = 1.0,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> Fit:
+) -> Any:
     """Fit a rig to one or several records of experiments.
 
     The model is driven by the loading that was commanded, as found in the record: rates of the load point by robust
@@ -74,18 +69,22 @@ def fit(
     It starts from steady sliding at the first sample; a record that begins at rest, from a hold after such sliding,
     whose length (``start.hold``) is fitted. Starting values come from the records.
 
+    A machine is fitted to columns that are named as its runs name them (`experiments.read_motion`), or to frequency
+    responses (`experiments.read_frequency_response`) by what it answers to small waves. It is driven by its drive and
+    the protocol, and its own values are where the search starts. Every column is weighed by its own noise.
+
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
         Its laws, and the values of what is not free. Values of what is free do not matter, but for parameters whose
         kind no law declares (`steadyslip.core.roles.PARAMETER_KINDS`): these start within a decade of them. Drive
         velocity and (with a constant contact) normal stress are those of each record.
-    records : Record or sequence of Record
+    records : Record, or MotionRecord or ResponseData for a machine, or sequence
         Fitted together.
     free : sequence of str, optional
         Parameters to fit. Unless given, all of the friction law and the stiffness. The level of friction,
         ``friction.mu_ref``, is free in any case unless it is fixed. With a protocol, times of its pieces too
-        (``protocol.pieces.1.at``).
+        (``protocol.pieces.1.at``). Of a machine name them: any of its parameters and of the protocol.
     fixed : sequence of str, optional
         Parameters that keep the rig's value.
     separate : sequence of str, optional
@@ -109,7 +108,8 @@ def fit(
         ``steady``: a record begins with steady sliding at the first rate and normal stress; ``free``: it slides at that
         rate but not steadily, and how far friction (``initial.friction``, by the spring's pull) and each memory of it
         (``initial.Theta``, e-folds of state) are from steady sliding is fitted, each record's own. A record that begins
-        at rest has ``start.hold`` in any case.
+        at rest has ``start.hold`` in any case. Of a machine ``free`` are places and velocities of all bodies at the
+        beginning (``initial.table.x``), as of a ring-down.
     loss : str, optional
         ``linear`` (least squares), or ``soft-l1``, ``huber``, ``cauchy``, in which outliers weigh less.
     width : float, optional
@@ -134,7 +134,7 @@ def fit(
 
     Returns
     -------
-    Fit
+    Fit, or MachineFit of a machine
 
     Raises
     ------
@@ -150,11 +150,15 @@ def fit(
     >>> print(fit["d_c"])
     friction.d_c = 10.06 ± 0.077 um
     """
-    return search_fit(
-        rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
-        trend_axis=trend_axis, offset=offset, lag=lag, initial=initial, loss=loss, width=width, weights=weights,
-        calibrated=calibrated, errors=errors, starts=starts, effort=effort, threads=threads, progress=progress,
-    ).with_variants()  # fmt: skip
+    options = {
+        "fixed": fixed, "separate": separate, "drive": drive, "protocol": protocol, "trend": trend,
+        "trend_axis": trend_axis, "offset": offset, "lag": lag, "initial": initial, "loss": loss, "width": width,
+        "weights": weights, "calibrated": calibrated, "errors": errors, "starts": starts, "effort": effort,
+        "threads": threads, "progress": progress,
+    }  # fmt: skip
+    if isinstance(rig, Machine):
+        return fit_machine(rig, records, free, **options)
+    return search_fit(rig, records, free, **options).with_variants()
 
 
 def search_fit(
@@ -185,7 +189,7 @@ def search_fit(
                 break
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
-    return fit_with_errors(plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+    return fit_with_errors(Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
 
 
 def _without_outliers(plan: Plan, found: SearchResult) -> tuple[Record, ...]:
@@ -225,88 +229,4 @@ def refit_from(result: Fit, others: Sequence[Fit]) -> Fit:
     found, _ = with_states_sorted(comparison, ends)
     errors = "correlated" if result.correlated else "independent"
     search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
-    return fit_with_errors(plan, comparison, found, search, errors, result.bounds)
-
-
-def _level_uncertainty(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
-    """Covariance (p, p) of Jᵀr that comes from the uncertain levels of velocity and normal stress in the records."""
-    found = np.zeros((len(z), len(z)))
-    predicted: Array | None = None
-    for i, loading in enumerate(plan.loading if plan.follows else ()):
-        for moved in shifted(loading, plan.pressed):
-            if predicted is None:
-                predicted = comparison.model(z[None])[0][0]
-            others = tuple(moved if k == i else own for k, own in enumerate(plan.loading))
-            model = replace(plan, loading=others).comparison().model(z[None])[0][0]
-            push = rows @ ((model - predicted) * comparison.weights)
-            if np.all(np.isfinite(push)):
-                found += np.outer(push, push)
-    return found
-
-
-def _is_minimum(
-    comparison: Comparison, z: Array, bounds: tuple[Array, Array], information: Array, gradient: Array,
-    deviations: Array,
-) -> bool:  # fmt: skip
-    """True if coordinates (p,) where a search ended are a minimum to within `ARRIVED` standard deviations.
-
-    A step of Gauss and Newton is then that short, or its way over a kink: the sum of squares has one where the time of
-    a change passes that of a sample. Such a time is held if the sum rises to both of its sides, the others following.
-    """
-    free = (bounds[0] < z) & (z < bounds[1])
-    ssq = float(np.sum(comparison.residuals(z[None])[0] ** 2))
-    times = times_of_changes(comparison.space)
-    while np.any(free):
-        own = information[np.ix_(free, free)]
-        length = np.zeros(len(z))
-        length[free] = np.abs(np.linalg.lstsq(own, gradient[free])[0]) / deviations[free]
-        if np.all(length <= ARRIVED):
-            break
-        worst = int(np.argmax(np.where(times, length, 0.0)))
-        if not length[worst] > ARRIVED:
-            return False
-        along = np.zeros(len(z))
-        along[free] = np.linalg.lstsq(own, (np.flatnonzero(free) == worst).astype(float))[0]
-        along *= ARRIVED * deviations[worst] / along[worst]
-        beside = np.sum(comparison.residuals(z + np.array([[-1.0], [1.0]]) * along)[0] ** 2, axis=1)
-        if not np.all(beside > ssq):
-            return False
-        free[worst] = False
-    return True
-
-
-def fit_with_errors(
-    plan: Plan, comparison: Comparison, z: Array, search: SearchSummary, errors: str, bounds: tuple[Array, Array]
-) -> Fit:
-    """Fit with errors, noise and combinations not determined, from the coordinates of a minimum."""
-    from steadyslip import __version__
-
-    r, jacobian = comparison.residuals(z[None])
-    residuals, rows = r[0], jacobian[0]
-    free = len(z)
-    information, spread = rows @ rows.T, np.zeros((free, free))
-    noises = []
-    for where in comparison.slices:
-        own = residuals[where]
-        share = free * len(own) // comparison.size
-        if errors == "independent":
-            noise = white(own, share)
-        else:
-            noise = describe(own, share, errors == "correlated", rows[:, where])
-        noises.append(noise)
-        spread += noise.spread(rows[:, where])
-    spread += _level_uncertainty(plan, comparison, z, rows)
-    known = prior_information(comparison.space)
-    scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
-    covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
-    if not search.converged:
-        if _is_minimum(comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))):
-            search = replace(search, converged=True)
-        else:  # curvature beside the minimum says nothing of errors
-            covariance = np.diag(np.full(free, np.inf))
-    ssq = float(residuals @ residuals)
-    if search.converged:
-        covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
-        undetermined += opened
-    fit = Fit(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__)
-    return fit.with_memories()
+    return fit_with_errors(Fit, plan, comparison, found, search, errors, result.bounds)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -145,11 +145,6 @@ class Fitted(ReadOnly):
         """Degrees of freedom: samples less parameters."""
         return self.samples - len(self.space)
 
-    @property
-    def rms(self) -> float:
-        """Root mean square of the residuals; in friction, of a slider."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
-
     @cached_property
     def model(self) -> Array:
         """What the records have, of the fitted model, trends included, at all samples (n,): friction of a slider."""
@@ -204,6 +199,10 @@ class Fitted(ReadOnly):
             independent += worth
         size = len(self.space)
         return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))
+
+    def with_memories(self) -> Self:
+        """The same fit; of a slider, without an error of what a memory of normal stress moves far that fits as well."""
+        return self
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:

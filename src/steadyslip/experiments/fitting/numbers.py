@@ -40,6 +40,11 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
                     return one
         return super().__getitem__(name)
 
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals, in friction."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
         """What follows from them, with errors: ``a - b``, critical stiffness ``k_c`` (Pa/m), ``k/k_c``, ``k/k_cal``."""

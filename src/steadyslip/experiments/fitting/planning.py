@@ -59,12 +59,12 @@ def make_plan(
                                "load point or change the normal stress")  # fmt: skip
     problems: list[Problem] = []
     known = can_be_free(rig, plan_protocol)
-    names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
+    names = _default_free(rig) if free is None else resolved("free", free, known, problems)
     if free is not None:  # the level of friction is never known beforehand: it is free even if not named
         names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
-    held = _resolved("fixed", fixed, rig.parameters(), problems)
+    held = resolved("fixed", fixed, rig.parameters(), problems)
     names = [name for name in dict.fromkeys(names) if name not in held]
-    apart = _resolved("separate", separate, dict.fromkeys(names), problems)
+    apart = resolved("separate", separate, dict.fromkeys(names), problems)
     problems += faults({name: value for name, value in options.items() if name != "weights"})
     for name in ("errors", "starts", "effort"):  # options of the search, which are no part of the plan
         options.pop(name, None)
@@ -125,7 +125,8 @@ def _default_free(rig: Slider) -> list[str]:
     return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
 
 
-def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
+def resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
+    """Full names of those in `known`; a problem with each other one is added, under the name `what`."""
     if isinstance(names, str):
         names = [names]
     found = []

@@ -7,12 +7,16 @@ from os import PathLike
 from typing import Any
 
 from steadyslip.core.checks import Check
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.fitting import store
+from steadyslip.experiments.fitting.machines import machine_store
+from steadyslip.experiments.fitting.machines.machine_result import MachineFit
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.fitting.words import as_dict, words
+from steadyslip.files.sealed import holds
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,8 +61,8 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
 
 
 @checked()
-def load_fit(path: str | PathLike[str]) -> Fit:
-    """Read a fit that `Fit.save` wrote.
+def load_fit(path: str | PathLike[str]) -> Fit | MachineFit:
+    """Read a fit that `Fit.save` or `MachineFit.save` wrote.
 
     Nothing in the file is executed; damage is found, whatever it is.
 
@@ -75,4 +79,20 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     >>> ss.load_fit("fit.nc")["d_c"] == fit["d_c"]
     True
     """
+    if holds(path, machine_store.MACHINE_FIT):
+        return machine_store.read(path, MachineFit)
     return store.read(path, Fit)
+
+
+def load_friction_fit(path: str | PathLike[str]) -> Fit:
+    """Read a fit of friction, as `load_fit`.
+
+    Raises
+    ------
+    NotAvailable
+        If the file holds the fit of a machine, or as `load_fit`.
+    """
+    found = load_fit(path)
+    if not isinstance(found, Fit):
+        raise NotAvailable(f"{str(path)!r} holds the fit of a machine; allowed: friction fitted to records of a slider")
+    return found

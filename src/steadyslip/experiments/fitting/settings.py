@@ -26,7 +26,7 @@ class FitSettings(Settings):
 
     free: tuple[str, ...] | None = setting(
         Names("parameters to fit, what is missing unless given; with a `[protocol]` also times of its pieces, "
-              "`protocol.pieces.1.at`"), default=None,
+              "`protocol.pieces.1.at`; of a machine any of its parameters, and of the protocol"), default=None,
     )  # fmt: skip
     fixed: tuple[str, ...] = setting(Names("parameters to keep"), default=())
     separate: tuple[str, ...] = setting(Names("free parameters that every record has to itself"), default=())
@@ -36,9 +36,14 @@ class FitSettings(Settings):
         doc="`commanded`: rates and normal stress found in the record, times of their changes fitted; `smoothed`: a "
         "smooth curve through the displacement; `measured`: as measured, noise included",
     )  # fmt: skip
-    trend: int = setting(Whole("order of a polynomial that is added to friction", 0, MOST_TREND), default=0)
+    trend: int = setting(
+        Whole("order of a polynomial that is added to friction, or to every column of a machine", 0, MOST_TREND),
+        default=0,
+    )
     trend_axis: str = option("displacement", "time", doc="what it is a polynomial of", default="displacement")
-    offset: bool = option(False, True, doc="add a constant too, beside mu_ref", default=False)
+    offset: bool = option(
+        False, True, doc="add a constant too, beside mu_ref, or to every column of a machine", default=False
+    )
     lag: bool = option(
         False, True, default=False,
         doc="friction may come later than what drives it, each record by a time of its own, `lag`",
@@ -46,7 +51,8 @@ class FitSettings(Settings):
     initial: str = option(
         "steady", "free", default="steady",
         doc="`steady`: the record begins with steady sliding; `free`: it slides, but not steadily: friction and memory "
-        "at its beginning are fitted, as differences from steady sliding (`initial.friction`, `initial.Theta`)",
+        "at its beginning are fitted, as differences from steady sliding (`initial.friction`, `initial.Theta`); of a "
+        "machine places and velocities of all bodies (`initial.table.x`), as of a ring-down",
     )  # fmt: skip
     loss: str = option(*LOSSES, doc="of residuals; all but `linear` let outliers weigh less", default="linear")
     width: float | None = parameter(

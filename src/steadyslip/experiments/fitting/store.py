@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import astuple, fields, replace
 from os import PathLike
 from typing import Any, TypeVar
@@ -12,6 +13,7 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.estimates import Combination
+from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
@@ -28,10 +30,8 @@ from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
 FIT = FileKind("fit", 8, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
-ATTRIBUTES = {
-    "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
-    "loading": str, "refits": str, "steadyslip": str,
-}  # fmt: skip
+RESULT_ATTRIBUTES = {"ssq": float, "search": str, "unidentified": str, "noise": str, "steadyslip": str}
+ATTRIBUTES = RESULT_ATTRIBUTES | dict.fromkeys(("rig", "options", "records", "loading", "refits"), str)
 _OPTIONS = {
     "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "lag": bool,
     "initial": str, "loss": str, "width": {float, None},
@@ -40,11 +40,14 @@ _OPTIONS = {
 _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
 _COURSE = (float, [{(float,) * 8, (float,) * len(fields(Change))}], [float], [_CURVE], float, int, int, int, int)
 _COLUMNS = (*ROLES, "worth")
-_FORMS = {
-    "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
+RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
     "unidentified": [{"weights": {str: float}, "deviation": float}],
     "noise": [(float, bool, float)],
+}
+"""Types of the attributes of any fit in JSON; see `steadyslip.files.tables.fits_form`."""
+_FORMS = RESULT_FORMS | {
+    "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
     "records": [(str, [str], bool)],
     "loading": [[[_COURSE]]],
     "refits": {
@@ -53,19 +56,13 @@ _FORMS = {
         "remedies": [(str, float, float, float, {str: float})],
     },
 }
-"""Types of the attributes in JSON; see `steadyslip.files.tables.fits_form`."""
 
 
-F = TypeVar("F", bound=FitNumbers)
+F = TypeVar("F", bound=Fitted)
 
 
-def to_dataset(fit: FitNumbers) -> Any:
-    """Fit as an xarray.Dataset."""
-    import xarray as xr
-
-    from steadyslip.files.specifications import stored_text
-
-    names = list(fit.names)
+def result_variables(fit: Fitted, samples: Sequence[str]) -> dict[str, Any]:
+    """Variables of any fit: estimates, and model and noise of each series, whose samples have these dimensions."""
     variables: dict[str, Any] = {
         "coordinates": ("parameter", fit.coordinates, {"long_name": "place of the minimum, logarithms where positive"}),
         "value": ("parameter", np.array(list(fit.values.values())), {}),
@@ -74,7 +71,74 @@ def to_dataset(fit: FitNumbers) -> Any:
         "covariance": (("parameter", "other"), fit.covariance, {"long_name": "of the coordinates"}),
         "bound": (("parameter", "side"), np.array(fit.bounds).T, {}),
     }
-    for i, (record, noise) in enumerate(zip(fit.plan.records, fit.noise, strict=True), start=1):
+    for i, (dim, noise) in enumerate(zip(samples, fit.noise, strict=True), start=1):
+        variables[f"model_{i}"] = (dim, fit.part(fit.model, i - 1), {})
+        variables[f"noise_coefficients_{i}"] = (f"order_{i}", noise.coefficients, {})
+        variables[f"noise_covariance_{i}"] = (f"lag_{i}", noise.covariance, {})
+    return variables
+
+
+def result_columns(samples: Sequence[str]) -> dict[str, ColumnRule]:
+    """Columns that `result_variables` makes."""
+    along = ("parameter",)
+    found = {name: ColumnRule(along) for name in ("coordinates", "value", "error")}
+    found |= {"parameter": ColumnRule(along, text=True), "other": ColumnRule(("other",), text=True)}
+    found |= {"unit": ColumnRule(along, text=True), "covariance": ColumnRule(("parameter", "other"))}
+    found["bound"] = ColumnRule(("parameter", "side"))
+    for i, dim in enumerate(samples, start=1):
+        found[f"model_{i}"] = ColumnRule((dim,))
+        found[f"noise_coefficients_{i}"] = ColumnRule((f"order_{i}",))
+        found[f"noise_covariance_{i}"] = ColumnRule((f"lag_{i}",))
+    return found
+
+
+def result_attributes(fit: Fitted) -> dict[str, Any]:
+    """Attributes of any fit, `RESULT_ATTRIBUTES`."""
+    return {
+        "ssq": fit.ssq,
+        "search": json.dumps(vars(fit.search)),
+        "unidentified": json.dumps([vars(one) for one in fit.unidentified]),
+        "noise": json.dumps([[n.lag1, n.correlated, n.innovation] for n in fit.noise]),
+        "steadyslip": fit.version,
+    }
+
+
+def result_of(table: ExpectedTable, found: dict[str, Any], stored: dict[str, Any], made: type[F], plan: Any) -> F:
+    """Fit from the columns and attributes that all fits have, of the class `made`; a damaged one is refused."""
+    names = [one.name for one in plan.space().unknowns]
+    if not (names == found["parameter"] == found["other"]):
+        raise table.fault(f"its parameters are {', '.join(found['parameter']):.200}; expected {', '.join(names)}")
+    if table.sizes["side"] != 2:
+        raise table.fault("its bounds have no two sides")
+    search, noises = stored["search"], stored["noise"]
+    fit = made(
+        plan=plan,
+        coordinates=found["coordinates"],
+        ssq=table.attributes["ssq"],
+        search=SearchSummary(**search | {"others": tuple(search["others"])}),
+        noise=tuple(
+            Noise(lag1, correlated, found[f"noise_coefficients_{i}"], innovation, found[f"noise_covariance_{i}"])
+            for i, (lag1, correlated, innovation) in enumerate(noises, start=1)
+        ),
+        covariance=found["covariance"],
+        unidentified=tuple(Combination(**one) for one in stored["unidentified"]),
+        bounds=(found["bound"][:, 0].copy(), found["bound"][:, 1].copy()),
+        version=table.attributes["steadyslip"],
+    )
+    _check(table, fit)
+    model = np.concatenate([found[f"model_{i}"] for i in range(1, len(noises) + 1)])
+    fit.__dict__["model"] = read_only(model)  # that the file holds, so that nothing is computed again
+    return fit
+
+
+def to_dataset(fit: FitNumbers) -> Any:
+    """Fit as an xarray.Dataset."""
+    import xarray as xr
+
+    from steadyslip.files.specifications import stored_text
+
+    variables = result_variables(fit, [f"sample_{i}" for i in range(1, len(fit.plan.records) + 1)])
+    for i, record in enumerate(fit.plan.records, start=1):
         dim = f"sample_{i}"
         for name in _COLUMNS:
             if (column := getattr(record, name)) is not None:
@@ -82,19 +146,12 @@ def to_dataset(fit: FitNumbers) -> Any:
                 variables[f"{name}_{i}"] = (dim, np.asarray(column), about)
         if fit.plan.weights is not None:
             variables[f"weight_{i}"] = (dim, fit.plan.weights[i - 1], {})
-        variables[f"model_{i}"] = (dim, fit.part(fit.model, i - 1), {"units": "1"})
-        variables[f"noise_coefficients_{i}"] = (f"order_{i}", noise.coefficients, {})
-        variables[f"noise_covariance_{i}"] = (f"lag_{i}", noise.covariance, {})
     options = {name: getattr(fit.plan, name) for name in _OPTIONS}
     options["weighted"] = fit.plan.weights is not None
     options["columns"] = [[n for n in _COLUMNS if getattr(r, n) is not None] for r in fit.plan.records]
-    attributes = {
+    attributes = result_attributes(fit) | {
         "rig": stored_text(fit.plan.rig, fit.plan.protocol),
         "options": json.dumps(options),
-        "ssq": fit.ssq,
-        "search": json.dumps(vars(fit.search)),
-        "unidentified": json.dumps([vars(one) for one in fit.unidentified]),
-        "noise": json.dumps([[n.lag1, n.correlated, n.innovation] for n in fit.noise]),
         "records": json.dumps([[r.source, list(r.notes), r.integrated] for r in fit.plan.records]),
         "loading": json.dumps([_loading_to_json(r.commanded) for r in fit.plan.records]),
         "refits": json.dumps(
@@ -104,8 +161,8 @@ def to_dataset(fit: FitNumbers) -> Any:
                 "remedies": [[one.choice, one.ssq, one.gain, one.p, one.values] for one in fit.remedies],
             }
         ),
-        "steadyslip": fit.version,
     }
+    names = list(fit.names)
     return xr.Dataset(variables, coords={"parameter": names, "other": names}, attrs=attributes)
 
 
@@ -147,33 +204,12 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     )
     weights = [found[f"weight_{i}"] for i in range(1, len(records) + 1)] if weighted else None
     plan = _plan(table, records, stored["options"], weights)
-    names = [one.name for one in plan.space().unknowns]
-    if not (names == found["parameter"] == found["other"]):
-        raise table.fault(f"its parameters are {', '.join(found['parameter']):.200}; expected {', '.join(names)}")
-    if table.sizes["side"] != 2:
-        raise table.fault("its bounds have no two sides")
-    search = stored["search"]
-    fit = made(
-        plan=plan,
-        coordinates=found["coordinates"],
-        ssq=table.attributes["ssq"],
-        search=SearchSummary(**search | {"others": tuple(search["others"])}),
-        noise=tuple(
-            Noise(lag1, correlated, found[f"noise_coefficients_{i}"], innovation, found[f"noise_covariance_{i}"])
-            for i, (lag1, correlated, innovation) in enumerate(noises, start=1)
-        ),
-        covariance=found["covariance"],
-        unidentified=tuple(Combination(**one) for one in stored["unidentified"]),
-        bounds=(found["bound"][:, 0].copy(), found["bound"][:, 1].copy()),
-        version=table.attributes["steadyslip"],
-    )
-    _check(table, fit)
+    fit = result_of(table, found, stored, made, plan)
     refits = stored["refits"]
     stored_results = {  # results that the file holds, so that nothing is computed again
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(RampFit(*one) for one in refits["ramps"]),
         "remedies": tuple(Remedy(*one) for one in refits["remedies"]),
-        "model": read_only(np.concatenate([found[f"model_{i}"] for i in range(1, len(records) + 1)])),
     }
     fit.__dict__.update(stored_results)
     return fit
@@ -181,19 +217,12 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
 
 def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
     """Columns that the file of a fit must have, given those of its records."""
-    along = ("parameter",)
-    found = {name: ColumnRule(along) for name in ("coordinates", "value", "error")}
-    found |= {"parameter": ColumnRule(along, text=True), "other": ColumnRule(("other",), text=True)}
-    found |= {"unit": ColumnRule(along, text=True), "covariance": ColumnRule(("parameter", "other"))}
-    found["bound"] = ColumnRule(("parameter", "side"))
+    found = result_columns([f"sample_{i}" for i in range(1, len(present) + 1)])
     for i, names in enumerate(present, start=1):
         samples = (f"sample_{i}",)
         found |= {f"{name}_{i}": ColumnRule(samples, ROLES.get(name, "")) for name in names}
-        found[f"model_{i}"] = ColumnRule(samples, "1")
         if weighted:
             found[f"weight_{i}"] = ColumnRule(samples)
-        found[f"noise_coefficients_{i}"] = ColumnRule((f"order_{i}",))
-        found[f"noise_covariance_{i}"] = ColumnRule((f"lag_{i}",))
     return found
 
 
@@ -272,7 +301,7 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
     return replace(plan, rtol=rtol)
 
 
-def _check(table: ExpectedTable, fit: FitNumbers) -> None:
+def _check(table: ExpectedTable, fit: Fitted) -> None:
     """Raise an error for numbers that no fit has, such as negative variances."""
     bad = {
         "coordinates": not np.all(np.isfinite(fit.coordinates)),

@@ -9,11 +9,12 @@ others are fitted again: how far the sum of squares lets it go is its error.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.comparison import DataComparison
 from steadyslip.experiments.fitting.condensed import condensed
 from steadyslip.experiments.fitting.estimates import (
     LEAST_CHANGE,
@@ -23,7 +24,6 @@ from steadyslip.experiments.fitting.estimates import (
     combination,
     is_time,
 )
-from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.numerics.least_squares import minimise
 
 DEPENDENT = 1e-3  # least eigenvalue of JᵀJ, scaled to a diagonal of 1, of a usual step: .004, of open directions 3e-4
@@ -47,7 +47,7 @@ class _Valley:
 
 
 def along_valleys(
-    plan: Plan, comparison: Comparison, z: Array, bounds: tuple[Array, Array], information: Array, covariance: Array
+    plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], information: Array, covariance: Array
 ) -> tuple[Array, tuple[Combination, ...]]:
     """Covariance (p, p), widened or infinite along a valley, and the combination that it leaves open.
 
@@ -79,7 +79,7 @@ def along_valleys(
     return wider, (combination(np.copysign(reached, valley.axis), deviation, comparison.space, lost),)
 
 
-def _valley(comparison: Comparison, information: Array, covariance: Array) -> _Valley | None:
+def _valley(comparison: DataComparison, information: Array, covariance: Array) -> _Valley | None:
     """The nearly dependent parameter among those that have an error; None if there is none."""
     known = np.flatnonzero(np.isfinite(np.diag(covariance)) & (np.diag(information) > 0))
     times = np.array([is_time(one) for one in comparison.space.unknowns])
@@ -107,7 +107,7 @@ def _unit_of_rise(information: Array, covariance: Array, i: int) -> float:
 
 
 def _reached(
-    plan: Plan, comparison: Comparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float
+    plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float
 ) -> Array:
     """Standard deviations (p,) that the ends of the valley stand for, on the side where each parameter goes further."""
     away = np.array([side * own for side in (-1.0, 1.0) for own in DISTANCES])

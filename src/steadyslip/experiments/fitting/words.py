@@ -7,11 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.areas import total
-from steadyslip.core.checks import as_data, in_words
+from steadyslip.core.checks import in_words
 from steadyslip.core.format import format_percent, format_quantity
-from steadyslip.core.version import of_another
-from steadyslip.experiments.fitting.estimates import Estimate
+from steadyslip.experiments.fitting.fitted_words import (
+    WIDTH,
+    chance,
+    estimate_dict,
+    fitted_dict,
+    fitted_warnings,
+    quality,
+    version_warnings,
+)
 from steadyslip.experiments.fitting.loading_words import enumerated, loading_warnings, own_rate
 from steadyslip.experiments.fitting.memories import forgets_changes
 from steadyslip.experiments.fitting.numbers import FitNumbers
@@ -25,11 +31,9 @@ from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 
-WIDTH = 100  # characters of a line of text
 MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
 END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
-LEAST_CHANCE = 1e-99  # probabilities below it are not told apart
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
@@ -87,30 +91,13 @@ def short_names(names: tuple[str, ...]) -> list[str]:
 
 
 def _quality(fit: FitNumbers) -> list[str]:
-    search = fit.search
     lag = max((noise.lag1 for noise in fit.noise), key=abs)
-    independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
-    reached = f"{search.arrived} of {search.starts} starts lead here"
-    if search.others:
-        reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
     return [
         f"residuals       rms {fit.rms:.3g}, sum of squares {fit.ssq:.6g}, lag-1 autocorrelation {lag:.2g}",
-        f"whiteness       {_whiteness(fit)}",
-        f"errors          one standard deviation, {independent}",
-        f"minimum         {reached}",
+        *quality(fit),
         *textwrap.wrap(f"driven by       {drive_line(fit)}", WIDTH, subsequent_indent=" " * 16),
         in_words(residual_checks(fit)),
     ]
-
-
-def _whiteness(fit: FitNumbers) -> str:
-    one = fit.whiteness
-    verdict = "structure is left" if one.p < STRUCTURE else "noise is left"
-    return f"{verdict}: Ljung-Box {one.statistic:.4g} where noise has {one.degrees}, probability {_chance(one.p)}"
-
-
-def _chance(p: float) -> str:
-    return f"{p:.2g}" if p > LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
 
 
 def _left_out(fit: FitNumbers) -> list[str]:
@@ -125,29 +112,9 @@ def _left_out(fit: FitNumbers) -> list[str]:
 
 def warnings(fit: FitNumbers) -> list[str]:
     """Warnings on a fit, each a sentence, that a reader must know before using the numbers."""
-    found = [str(one) for one in fit.unidentified] + _open_memory(fit)
-    if fit.search.cut:
-        found.append(_cut_off(fit))
-    elif not fit.search.converged:
-        found.append("the search had not come to its end: the numbers are rough, and have no errors")
-    close = [ratio for ratio in fit.search.others if ratio < 1.05]
-    if close:
-        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _left_out(fit) + _ends_off_model(fit)
+    found = fitted_warnings(fit) + _open_memory(fit) + _left_out(fit) + _ends_off_model(fit)
     found += _vague_jumps(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
-    found += loading_warnings(fit)
-    if other := of_another(fit.version):
-        found.append(f"{other}; fit anew to compare it with fits of this one")
-    return found
-
-
-def _cut_off(fit: FitNumbers) -> str:
-    """Warning that the search spent its budget, as it does where the model cannot follow the records well."""
-    rough = "" if fit.search.converged else ", not even at its minimum, so that it has no errors"
-    return (
-        f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
-        "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
-    )
+    return found + loading_warnings(fit) + version_warnings(fit)
 
 
 def _ends_off_model(fit: FitNumbers) -> list[str]:
@@ -239,12 +206,12 @@ def _structure(fit: FitNumbers) -> list[str]:
     if fit.whiteness.p >= STRUCTURE and (best is None or best.gain < STRONG_EVIDENCE):
         return [f"{said}; {_equal_memories(fit)}"] if forgets else []
     if not forgets:
-        said = f"residuals have structure (whiteness {_chance(fit.whiteness.p)})"
+        said = f"residuals have structure (whiteness {chance(fit.whiteness.p)})"
     if best is None or best.gain < STRONG_EVIDENCE:
         tried = "; ".join(one.choice for one in fit.remedies)
         return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
     asked, moved = _asked(fit, best), _moved(fit, best)
-    rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {_chance(best.p)})"
+    rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {chance(best.p)})"
     return [
         f"{said}: with {asked} the sum of squares is "
         f"{best.ssq / fit.ssq:.2g} of this, BIC {best.gain:.0f} less, {', '.join([rest, *moved])}; "
@@ -385,48 +352,13 @@ def _steep_names(rig: Slider) -> tuple[str, ...]:
     return tuple(name for kind in kinds for name in rig.of_kind(kind))
 
 
-def _estimate(one: Estimate) -> dict[str, Any]:
-    return {
-        "value": one.value,
-        "error": one.error if one.determined else None,
-        "low": one.low if np.isfinite(one.low) and one.determined else None,
-        "high": one.high if np.isfinite(one.high) and one.determined else None,
-        "unit": one.unit,
-        "determined": one.determined,
-    } | total(one.value, one.unit, one.area)
-
-
 def as_dict(fit: FitNumbers) -> dict[str, Any]:
     """Data of a fit for JSON, in SI units; None for what does not exist."""
-    return {
-        "version": fit.version,
-        "records": [record.source for record in fit.plan.records],
-        "samples": fit.samples,
-        "parameters": {one.name: _estimate(one) for one in fit.estimates},
-        "derived": {one.name: _estimate(one) for one in fit.derived},
-        "correlation": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.correlation],
+    return fitted_dict(fit) | {
+        "derived": {one.name: estimate_dict(one) for one in fit.derived},
         "driven_by": drive_line(fit),
-        "ssq": fit.ssq,
         "rms": fit.rms,
-        "lag1": [noise.lag1 for noise in fit.noise],
-        "whiteness": vars(fit.whiteness) | {"p": fit.whiteness.p},
         "remedies": [vars(one) for one in fit.remedies],
-        "correlated": fit.correlated,
-        "aic": fit.aic,
-        "bic": fit.bic,
-        "search": {
-            "starts": fit.search.starts,
-            "arrived": fit.search.arrived,
-            "other_minima": list(fit.search.others),
-            "iterations": fit.search.iterations,
-            "converged": fit.search.converged,
-            "cut": fit.search.cut,
-        },
-        "unidentified": [
-            {"weights": one.weights, "deviation": one.deviation if np.isfinite(one.deviation) else None}
-            for one in fit.unidentified
-        ],
         "warnings": warnings(fit),
-        **as_data(residual_checks(fit)),
         "notes": {record.source: list(record.notes) for record in fit.plan.records},
     }

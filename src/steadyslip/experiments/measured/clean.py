@@ -60,13 +60,7 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
     `any_sign` accepts columns that count compression as negative or displacement backwards, as files do, and turns
     them.
     """
-    si, lines = _without_gaps_in_rows(si, lines, notes)
-    _check_sizes(si, source, lines)
-    if len(lines) >= FEWEST_ROWS:
-        si, lines = _in_order(si, lines, notes, source)
-    if len(lines) < FEWEST_ROWS:
-        message = f"{len(lines)} usable rows are left; a record needs {FEWEST_ROWS} or more"
-        raise ParameterError([Problem("file", message)], title=source)
+    si, lines = rows_in_order(si, source, notes, lines)
     si = _in_compression(si, notes) if any_sign else si
     si = _effective(si, notes)
     _check_stress(si, source, lines)
@@ -108,6 +102,24 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
     pores = None if "pore_pressure" not in si else frozen(si["pore_pressure"])
     columns = (time, friction, normal, shear, displacement, velocity)
     return Record(*columns, source, tuple(notes), integrated, pore_pressure=pores)
+
+
+def rows_in_order(si: dict[str, Array], source: str, notes: list[str], lines: Array) -> tuple[dict[str, Array], Array]:
+    """Complete rows in order of time, and their lines in the file.
+
+    Raises
+    ------
+    ParameterError
+        If fewer than `FEWEST_ROWS` are left, or numbers or the clock are not those of an experiment.
+    """
+    si, lines = _without_gaps_in_rows(si, lines, notes)
+    _check_sizes(si, source, lines)
+    if len(lines) >= FEWEST_ROWS:
+        si, lines = _in_order(si, lines, notes, source)
+    if len(lines) < FEWEST_ROWS:
+        message = f"{len(lines)} usable rows are left; a record needs {FEWEST_ROWS} or more"
+        raise ParameterError([Problem("file", message)], title=source)
+    return si, lines
 
 
 def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:

@@ -111,7 +111,7 @@ def read_record(
     faults += missing_roles({role: found.get(role) for role in asked}, raw.names)  # type: ignore[misc]
     if faults:
         raise ParameterError(faults, title=str(path))
-    size = 1.0 if area is None else _checked("area", "m^2", area)
+    size = 1.0 if area is None else checked_option("area", "m^2", area)
     si: dict[str, Array] = {}
     for role, column in found.items():
         own = without_placeholders(raw.values[column.place], column.name, notes)
@@ -123,7 +123,7 @@ def read_record(
     if unread := [repr(name) for i, name in enumerate(raw.names) if i not in taken]:
         notes.append(f"left out: {listed(unread)}; to use a column give its role, such as pore_pressure=NAME")
     if normal_stress is not None:
-        level = _checked("normal_stress", "Pa", normal_stress)
+        level = checked_option("normal_stress", "Pa", normal_stress)
         si["normal"] = np.full(raw.values.shape[1], level)
         notes.append(f"normal: constant, {format_quantity(level, 'Pa')}")
     if clock is not None:
@@ -131,17 +131,17 @@ def read_record(
         notes.append(how)
     lines = raw.lines
     if between is not None:
-        si, lines = _cut(si, lines, between, notes)
+        si, lines = cut_between(si, lines, between, notes)
     return cleaned(si, str(path), [*raw.notes, *notes], lines, any_sign=True)
 
 
 def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Array], int], tuple[Array, str]] | None:
     """Function that computes the times of a file without them, with a note; None if the data do not allow it."""
     if sampling is not None:
-        every = _checked("sampling", "s", sampling)
+        every = checked_option("sampling", "s", sampling)
         return lambda si, rows: (every * np.arange(rows), f"time: counted, a row every {format_quantity(every, 's')}")
     if rate is not None and "displacement" in roles:
-        speed = _checked("rate", "m/s", rate)
+        speed = checked_option("rate", "m/s", rate)
         said = f"time: displacement over the given rate, {format_quantity(speed, 'm/s')}"
         return lambda si, rows: ((si["displacement"] - si["displacement"][0]) / speed, said)
     if {"displacement", "velocity"} <= roles:
@@ -159,7 +159,7 @@ def _integrated_time(displacement: Array, velocity: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(spent), np.maximum(spent, 0.0), 0.0))])
 
 
-def _cut(
+def cut_between(
     si: dict[str, Array], lines: Array, between: tuple[Any, Any], notes: list[str]
 ) -> tuple[dict[str, Array], Array]:
     """Rows between two times; other rows may be damaged."""
@@ -174,7 +174,8 @@ def _cut(
     return {role: values[rows] for role, values in si.items()}, lines[rows]
 
 
-def _checked(name: str, unit: str, value: Any) -> float:
+def checked_option(name: str, unit: str, value: Any) -> float:
+    """Positive number in the SI unit, from one or from text with a unit."""
     try:
         return Parameter(unit, positive, name).checked(value)
     except ParameterError as error:

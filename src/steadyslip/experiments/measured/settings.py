@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from steadyslip.core.domains import positive
-from steadyslip.core.entries import Label, Span, Text, Whole
+from steadyslip.core.entries import Headings, Label, Span, Text, Whole
 from steadyslip.core.records import Settings, given, option, parameter, part, setting
 from steadyslip.experiments.measured.columns import ROLES
 
@@ -51,6 +51,16 @@ class RecordSettings(Settings):
     between: tuple[float, float] | None = setting(Span("part to use", "s"), default=None)
     skip_bad_lines: bool = option(False, True, doc="leave damaged lines out and say so", default=False)
     decimate: int | None = setting(Whole("keep about this many samples, dense after steps", FEWEST_KEPT), default=None)
+
+    columns: dict[str, Any] | None = setting(
+        Headings(
+            "of a machine: the heading of each column, by the name that a run of the machine has for it, "
+            '`{"table.x" = "encoder", "links.screw.force" = ["load cell", "N"]}`; headings that are such names '
+            "need none"
+        ),
+        default=None,
+    )
+    averages: int = setting(Whole("of a machine: averages behind the coherence of frequency responses", 1), default=1)
 
     def arguments(self) -> dict[str, Any]:
         """Options as keyword arguments of `read_record`, and ``decimate``; only those that the file gives."""

@@ -26,10 +26,13 @@ Complex = NDArray[np.complex128]
 MOST_RESPONSES = 2**28
 """Largest size of a file of responses, bytes."""
 _ORDERS = {"m/N": 0, "m/s/N": 1, "m/s^2/N": 2}  # receptance, mobility and accelerance: derivatives of the displacement
+_TURNING = ("rad/(N m)", "m/(N m)", "rad/N")  # receptances of what turns
 _RESPONSE, _COHERENCE = 4, 6  # types of functions in universal files
 _QUANTITIES = {8: "m", 11: "m/s", 12: "m/s^2"}  # types of data there: displacement, velocity, acceleration
 _AXES = {1: "x", 2: "y"}  # numbers of directions there
-_COLUMN = re.compile(r"(?P<out>\S+?\.[xy])/(?P<in>\S+?\.[xy]) +(?P<part>real|imag|coherence)(?: *\[(?P<unit>.+)\])?")
+_COLUMN = re.compile(r"(?P<out>\S+?\.[xy])/(?P<in>\S+?\.[xy]) +"
+                     r"(?P<part>real|imag|magnitude|phase|coherence)(?: *\[(?P<unit>.+)\])?")  # fmt: skip
+_FIRST = {"imag": "real", "phase": "magnitude"}  # parts that complete others
 _SMOOTHED = 21  # frequencies over which the spread of a few repeats is averaged
 
 
@@ -48,8 +51,8 @@ def read_response(path: str, folder: Path, averages: int) -> ResponseData:
     ----------
     path : str
         File relative to `folder`: ``.uff`` or ``.unv`` with functions of type 58; ``.csv`` with columns ``frequency``
-        (Hz), ``tip.x/tip.y real [m/s^2/N]``, the same with ``imag`` and perhaps with ``coherence``; ``.mat`` with
-        variables frequency, response, points, unit and perhaps coherence.
+        (Hz), ``tip.x/tip.y real [m/s^2/N]``, the same with ``imag``, or ``magnitude`` and ``phase [deg]``, and
+        perhaps with ``coherence``; ``.mat`` with variables frequency, response, points, unit and perhaps coherence.
     folder : Path
     averages : int
         Averages behind the coherence.
@@ -108,7 +111,8 @@ def _receptance(path: str, hertz: Array, values: Complex, name: str) -> Complex:
         factor, dimension = unit(name)
     except QuantityError as error:
         raise UnreadableFile(path, f"{name!r} is no unit ({error}); allowed: {', '.join(_ORDERS)}") from error
-    order = next((n for known, n in _ORDERS.items() if unit(known)[1] == dimension), None)
+    orders = _ORDERS | {f"{known}/s^{n}": n for known in _TURNING for n in range(3)}
+    order = next((n for known, n in orders.items() if unit(known)[1] == dimension), None)
     if order is None:
         raise UnreadableFile(path, f"{name!r} is no unit of a response to a force; allowed: {', '.join(_ORDERS)}")
     if not np.all(np.isfinite(values)):
@@ -135,23 +139,40 @@ def _from_table(path: str, folder: Path) -> tuple[Array, dict[tuple[str, str], _
     if not header or header[0] != "frequency" or rows.shape[1:] != (len(header),):
         raise UnreadableFile(path, f"its first line is {','.join(header)[:80]!r}; allowed: frequency and the responses")
     hertz, found = rows[:, 0], defaultdict[tuple[str, str], _Measured](_Measured)
-    real: dict[tuple[str, str], Array] = {}
+    begun: dict[tuple[str, str], tuple[str, Array, str]] = {}
     for name, column in zip(header[1:], rows.T[1:], strict=True):
         if (match := _COLUMN.fullmatch(name)) is None:
             raise UnreadableFile(
-                path, f"its column {name!r} is not like 'tip.x/tip.y real [m/s^2/N]', imag or coherence"
+                path,
+                f"its column {name!r} is not like 'tip.x/tip.y real [m/s^2/N]', imag, magnitude, phase or coherence",
             )
-        pair = match["out"], match["in"]
-        if match["part"] == "coherence":
+        pair, part = (match["out"], match["in"]), match["part"]
+        if part == "coherence":
             found[pair].coherence.append(column)
-        elif match["part"] == "real":
-            real[pair] = column
-        elif pair not in real:
-            raise UnreadableFile(path, f"its column {name!r} has no real part before it")
+        elif part not in _FIRST:
+            begun[pair] = part, column, match["unit"] or ""
+        elif begun.get(pair, ("",))[0] != _FIRST[part]:
+            raise UnreadableFile(path, f"its column {name!r} has no {_FIRST[part]} part before it")
         else:
-            own = real.pop(pair) + 1j * column
-            found[pair].repeats.append(_receptance(path, hertz, own, match["unit"] or ""))
+            _, first, own = begun.pop(pair)
+            whole = first + 1j * column
+            if part == "phase":
+                whole = first * np.exp(1j * _angles(path, column, match["unit"] or "deg"))
+            elif match["unit"]:
+                own = match["unit"]
+            found[pair].repeats.append(_receptance(path, hertz, whole, own))
     return hertz, dict(found)
+
+
+def _angles(path: str, values: Array, name: str) -> Array:
+    """Angles in rad."""
+    try:
+        factor, dimension = unit(name)
+    except QuantityError as error:
+        raise UnreadableFile(path, f"{name!r} is no unit of a phase ({error}); allowed: deg, rad") from error
+    if dimension != unit("rad")[1]:
+        raise UnreadableFile(path, f"a phase is in {name}; allowed: deg, rad")
+    return factor * values
 
 
 def _from_matlab(path: str, folder: Path) -> tuple[Array, dict[tuple[str, str], _Measured]]:

@@ -253,10 +253,11 @@ class _MapReader:
         return replace(found, over=self._per_area("map.samples.over", found.over))
 
     def _fit_draws(self, settings: SampleSettings, name: str) -> Any:
-        from steadyslip.experiments import load_fit, normal_draws
+        from steadyslip.experiments import normal_draws
+        from steadyslip.experiments.fitting.result import load_friction_fit
 
         try:
-            return normal_draws(load_fit(self.folder / name), settings.points or FIT_POINTS, settings.seed)
+            return normal_draws(load_friction_fit(self.folder / name), settings.points or FIT_POINTS, settings.seed)
         except SteadyslipError as error:
             self.problems.append(Problem("map.samples.fit", str(error)))
             return None

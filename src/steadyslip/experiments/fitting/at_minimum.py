@@ -1,0 +1,106 @@
+"""Errors at a minimum: covariance by the noise of the residuals, what is left open, whether it is a minimum at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
+from steadyslip.experiments.fitting.estimates import combinations, prior_information
+from steadyslip.experiments.fitting.fitted import Fitted
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
+from steadyslip.experiments.fitting.valleys import along_valleys
+from steadyslip.experiments.loading.loading import shifted
+from steadyslip.experiments.numerics.noise import describe, white
+
+ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
+F = TypeVar("F", bound=Fitted)
+
+
+def _level_uncertainty(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
+    """Covariance (p, p) of Jᵀr that comes from the uncertain levels of velocity and normal stress in the records."""
+    found = np.zeros((len(z), len(z)))
+    predicted: Array | None = None
+    for i, loading in enumerate(plan.loading):
+        for moved in shifted(loading, plan.pressed):
+            if predicted is None:
+                predicted = comparison.model(z[None])[0][0]
+            others = tuple(moved if k == i else own for k, own in enumerate(plan.loading))
+            model = replace(plan, loading=others).comparison().model(z[None])[0][0]
+            push = rows @ ((model - predicted) * comparison.weights)
+            if np.all(np.isfinite(push)):
+                found += np.outer(push, push)
+    return found
+
+
+def _is_minimum(
+    comparison: DataComparison, z: Array, bounds: tuple[Array, Array], information: Array, gradient: Array,
+    deviations: Array,
+) -> bool:  # fmt: skip
+    """True if coordinates (p,) where a search ended are a minimum to within `ARRIVED` standard deviations.
+
+    A step of Gauss and Newton is then that short, or its way over a kink: the sum of squares has one where the time of
+    a change passes that of a sample. Such a time is held if the sum rises to both of its sides, the others following.
+    """
+    free = (bounds[0] < z) & (z < bounds[1])
+    ssq = float(np.sum(comparison.residuals(z[None])[0] ** 2))
+    times = times_of_changes(comparison.space)
+    while np.any(free):
+        own = information[np.ix_(free, free)]
+        length = np.zeros(len(z))
+        length[free] = np.abs(np.linalg.lstsq(own, gradient[free])[0]) / deviations[free]
+        if np.all(length <= ARRIVED):
+            break
+        worst = int(np.argmax(np.where(times, length, 0.0)))
+        if not length[worst] > ARRIVED:
+            return False
+        along = np.zeros(len(z))
+        along[free] = np.linalg.lstsq(own, (np.flatnonzero(free) == worst).astype(float))[0]
+        along *= ARRIVED * deviations[worst] / along[worst]
+        beside = np.sum(comparison.residuals(z + np.array([[-1.0], [1.0]]) * along)[0] ** 2, axis=1)
+        if not np.all(beside > ssq):
+            return False
+        free[worst] = False
+    return True
+
+
+def fit_with_errors(
+    made: type[F], plan: Any, comparison: Any, z: Array, search: SearchSummary, errors: str,
+    bounds: tuple[Array, Array],
+) -> F:  # fmt: skip
+    """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and what is not determined."""
+    from steadyslip import __version__
+
+    r, jacobian = comparison.residuals(z[None])
+    residuals, rows = r[0], jacobian[0]
+    free = len(z)
+    information, spread = rows @ rows.T, np.zeros((free, free))
+    noises = []
+    for where in comparison.slices:
+        own = residuals[where]
+        share = free * len(own) // comparison.size
+        if errors == "independent":
+            noise = white(own, share)
+        else:
+            noise = describe(own, share, errors == "correlated", rows[:, where])
+        noises.append(noise)
+        spread += noise.spread(rows[:, where])
+    if plan.follows:
+        spread += _level_uncertainty(plan, comparison, z, rows)
+    known = prior_information(comparison.space)
+    scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
+    covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
+    if not search.converged:
+        if _is_minimum(comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))):
+            search = replace(search, converged=True)
+        else:  # curvature beside the minimum says nothing of errors
+            covariance = np.diag(np.full(free, np.inf))
+    ssq = float(residuals @ residuals)
+    if search.converged:
+        covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
+        undetermined += opened
+    return made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__).with_memories()

@@ -1,0 +1,113 @@
+"""Text and data that all fits have in common: how good, how sure, and what must be known before use."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.areas import total
+from steadyslip.core.checks import as_data
+from steadyslip.core.version import of_another
+from steadyslip.experiments.fitting.estimates import Estimate
+from steadyslip.experiments.fitting.fitted import Fitted
+from steadyslip.experiments.fitting.residuals import residual_checks
+from steadyslip.experiments.numerics.noise import STRUCTURE
+
+WIDTH = 100  # characters of a line of text
+LEAST_CHANCE = 1e-99  # probabilities below it are not told apart
+
+
+def quality(fit: Fitted) -> list[str]:
+    """Lines on whiteness, errors and the minimum."""
+    search = fit.search
+    independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
+    reached = f"{search.arrived} of {search.starts} starts lead here"
+    if search.others:
+        reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
+    return [
+        f"whiteness       {_whiteness(fit)}",
+        f"errors          one standard deviation, {independent}",
+        f"minimum         {reached}",
+    ]
+
+
+def _whiteness(fit: Fitted) -> str:
+    one = fit.whiteness
+    verdict = "structure is left" if one.p < STRUCTURE else "noise is left"
+    return f"{verdict}: Ljung-Box {one.statistic:.4g} where noise has {one.degrees}, probability {chance(one.p)}"
+
+
+def chance(p: float) -> str:
+    """Format a probability."""
+    return f"{p:.2g}" if p > LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
+
+
+def fitted_warnings(fit: Fitted) -> list[str]:
+    """Warnings on what the search left open, each a sentence."""
+    found = [str(one) for one in fit.unidentified]
+    if fit.search.cut:
+        found.append(_cut_off(fit))
+    elif not fit.search.converged:
+        found.append("the search had not come to its end: the numbers are rough, and have no errors")
+    close = [ratio for ratio in fit.search.others if ratio < 1.05]
+    if close:
+        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
+    return found + list(fit.at_bounds)
+
+
+def _cut_off(fit: Fitted) -> str:
+    """Warning that the search spent its budget, as it does where the model cannot follow the records well."""
+    rough = "" if fit.search.converged else ", not even at its minimum, so that it has no errors"
+    return (
+        f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
+        "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
+    )
+
+
+def version_warnings(fit: Fitted) -> list[str]:
+    """Warning on a fit that another version made."""
+    other = of_another(fit.version)
+    return [f"{other}; fit anew to compare it with fits of this one"] if other else []
+
+
+def estimate_dict(one: Estimate) -> dict[str, Any]:
+    """Data of an estimate; None for what does not exist."""
+    return {
+        "value": one.value,
+        "error": one.error if one.determined else None,
+        "low": one.low if np.isfinite(one.low) and one.determined else None,
+        "high": one.high if np.isfinite(one.high) and one.determined else None,
+        "unit": one.unit,
+        "determined": one.determined,
+    } | total(one.value, one.unit, one.area)
+
+
+def fitted_dict(fit: Fitted) -> dict[str, Any]:
+    """Data of a fit for JSON, in SI units; None for what does not exist."""
+    return {
+        "version": fit.version,
+        "records": [record.source for record in fit.plan.records],
+        "samples": fit.samples,
+        "parameters": {one.name: estimate_dict(one) for one in fit.estimates},
+        "correlation": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.correlation],
+        "ssq": fit.ssq,
+        "lag1": [noise.lag1 for noise in fit.noise],
+        "whiteness": vars(fit.whiteness) | {"p": fit.whiteness.p},
+        "correlated": fit.correlated,
+        "aic": fit.aic,
+        "bic": fit.bic,
+        "search": {
+            "starts": fit.search.starts,
+            "arrived": fit.search.arrived,
+            "other_minima": list(fit.search.others),
+            "iterations": fit.search.iterations,
+            "converged": fit.search.converged,
+            "cut": fit.search.cut,
+        },
+        "unidentified": [
+            {"weights": one.weights, "deviation": one.deviation if np.isfinite(one.deviation) else None}
+            for one in fit.unidentified
+        ],
+        **as_data(residual_checks(fit)),
+    }

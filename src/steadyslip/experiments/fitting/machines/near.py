@@ -1,0 +1,206 @@
+"""Search for the least sum of squares of a fit of a machine, from the machine's own values and around them.
+
+Phases of a long ring-down, or narrow peaks of a response, tell little of a frequency that is off by more than a period
+or a width. So each start first follows a short beginning of the motions, then a longer one, and the logarithm of
+responses; it is held back softly, so that what a beginning does not tell stays where it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.fitting.effort import Effort, work_of_search
+from steadyslip.experiments.fitting.machines.machine_plan import MachineComparison, MachinePlan, Model
+from steadyslip.experiments.fitting.machines.series import EXACT, MotionModel, ResponseModel
+from steadyslip.experiments.fitting.search import (
+    FINALISTS,
+    FIRST_STARTS,
+    MIN_ARRIVED,
+    ROUGH_ITERATIONS,
+    Progress,
+    SearchSummary,
+)
+from steadyslip.experiments.measured.motion_record import MotionRecord
+from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, MERGE_DISTANCE, SAME_SSQ, Minima, minimise
+
+BEGINNINGS = (1 / 16, 1 / 4)
+"""Parts of a record that are followed one after the other: a frequency told by one is good for four times its length.
+Ring-downs of 60 and 120 periods took 1.3 to 6 times as long without."""
+FEWEST_FOLLOWED = 10  # samples of a part, and twice as many as unknowns
+MOST_ITERATIONS = 100  # on whole records; those that take more follow a valley that the record leaves open
+ROUGH_RTOL = 1e-6  # of motions in these
+HELD_BACK = 1e-4  # mean square of residuals, in sizes of their series, that an e-fold away from a start costs there
+ELSEWHERE, RISE = 0.1, 2.0  # e-folds or sizes apart, and multiple of the sum of squares between, of different minima
+SPREAD = 1.15  # largest distance of a start from the machine's own values, e-folds: a factor of three
+
+
+class Beginning:
+    """First part of all motions of a plan, and the logarithm of its responses.
+
+    Parameters
+    ----------
+    plan : MachinePlan
+    share : float
+        Of each record, from where it is first disturbed.
+    effort : Effort
+    """
+
+    def __init__(self, plan: MachinePlan, share: float, effort: Effort) -> None:
+        records, models = [], []
+        for record in plan.records:
+            if isinstance(record, MotionRecord):
+                record = _cut(record, share, _disturbed(plan, record))
+                model: Model = MotionModel(plan.rig, plan.protocol, record, ROUGH_RTOL, effort)
+            else:
+                model = ResponseModel(plan.rig, record)
+            records.append(record)
+            models.append(model)
+        self.whole = plan.series
+        self.comparison = MachineComparison(replace(plan, records=tuple(records)), models, rough=True)
+        self.weights = [1 / own.size for own in self.whole]
+
+    @property
+    def size(self) -> int:
+        return self.comparison.size
+
+    def residuals(self, coordinates: Array, starts: Array) -> tuple[Array, Array]:
+        """Residuals (m, n) and derivatives of the model, with one more for each coordinate that holds it back."""
+        predicted, slopes = self.comparison.model(coordinates)
+        r, rows = self.comparison.data - predicted, np.array(slopes)
+        for k, (one, where) in enumerate(zip(self.comparison.series, self.comparison.slices, strict=True)):
+            if one.name.endswith(" real"):
+                pair = slice(where.start, self.comparison.slices[k + 1].stop)
+                r[:, pair], rows[:, :, pair] = _of_logarithms(self.comparison.data[pair], predicted[:, pair],
+                                                              slopes[:, :, pair])  # fmt: skip
+            elif not one.name.endswith(" imag"):
+                r[:, where] *= self.weights[k]
+                rows[:, :, where] *= self.weights[k]
+        hold = np.sqrt(HELD_BACK * self.size)
+        held = hold * np.broadcast_to(np.eye(coordinates.shape[1]), (len(coordinates), *2 * coordinates.shape[1:]))
+        return np.concatenate([r, hold * (starts - coordinates)], axis=1), np.concatenate([rows, held], axis=2)
+
+
+def _of_logarithms(data: Array, predicted: Array, slopes: Array) -> tuple[Array, Array]:
+    """Differences of the logarithms of complex data and model, real parts before imaginary ones; and derivatives."""
+    half = len(data) // 2
+
+    def whole(parts: Array) -> Array:
+        return np.asarray(parts[..., :half] + 1j * parts[..., half:])
+
+    with np.errstate(all="ignore"):
+        apart, rate = np.log(whole(data) / whole(predicted)), whole(slopes) / whole(predicted)[:, None]
+    return (np.concatenate([one.real, one.imag], axis=-1) for one in (apart, rate))  # type: ignore[return-value]
+
+
+def _disturbed(plan: MachinePlan, record: MotionRecord) -> float:
+    """Time (s) at which a motion is first disturbed."""
+    times = [float(getattr(piece, "at", 0.0) or 0.0) for piece in (plan.protocol.pieces if plan.protocol else ())]
+    first = float(record.time[0])
+    return first if plan.initial == "free" or not times else float(np.clip(min(times), first, record.time[-1]))
+
+
+def _cut(record: MotionRecord, share: float, begin: float) -> MotionRecord:
+    count = int(np.searchsorted(record.time, begin + share * (record.time[-1] - begin), side="right"))
+    count = min(max(count, FEWEST_FOLLOWED), len(record))
+    return replace(record, time=record.time[:count], columns={n: one[:count] for n, one in record.columns.items()})
+
+
+def find_near(
+    plan: MachinePlan, starts: int, effort: Effort, progress: Progress | None
+) -> tuple[Array, SearchSummary, MachineComparison]:
+    """Coordinates (p,) of the least sum of squares, how it was reached, and the comparison.
+
+    The first start is the machine itself. More follow, up to `starts`, until `MIN_ARRIVED` end at the best minimum.
+
+    Raises
+    ------
+    NotAvailable
+        If the machine cannot move as the records do from any start.
+    """
+    whole = plan.comparison(effort)
+    for model in whole.models:
+        if isinstance(model, MotionModel):
+            model.run({}, {}, 1)  # raises, and says why, if the machine itself cannot move
+    stop = effort.budget.part(work_of_search(whole.size, len(whole.space)) * effort.budget.scale)
+    motions = any(isinstance(record, MotionRecord) for record in plan.records)
+    parts = [Beginning(plan, share, effort) for share in (BEGINNINGS if motions else BEGINNINGS[:1])]
+    parts = [one for one in parts if one.size >= 2 * len(whole.space)]
+    begin, found, floor = _starts(plan, whole, starts), Minima.none(len(whole.space)), EXACT * whole.size
+    tried, arrived, arrivals = 0, 0, np.empty(0, dtype=int)
+    for upto in dict.fromkeys((min(FIRST_STARTS, starts), -(-starts // 3), starts)):
+        if upto <= tried or (tried and stop()):
+            continue
+        here, counts = begin[tried:upto], np.ones(upto - tried, dtype=int)
+        for part in parts:
+            first = here.copy()
+            ends = minimise(
+                lambda z, which, part=part, first=first: part.residuals(z, first[which]), here, whole.low, whole.high,  # type: ignore[misc]
+                most=ROUGH_ITERATIONS, tolerance=1e-4, race=MIN_ARRIVED, stop=stop,
+            )  # fmt: skip
+            here, which = _hopeful(ends)
+            counts = np.array([np.sum(counts[which == k]) for k in range(len(here))], dtype=int)
+        if not tried:  # the machine itself may be near, and beginnings mislead where a time is free
+            here, counts = np.concatenate([here, begin[:1]]), np.append(counts, 1)
+        tried = upto
+        ends = minimise(
+            lambda z, _: whole.residuals(z), here, whole.low, whole.high, most=MOST_ITERATIONS, race=1, stop=stop,
+            damping=DAMPING_NEAR,
+        )  # fmt: skip
+        found, arrivals = found + ends, np.append(arrivals, counts)
+        least = float(np.min(found.ssq, initial=np.inf))
+        if progress is not None:
+            progress("searching", tried, float(np.sqrt(least / whole.size)))
+        arrived = min(int(np.sum(arrivals[found.ssq <= least * (1 + SAME_SSQ) + floor])), tried)
+        if np.isfinite(least) and arrived >= min(MIN_ARRIVED, starts):
+            break
+    if not np.any(np.isfinite(found.ssq)):
+        raise NotAvailable(
+            "the machine cannot move as these records do from any start: are its values, protocol and beginning "
+            "(initial) those of the test?"
+        )
+    found = found.sorted()
+    others = found.ssq[found.converged] / max(least, floor)
+    ratios = {float(f"{x:.3g}") for x in others if np.isfinite(x) and x > 1 + SAME_SSQ} if least > floor else set()
+    if _is_another(whole, found, least * (1 + SAME_SSQ) + floor):
+        ratios.add(1.0)
+    ended = bool(found.converged[0]) or least <= floor
+    summary = SearchSummary(tried, arrived, tuple(sorted(ratios)), int(found.iterations[0]), ended, stop.was_met)
+    return found.coordinates[0], summary, whole
+
+
+def _is_another(whole: MachineComparison, found: Minima, most: float) -> bool:
+    """True if a minimum as good as the first lies elsewhere, beyond a rise: two machines that move alike there."""
+    alike = found.coordinates[found.converged & (found.ssq <= most)]
+    far = alike[np.max(np.abs(alike - found.coordinates[0]), axis=1, initial=0.0) > ELSEWHERE]
+    return bool(len(far)) and bool(np.any(whole.misfit(0.5 * (far + found.coordinates[0])) > RISE * most))
+
+
+def _hopeful(ends: Minima) -> tuple[Array, Array]:
+    """Different ends that may lead to the best minimum (k, p), and to which of them each end (m,) belongs; -1 to none.
+
+    Of no rounds that could be computed all go on: a longer part may be another matter.
+    """
+    if not np.any(np.isfinite(ends.ssq)):
+        return ends.coordinates, np.arange(len(ends.ssq))
+    kept, _ = ends.distinct(FINALISTS)
+    apart = np.max(np.abs(ends.coordinates[:, None] - kept), axis=2)
+    near = np.argmin(apart, axis=1)
+    return kept, np.where((apart[np.arange(len(near)), near] < MERGE_DISTANCE) & np.isfinite(ends.ssq), near, -1)
+
+
+def _starts(plan: MachinePlan, whole: MachineComparison, count: int) -> Array:
+    """Starting coordinates (count, p): the machine's own values, then others around them by a Halton sequence."""
+    from scipy.stats import qmc
+
+    own = plan.begins(whole.space)
+    spread = np.array([0.0 if u.parameter not in plan.free else SPREAD if u.logarithmic else 0.5
+                       for u in whole.space.unknowns])  # fmt: skip
+    grid = qmc.Halton(len(own), rng=12345).random(count)
+    grid[0] = 0.5
+    found = own + (2 * grid - 1) * spread
+    found[1::2] += plan.begins(whole.space, steadily=True) - own  # no motion may begin at a first sample with its noise
+    return np.asarray(np.clip(found, whole.low, whole.high))

@@ -30,6 +30,9 @@ def test_the_contact_that_lifts_off_is_named():
     assert (silent.status, silent.contact) == ("contact lost", "oiled")
     assert run.events[-1].normal_force == pytest.approx(0.0, abs=1e-6)
     assert ss.simulate(two_tables(), dataclasses.replace(lift, on="dry"), until=20.0).contact == "dry"
+    alone = ss.simulate_many(two_tables(), {}, lift, until=20.0)
+    assert (alone.contact.shape, alone.contact.item()) == ((), "oiled")
+    assert str(alone) == "1 runs: 1 contact lost (oiled 1)"
 
 
 def test_the_contact_that_sticks_is_named_and_one_may_reverse():

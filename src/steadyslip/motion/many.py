@@ -125,7 +125,7 @@ class Ensemble(ReadOnly):
         found = np.full(self.shape, "", dtype=object)
         if names and np.any(lost):
             forces = np.stack([self.final[name + NORMAL_FORCE] for name in names])
-            found[lost] = np.array(names, dtype=object)[np.argmin(forces, axis=0)][lost]
+            found[lost] = np.asarray(np.take(names, np.argmin(forces, axis=0)), dtype=object)[lost]
         return np.asarray(read_only(found.astype(str)))
 
     def summary(self) -> str:

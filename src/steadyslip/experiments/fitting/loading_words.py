@@ -8,11 +8,13 @@ import numpy as np
 
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments.fitting.numbers import FitNumbers
+from steadyslip.experiments.fitting.protocol_words import protocol_against_record
 from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
+from steadyslip.protocol.protocol import LOAD_POINT
 
 _RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a thousandth of its stretch: of no account
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
@@ -22,8 +24,8 @@ SMALL_CHANGE, LISTED = 1.5, 4  # ratio of rates up to which a change may be wavi
 
 def loading_warnings(fit: FitNumbers) -> list[str]:
     """Warnings on the loading, each a sentence."""
-    found = _assumed_rate(fit) + _loading_outliers(fit) + _across_fault(fit) + _small_changes(fit)
-    found += _unusual_distances(fit) + _off_calibration(fit)
+    found = _assumed_rate(fit) + _against_protocol(fit) + _loading_outliers(fit) + _across_fault(fit)
+    found += _small_changes(fit) + _unusual_distances(fit) + _off_calibration(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
@@ -61,6 +63,16 @@ def _assumed_rate(fit: FitNumbers) -> list[str]:
         f"no record has a displacement of the load point: it is taken to move at {own_rate(fit)} (drive.velocity) "
         "until the protocol changes that; if it moved at another rate, every number above is off"
     ]
+
+
+def _against_protocol(fit: FitNumbers) -> list[str]:
+    """Warnings on a protocol that the measured displacement contradicts."""
+    protocol = fit.plan.protocol
+    if protocol is None or not any(piece.channel == LOAD_POINT for piece in protocol.pieces):
+        return []
+    values = np.array(list(fit.values.values()))
+    parts = [part for part in fit.comparison.parts if part.record.displacement is not None]
+    return [text for part in parts if (text := protocol_against_record(part, values[list(part.time_indices)]))]
 
 
 def _across_fault(fit: FitNumbers) -> list[str]:

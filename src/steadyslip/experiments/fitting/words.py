@@ -164,7 +164,7 @@ def _between_samples(fit: FitNumbers, one: Any) -> bool:
 def _possible_ramps(fit: FitNumbers) -> list[str]:
     """Warnings on velocity changes that may be steps or ramps, with the effect of ramps on the fit."""
     found = []
-    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+    for record, loading in zip(fit.plan.records, fit.plan.loading if fit.plan.follows else (), strict=False):
         possible = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
         if possible:
             times = enumerated([f"{change.time:.7g}" for change in possible])

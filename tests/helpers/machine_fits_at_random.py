@@ -158,7 +158,7 @@ if __name__ == "__main__":
     print(len(z), "deviations: rms", np.sqrt(np.mean(z**2)), "within 1.96:", np.mean(np.abs(z) < 1.96),
           "worst", np.max(np.abs(z)), "first alone:", told(every))  # fmt: skip
     print(
-        "above the truth:",
+        "minima missed:",
         sum(one.excess > MISSED for one in every),
         "CPU s",
         np.median([one.seconds for one in every]),

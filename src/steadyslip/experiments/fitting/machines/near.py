@@ -33,6 +33,7 @@ Ring-downs of 60 and 120 periods took 1.3 to 6 times as long without."""
 FEWEST_FOLLOWED = 10  # samples of a part, and twice as many as unknowns
 MOST_ITERATIONS = 100  # on whole records; those that take more follow a valley that the record leaves open
 ROUGH_RTOL = 1e-6  # of motions in these
+ROUGH_HOPE = 100.0  # ends above this multiple of the best sum of squares of a beginning are dropped
 HELD_BACK = 1e-4  # mean square of residuals, in sizes of their series, that an e-fold away from a start costs there
 ELSEWHERE, RISE = 0.1, 2.0  # e-folds or sizes apart, and multiple of the sum of squares between, of different minima
 SPREAD = 1.15  # largest distance of a start from the machine's own values, e-folds: a factor of three
@@ -139,7 +140,7 @@ def find_near(
             first = here.copy()
             ends = minimise(
                 lambda z, which, part=part, first=first: part.residuals(z, first[which]), here, whole.low, whole.high,  # type: ignore[misc]
-                most=ROUGH_ITERATIONS, tolerance=1e-4, race=MIN_ARRIVED, stop=stop,
+                most=ROUGH_ITERATIONS, tolerance=1e-4, stop=stop,
             )  # fmt: skip
             here, which = _hopeful(ends)
             counts = np.array([np.sum(counts[which == k]) for k in range(len(here))], dtype=int)
@@ -186,7 +187,7 @@ def _hopeful(ends: Minima) -> tuple[Array, Array]:
     """
     if not np.any(np.isfinite(ends.ssq)):
         return ends.coordinates, np.arange(len(ends.ssq))
-    kept, _ = ends.distinct(FINALISTS)
+    kept, _ = ends.distinct(FINALISTS, ROUGH_HOPE)
     apart = np.max(np.abs(ends.coordinates[:, None] - kept), axis=2)
     near = np.argmin(apart, axis=1)
     return kept, np.where((apart[np.arange(len(near)), near] < MERGE_DISTANCE) & np.isfinite(ends.ssq), near, -1)

@@ -83,3 +83,20 @@ def test_a_misspelt_table_hides_no_other_problem():
     with pytest.raises(ss.RigFileError) as raised:
         ss.rig_from_text(MACHINE.replace("[bodies.", "[body.").replace('"300 kg"', '"300 m"'))
     assert [one.name for one in raised.value.problems] == ["body", "bodies.table.mass"]
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "answer"),
+    [
+        ("v_stribeck =", "v_stribek =", "unknown key 'v_stribek'; did you mean 'v_stribeck'?"),
+        ("mu_coulomb =", "mu_coulom =", "unknown key 'mu_coulom'; did you mean 'mu_coulomb'?"),
+        ("[contact]", "[contacts]", "unknown table 'contacts'; did you mean 'contact'?"),
+        ('"240 kg"', '"-240 kg"', "got -240.0; allowed: a finite number >= 0 in kg,"),
+    ],
+)
+def test_a_mistake_has_one_message(right, wrong, answer):
+    with pytest.raises(ss.RigFileError) as raised:
+        ss.rig_from_text(AXIS.replace(right, wrong, 1))
+    (problem,) = raised.value.problems
+    assert problem.message.startswith(answer)
+    assert problem.line

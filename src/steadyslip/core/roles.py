@@ -228,12 +228,15 @@ class Parameter(Entry):
         """Convert a raw value: a bare number is a total if the rig has an area; text is read in its own unit."""
         if area is None or not is_per_area(self.unit):
             return self.checked(raw)
+        whole = Parameter(total_unit(self.unit), self.domain, self.doc)
         if isinstance(raw, str):
             try:
-                return self.checked(_per_area(raw, self.unit, area))
+                value = _per_area(raw, self.unit, area)
             except QuantityError as error:
                 raise fault(str(error)) from error
-        whole = Parameter(total_unit(self.unit), self.domain, self.doc)
+            if math.isfinite(value):
+                whole.checked(value * area)  # so that a message is of the total
+            return self.checked(value)
         return self.checked(whole.checked(raw) / area)
 
     def written(self, value: Any, area: float | None = None) -> str:

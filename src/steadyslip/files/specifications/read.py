@@ -340,9 +340,13 @@ class _ContentsReader(TableReader):
     def _misspelt(self, name: str, others: set[str]) -> None:
         """Report a table nearly named as one of a rig's, and read it as that one, as nothing else follows from it."""
         table, own = self.tables[name], {section.name for section in self._own_sections()}
+        if not isinstance(table, dict):
+            return
         keyed = {section.name for section in machine_sections() if section.keyed}
+        if name in keyed and "friction" in self.tables and not any(isinstance(one, dict) for one in table.values()):
+            own, keyed = {section.name for section in sections()}, set()  # of a slider, in the plural
         meant = next(iter(get_close_matches(name, own | keyed, n=1, cutoff=LIKE)), None)
-        if name in own | others or meant is None or not isinstance(table, dict):
+        if name in own | others or meant is None:
             return
         if meant in self.tables and meant not in keyed:
             return

@@ -146,6 +146,7 @@ class TableReader:
         """Constructor arguments from a table; unknown, missing and bad keys are noted."""
         rest = dict(table)
         arguments: Table = {}
+        missing: dict[str, Problem] = {}
         keys: list[str] = []
         for item, role in own_fields(law):
             key = key_of(item)
@@ -165,7 +166,7 @@ class TableReader:
                 if value is not None:
                     arguments[item.name] = value
             elif is_required(item):
-                self.problem(prefix + key, _missing(self.worded(role)))
+                missing[key] = Problem(prefix + key, _missing(self.worded(role)))
         for name, value in rest.items():
             another = _key_of_another(law, name, value)
             elsewhere = "" if another else _tables_with(name, self.sections)
@@ -174,6 +175,9 @@ class TableReader:
             if elsewhere:
                 told = f"unknown key {repr_short(name)} here; it is a key of {elsewhere}"
             self.problem(prefix + legible(name), told + another)
+            for key in [key for key in missing if f"did you mean {key!r}?" in told]:
+                del missing[key]  # it is there, misspelt
+        self.problems += missing.values()
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:

@@ -24,6 +24,7 @@ NOT_ASKED = {
     "it has a unit": ('"20 m/s"', '"1 mm/s"'),
     "another is in m/s": ("0.5", '"0.001 m/s"'),
     "so small that only m/s is meant": ("8e-6", '"1 mm/s"'),
+    "nearer to the other in m/s": ("0.01", '"1 mm/s"'),
     "slow, and no speed has a unit": ("0.9", "1e-5"),
     "a law as fast": ("20", "1.0"),
 }

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import UnitWarning
 from steadyslip.core.format import format_quantity
-from steadyslip.core.quantities import units_in
+from steadyslip.core.quantities import parse, units_in
 from steadyslip.machine.rig import Rig
 
 SPEEDS = ("m/s", "rad/s")
-LEAST = 1e-3  # least number questioned beside other units: a smaller one is written so in m/s alone
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
@@ -32,15 +33,23 @@ def question_speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
 
 def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
     for si in SPEEDS:
-        own = {name: raw for name, (raw, unit) in read.items() if unit == si}
+        own = {name: raw for name, (raw, its) in read.items() if its == si}
         bare = {name: raw for name, raw in own.items() if isinstance(raw, (int, float)) and raw}
-        written = sorted(units_in([raw for raw in own.values() if isinstance(raw, str)]))
+        texts = [raw for raw in own.values() if isinstance(raw, str) and units_in([raw])]
+        written = sorted(units_in(texts))
         for name, raw in bare.items():
             was = f"{name} = {raw:g} has no unit and is read as {raw:g} {si}"
-            if written and si not in written and abs(raw) >= LEAST:
+            if written and si not in written and _fits_better(abs(raw), texts, si):
                 yield f"{was}; other speeds of the file are in {', '.join(written)}: write the unit that is meant"
             elif name == "drive.velocity" and si == "m/s" and (law := _outrun(rig, abs(raw))):
                 yield f"{was}, {law}: write the unit that is meant"
+
+
+def _fits_better(number: float, texts: Sequence[str], si: str) -> bool:
+    """True if a number is nearer to the speeds of texts in the unit of one of them than in the SI unit."""
+    speeds = [(abs(parse(text, si)), unit(name)[0]) for text in texts for name in units_in([text])]
+    away = [(abs(math.log(number / v)), abs(math.log(number * factor / v))) for v, factor in speeds if v]
+    return bool(away) and min(one for _, one in away) < min(one for one, _ in away)
 
 
 def _outrun(rig: Rig, speed: float) -> str:

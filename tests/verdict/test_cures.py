@@ -9,6 +9,7 @@ import pytest
 import steadyslip as ss
 from command import run
 from dimensionless import unit_rig
+from machines import block
 from rigs_of_theory import CONTACTS, rate_state, rig
 from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.verdict import Adjustment
@@ -134,3 +135,10 @@ def test_the_command_reads_what_may_be_adjusted(axis, tmp_path):
 def test_mistakes_are_told_in_one_sentence(options, words):
     with pytest.raises((ss.ParameterError, ss.UnknownNameError), match=words):
         ss.cure(rig(), **options)
+
+
+def test_the_least_damping_cures_an_undamped_machine():
+    text = str(ss.cure(block()))
+    assert text.startswith("To be stable (now undamped)\ncheapest single change: links.")
+    assert ".damping from 0 N s/m to anything above 0, cost 1\n" in text
+    assert "e-" not in text

@@ -18,6 +18,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
 from steadyslip.linear.boundary import REMOTE, boundary, margins
+from steadyslip.linear.status import stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.chances import Chances, chances_of
@@ -27,6 +28,7 @@ from steadyslip.verdict.tolerances import GIVEN, format_chance
 DECADES = 3.0  # searched to each side of a value without limits
 SCANNED, COARSE = 97, 17  # values along one parameter, and of each of a pair: by trial, time against windows missed
 FROM_ZERO = 145  # values of a parameter that is zero, over the twelve decades that `boundary` searches
+LEAST = 1e-12  # smallest of these values over the largest
 BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is looked at too
 HALVINGS, FEW_HALVINGS = 52, 12  # of a bracket: to the last digit of one rig, to 1e-5 of many
 NEAR = np.linspace(-0.02, 0.02, 5)  # relative places about an edge where the whole sample is judged
@@ -106,6 +108,8 @@ class Window(Displayed):
 
     def written(self, value: float) -> str:
         """Format a value of the parameter."""
+        if 0 == self.limits[0] < value < LEAST * self.limits[1]:
+            return "anything above 0"  # the edge is zero itself, as of what damps an undamped machine
         factor, unit = self.told or (1.0, self.unit)
         return format_quantity(value * factor, unit, area=self.area)
 
@@ -150,7 +154,7 @@ class Cures(ReadOnly):
 
     def __str__(self) -> str:
         wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails))
-        now = format_chance(self.chance, self.error) if self.error else "stable" if self.chance else "unstable"
+        now = format_chance(self.chance, self.error) if self.error else stability(self.rig)
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
         if self.chance >= self.sure:
             already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
@@ -311,7 +315,7 @@ def _scan(chances: Chances, name: str, limits: tuple[float, float]) -> Array:
         values = np.geomspace(low, high, SCANNED)
         values[0], values[-1] = low, high
     elif low == 0:
-        values = np.append(0.0, np.geomspace(high * 1e-12, high, FROM_ZERO))
+        values = np.append(0.0, np.geomspace(high * LEAST, high, FROM_ZERO))
     else:
         values = np.linspace(low, high, SCANNED)
     try:

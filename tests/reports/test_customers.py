@@ -16,9 +16,10 @@ from steadyslip.linear.formula import MEANINGS, formula_in_parts
 from steadyslip.machine.letters import said
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
+from steadyslip.reports.elements import _LINE, _lines, equation
 from steadyslip.reports.literature import PUBLICATIONS, cited
 from steadyslip.reports.rig import input_table
-from steadyslip.reports.sections import letters, notes_of, recommendation
+from steadyslip.reports.sections import letters, motion, notes_of, recommendation
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
 RIGS = [path for path in EXAMPLES if "[drive]" in path.read_text() and not path.stem.startswith(("hunting", "reed"))]
@@ -84,6 +85,37 @@ def test_a_recommendation_changes_what_is_there():
     found = ss.analyze(ss.read_rig("examples/inclined-spring.toml"))
     assert "damping" not in words("".join(recommendation(found)))
     assert "damping c" in words("".join(recommendation(found, ("slider.damping",))))
+
+
+def test_a_stable_rig_is_told_what_to_hold():
+    """The nearest edge of all, and that of what can be set, with the side on which to stay."""
+    found = ss.analyze(ss.read_rig("examples/double-direct-shear.toml"))
+    text = words("".join(recommendation(found)))
+    assert "evolution effect b₁, now 0.006: keep it below 0.009113" in text
+    assert "Of what can be set, the nearest is that of stiffness k, now 20 GPa/m: keep it above 2.503 GPa/m" in text
+    assert "preload σ₀, now 25 MPa: keep it below" in words("".join(recommendation(found, ("contact.preload",))))
+
+
+def test_a_motion_says_how_it_ends():
+    """A slip event before a run-away does not hide that; a stable rig comes back."""
+    assert "slips" in (text := words("".join(motion(ss.analyze(ss.read_rig("examples/triaxial.toml"))))))
+    assert "; then blow-up at 249.4 s" in text
+    text = words("".join(motion(ss.analyze(ss.read_rig("examples/machines/two-guides.toml")))))
+    assert re.search(r"no slip event; after 37\.46 s it slides steadily again to within 0\.001 %", text)
+
+
+def test_long_sums_go_on_in_further_lines():
+    """Every term stands in one of them."""
+    for one in build_model(ss.read_rig("examples/machines/brake-pad.toml")).equations():
+        terms = one.args[0 if one.args[1] == 0 else 1].as_ordered_terms()
+        lines = _lines(terms)
+        assert [term for line in lines for term in line] == terms
+        assert all(len(line) == 1 or len(" + ".join(map(str, line))) <= _LINE for line in lines)
+        assert equation(one).count("<mtr>") == (len(lines) if len(lines) > 1 else 0)
+
+
+def test_values_of_inline_tables_are_of_the_file():
+    assert notes_of("[contact]\nmemory = { alpha = 0.2 }  # of B819") == {"contact.memory.alpha": ""}
 
 
 def test_comments_in_tables_of_several_are_found():

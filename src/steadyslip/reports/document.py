@@ -18,7 +18,7 @@ from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
-from steadyslip.reports.elements import STYLE, heading, html_text, listing, paragraph, table
+from steadyslip.reports.elements import STYLE, heading, html_text, listing, paragraph, table, why
 
 _DOCUMENT_STYLE = """
 body { background: #fff; }
@@ -95,10 +95,10 @@ def document_html(
         try:
             live = fragment(parts.rig, title, parts.branch, source_text(source))
         except NotAvailable as refused:
-            still = paragraph(f"There is no explorer at the end: {refused}.", "small")
+            still = paragraph(f"There is no explorer at the end: {why(refused)}.", "small")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
-        '<article class="report steadyslip-told" role="region" aria-label="report">'
+        '<article class="report steadyslip-told" role="' + ("region" if live else "main") + '" aria-label="report">'
         f"{_title_block(block)}"
         f'<p class="kind">{html_text(title)}</p><h1>{html_text(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"

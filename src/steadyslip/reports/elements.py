@@ -33,6 +33,7 @@ STYLE = """
   border-bottom: 1px solid #d5dae1; text-align: left; vertical-align: top;
   font-variant-numeric: tabular-nums; background: none; }
 .steadyslip-told th { font-weight: 650; }
+.steadyslip-told thead th { min-width: 4.5em; }
 .steadyslip-told .n { white-space: nowrap; }
 .steadyslip-told h1, .steadyslip-told p, .steadyslip-told td { overflow-wrap: anywhere; }
 .steadyslip-told tr { break-inside: avoid; }
@@ -44,7 +45,8 @@ STYLE = """
 .steadyslip-told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
   white-space: pre-wrap; overflow-wrap: anywhere; }
 .steadyslip-told sub { line-height: 0; }
-.steadyslip-told math { font-size: 17px; }
+.steadyslip-told math { font-size: 17px; white-space: nowrap; }
+@media print { .steadyslip-told .formula math { font-size: 12px; } }
 @supports not (-moz-appearance: none) { .steadyslip-told msub > :last-child { transform: translateY(.18em); } }
 .steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 6px 0; padding: 4px 0 10px; }
 """  # style sheet for elements inside one of class "steadyslip-told"
@@ -56,6 +58,11 @@ def typographic(text: Any) -> str:
     for pattern, better in _REPLACEMENTS:
         words = re.sub(pattern, better, words)
     return _EXPONENT.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_SUPERSCRIPTS)}", words)
+
+
+def why(refused: Exception) -> str:
+    """Reason of a refusal, without what else to call, which a reader of a document cannot."""
+    return re.split(r"; (?:offered are|ask `|stable_stiffness)", str(refused))[0]
 
 
 def html_text(text: Any) -> str:
@@ -100,7 +107,7 @@ def _breakable(name: str) -> str:
 
 def _nowrap_class(cell: str) -> str:
     """HTML class attribute that keeps a short cell, such as a value with unit, on one line; else empty."""
-    return " class=n" if len(cell) <= 16 and " " in cell else ""
+    return " class=n" if len(cell) <= 20 and " " in cell else ""
 
 
 class Markup(str):
@@ -116,7 +123,7 @@ def equation(one: sp.Eq) -> str:
     """HTML of an equation on lines of its own: long sums go on below, as paper has no bar to scroll by."""
     left, right = one.args
     side, end = (left, "<mo>=</mo><mn>0</mn>") if right == 0 else (right, "")
-    lines = [_presented(sp.Add(*terms, evaluate=False)) for terms in _lines(sp.Add.make_args(side))]
+    lines = [_presented(sp.Add(*terms, evaluate=False)) for terms in _lines(side.as_ordered_terms())]
     if len(lines) == 1:
         return f'<div class="formula" tabindex="0">{math(one)}</div>'
     before = [f"{_presented(left)}<mo>=</mo>" if right != 0 else "", *("" for _ in lines[1:])]

@@ -27,7 +27,7 @@ from steadyslip.model.build import build_model
 from steadyslip.model.numeric import by_matrices
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import equation as equation_html, figure, heading, inline_math, paragraph, table
+from steadyslip.reports.elements import equation as equation_html, figure, heading, inline_math, paragraph, table, why
 from steadyslip.reports.sections import (
     assumptions,
     input_letter,
@@ -111,9 +111,9 @@ def input_table(
 
 
 def _meaning(one: Address) -> str:
-    """What a parameter is, and what its kind does, where its words say no more than its name."""
-    kind = one.role.kind
-    return f"{one.role.doc}: {PARAMETER_KINDS[kind]}" if kind and one.role.doc.startswith(kind) else one.role.doc
+    """What a parameter is; of the effects of friction also what they do."""
+    kind, doc = one.role.kind, one.role.doc
+    return f"{doc}: {PARAMETER_KINDS[kind]}" if kind.endswith("effect") and doc.startswith(kind) else doc
 
 
 def edge_table(analysis: Analysis) -> Iterator[str]:
@@ -163,8 +163,7 @@ def formula_section(analysis: Analysis) -> Iterator[str]:
         for part in parts:
             yield equation_html(part)
     except NotAvailable as refused:
-        why = str(refused).partition("; stable_stiffness")[0]
-        yield paragraph(f"The critical stiffness has no formula here: {why}.")
+        yield paragraph(f"The critical stiffness has no formula here: {why(refused)}.")
     yield from motion_equations(analysis.rig, printed)
 
 

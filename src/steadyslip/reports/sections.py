@@ -29,7 +29,7 @@ from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
 from steadyslip.model.numeric import has_structure
 from steadyslip.motion import History
-from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table
+from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table, why
 from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
@@ -174,7 +174,7 @@ def motion(analysis: Analysis) -> Iterator[str]:
         branch, unstable = getattr(analysis, "branch", 0), analysis.stable is False
         run = None if analysis.stable is None else motion_after(rig, analysis.eigenvalues, branch, repeated=unstable)
     except SteadyslipError as refused:
-        yield paragraph(f"It was not simulated: {refused}.")
+        yield paragraph(f"It was not simulated: {why(refused)}.")
         return
     if run is None:
         yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")

@@ -92,6 +92,8 @@ def literal(value: Any) -> str:
 
 
 class _JavaScript(Writer):
+    short = True
+
     def number(self, value: Any) -> str:
         return literal(value)
 

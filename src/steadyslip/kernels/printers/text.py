@@ -20,7 +20,11 @@ class Writer(ABC):
     ----------
     lines : list of str
         Statements so far, indented.
+    short : bool
+        True if what is loaded and used once has no name either; for pages, not for who steps through.
     """
+
+    short = False
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -104,7 +108,7 @@ class Writer(ABC):
             written = self._written(node)
             depth = 1 + max((self.depth.get(a.order, 0) for a in node.operands), default=0)
             often = self.uses.get(node.order, 0) != 1 or depth > _DEEPEST
-            early = node.op == "load" and node.args[0] in self.changed  # before it is overwritten
+            early = node.op == "load" and (not self.short or node.args[0] in self.changed)  # before it is overwritten
             if node.op != "number" and (often or early or loop is not None):
                 name = f"t{len(self.lines) + 1}"
                 self.line(level, self.named(name, written[1:-1] if node.op in _SIGNS else written))

@@ -14,6 +14,7 @@ from scipy.stats import binom
 import lab_records as lab
 import steadyslip as ss
 from command import run
+from steadyslip.experiments.answers.members import problems_together
 from steadyslip.experiments.numerics.pooling import ExperimentEstimate, log_evidence, pooled
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"
@@ -224,6 +225,25 @@ def test_conditions_by_label_and_the_same_record_twice(fits):
         ss.population(fits | {"again": fits["run 1"]})
 
 
+def test_the_same_record_cut_thinned_or_averaged_is_not_another():
+    measured = [lab.record(lab.rig(), lab.STEP, seed, count=600) for seed in (1, 2)]
+    first = measured[0]
+    fits = {str(i): ss.fit(ss.lab_rig(), one, starts=2) for i, one in enumerate(measured)}
+    assert problems_together(fits) == []
+    for same in (first.decimated(250), first.between(20, 120), first.taken(np.arange(0, 600, 2), "thinned")):
+        again = ss.fit(ss.lab_rig(), same, starts=2)
+        assert [one.name for one in problems_together(fits | {"again": again})] == ["fits.again"]
+
+
+def test_a_level_of_friction_that_the_population_lacks_is_the_rigs(fits):
+    rock = ss.population(fits, ["a", "b", "d_c"], count=100)
+    found = ss.predict(lab.rig(mu_ref=0.7), rock)
+    assert found.rig.value("friction.mu_ref") == 0.7
+    assert "not in the population   friction.mu_ref = 0.7, of the rig" in str(found)
+    whole = ss.population(fits, ["a", "b", "d_c", "mu_ref"], count=100)
+    assert "not in the population" not in str(ss.predict(lab.rig(mu_ref=0.7), whole))
+
+
 def test_a_population_read_back_says_the_same(fits, tmp_path):
     rock = ss.population(fits, ["a", "mu_ref"], conditions="normal stress", count=400)
     rock.save(tmp_path / "rock.nc")
@@ -293,7 +313,12 @@ def test_a_population_from_files(files):
 def test_a_condition_in_a_file_by_the_names_of_records(files):
     shutil.copy(files / "p3.csv", files / "p4.csv")
     text = (files / "p4.csv").read_text().splitlines()
-    (files / "p4.csv").write_text("\n".join(text[:-5]))  # another experiment than p3
+    noise = np.random.default_rng(9)  # another experiment than p3
+    columns = [line.split(",") for line in text[1:]]
+    place = text[0].split(",").index(next(name for name in text[0].split(",") if "riction" in name))
+    for row in columns:
+        row[place] = f"{float(row[place]) + 2e-4 * noise.standard_normal():.8f}"
+    (files / "p4.csv").write_text("\n".join([text[0], *map(",".join, columns)]))
     found = {}
     spec = SPEC.format("").replace('parameters = ["a", "mu_ref"]', "")  # all of friction
     for given in ("{p4 = 4, p2 = 2, p1 = 1, p3 = 3}", "[1, 2, 3, 4]"):

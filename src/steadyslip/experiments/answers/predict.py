@@ -31,6 +31,7 @@ COUNT = 4000  # default number of draws: errors of a probability are below 1 %
 KICK_DRAWS = 200  # draws for which thresholds of kicks are computed, each by simulations
 LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, 68 % and 95 % intervals
 EFFECT, ROUNDING = 0.05, 1e-9  # relative change of a parameter, and of an answer that does not depend on it
+DECISIVE = ("direct effect", "evolution effect", "slip distance")  # kinds that a machine's file does not lend a rock
 CLEAR_PROBABILITY = 0.95  # probability above which the text says stable or unstable
 
 
@@ -119,8 +120,16 @@ class Prediction(ReadOnly):
         if self.shares:
             found = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.shares.items() if share >= 0.005)
             lines.append(f"spread taken away by    {found}, each known by itself")
+        if self.kept:
+            found = ", ".join(f"{name} = {value:.4g}" for name, value in self.kept.items())
+            lines.append(f"not in the population   {found}, of the rig")
         lines.append(f"from {len(self.stable)} draws, {self.draws.kind}")
         return "\n".join(lines)
+
+    @property
+    def kept(self) -> dict[str, float]:
+        """Parameters of friction, by name, that the population of the draws lacks, with the rig's values."""
+        return _kept(self.rig, self.draws) if isinstance(self.draws, Population) else {}
 
     @property
     def undecided(self) -> dict[str, float]:
@@ -255,7 +264,9 @@ def transferred(
         values = {name: own for name, own in fit.others(seed).items() if name in belonging}
         best = {belonging[name]: fit.mean(name).value for name in values}
         lost = {name for name in belonging if name not in values}
-        draws: Draws | Population = fit
+        kept = {belonging[name] for name in lost} & set(_kept(rig, fit))
+        best |= {name: _kept(rig, fit)[name] for name in kept}
+        lost = {name for name in lost if belonging[name] not in kept}
     else:
         best = {belonging[n]: source.values[n] for n in belonging if not belonging[n].startswith("friction.")}
         lost = {one.name for one in source.estimates if one.name in belonging and not one.determined}
@@ -266,10 +277,25 @@ def transferred(
         if lost:
             message = f"{', '.join(sorted(lost))}: fitted, but not in the population; name them in its parameters"
             raise NotAvailable(message)
-        return target, draws, {belonging[name]: own for name, own in values.items()}
+        return target, fit, {belonging[name]: own for name, own in values.items()}
     held = [one for one in source.names if one not in lost]
     draws = normal_draws(fit, count, seed, held=held) if isinstance(fit, Fit) else fit
     return target, draws, {name: draws.values[own] for own, name in belonging.items()}
+
+
+def _kept(rig: Slider, rock: Population) -> dict[str, float]:
+    """Parameters of friction that a population lacks, with the values of the rig; not those that decide its stability.
+
+    A rig's level of friction is as good as the rock's; its a, b or d_c would be those of another rock.
+    """
+    fitted = {one.parameter for one in _source(rock).space.unknowns} - {
+        one.name for one in rock.axes.quantities.values()
+    }
+    return {
+        name: float(address.value) for name, address in rig.parameters().items()
+        if name in fitted and name.startswith("friction.") and address.value is not None
+        and address.role.kind not in DECISIVE
+    }  # fmt: skip
 
 
 def _source(fit: Fit | Draws | Population) -> Fit:

@@ -88,6 +88,10 @@ def threshold(
     reference: Annotated[
         str, typer.Option(help="whether the rig's drive is the velocity 'before' or 'after' a velocity step")
     ] = "before",
+    up_to: Annotated[
+        float | None,
+        typer.Option("--up-to", help="largest size of interest, as sizes are told; 1e4 times the drive, or so"),
+    ] = None,
     output: Annotated[
         list[Path] | None, outputs("write .html, or draw the basin in the phase plane: .png, .svg or .pdf")
     ] = None,
@@ -98,7 +102,7 @@ def threshold(
     from steadyslip.nonlinear.cycle_commands import KICKED, thresholds_of_file, write_thresholds
 
     check_output(output or (), KICKED)
-    found = thresholds_of_file(rig, changes or (), kick or (), reverse, reference, at)
+    found = thresholds_of_file(rig, changes or (), kick or (), reverse, reference, at, up_to)
     wanted = [path for path in output or () if not found.interrupted or path.suffix == ".html"]
     if len(wanted) < len(output or ()):
         typer.secho("stopped: the basin is not drawn", err=True)

@@ -118,12 +118,13 @@ class Thresholds(Displayed):
 
 def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
-    at: str | None = None,
+    at: str | None = None, up_to: float | None = None,
 ) -> Thresholds:  # fmt: skip
     """`thresholds_shown` for the rig of a file; for the usual kicks unless some are given."""
     rig = read_rig(path, changes)
     usual = tuple(name for name, kick in kicks_of(rig).items() if kick.usual)
-    return thresholds_shown(rig, tuple(kicks) or usual, at=at, direction=-1 if reverse else 1, reference=reference)
+    options = {"at": at, "direction": -1 if reverse else 1, "reference": reference, "up_to": up_to}
+    return thresholds_shown(rig, tuple(kicks) or usual, **options)
 
 
 def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any) -> Thresholds:

@@ -160,7 +160,9 @@ def threshold_words(kick: Threshold) -> str:
     if kick.size == 0:
         return f"no {name}{at} is survived: steady sliding is unstable"
     if math.isinf(kick.size):
-        return f"every {name}{at} in the range searched is survived"
+        return (
+            f"survives {what.format(at=at)} {format_quantity(kick.survived, kick.unit, area=kick.area)} and all smaller"
+        )
     reason = f" ({kick.doubt})" if kick.doubt else ""
     why = "stopped, not known" if kick.interrupted else "undecided"
     if math.isnan(kick.size) and kick.bracket[0] == 0:

@@ -12,6 +12,7 @@ from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks.closed_orbits import _attraction
 from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
+from steadyslip.nonlinear.kicks.quartic import Rays
 from steadyslip.nonlinear.kicks.settled import rest_of
 
 STEEP = rate_state(b=0.022, normal_memory=ss.laws.LinkerDieterich(alpha=0.3))
@@ -148,6 +149,64 @@ def test_motion_from_the_edge_of_the_neighbourhood_only_goes_inwards(stable):
         away = near.distance(np.zeros(len(run.t), dtype=int), rest.state + rest.scales * run.y.T)
         assert np.all(np.diff(away) < 1e-5 * radius)
         assert away[-1] < 0.4 * radius
+
+
+# -- beyond the ball: V = V2 + V3 + V4
+
+
+def motor_screw_table(damping):
+    """Theory 15: the motor drives a table that slides, by a screw with a share of critical damping."""
+    critical = 0.005 * (1 + 0.0505 / 0.01)
+    stiff, together = 20 * critical, 0.0005 * 0.05 / 0.0505
+    law = ss.laws.RateState(a=0.01, b=0.015, d_c=1.0, mu_ref=0.6, v_ref=1.0, evolution=ss.laws.Slip())
+    return ss.Machine(
+        bodies={"motor": ss.machine.SlidingBody(mass=0.0005), "table": ss.machine.SlidingBody(mass=0.05)},
+        links={
+            "drive": ss.machine.Spring(between=("drive", "motor"), stiffness=1.5 * critical),
+            "screw": ss.machine.Spring(
+                between=("motor", "table"), stiffness=stiff, damping=2 * damping * np.sqrt(stiff * together)
+            ),
+        },
+        contacts={
+            "bed": ss.machine.Surface(body="table", friction=law, contact=ss.laws.ConstantNormalStress(preload=1.0))
+        },
+        drive=ss.machine.Pull(velocity=1.0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("damping", [1e-1, 1e-3, 1e-5])
+def test_v_reaches_several_times_as_far_as_the_ball_however_long_the_screw_rings(damping):
+    near = Neighbourhood(rest_at(motor_screw_table(damping)))
+    radius, (*_, size) = near.computed(), near._levels(np.arange(1))
+    assert size[0] > max(0.05, 5 * radius[0])
+
+
+LONG = {f"screw of {damping:g}": (lambda damping=damping: motor_screw_table(damping)) for damping in (1e-2, 1e-4)}
+
+
+@pytest.mark.parametrize("stable", [*STABLE.values(), *LONG.values()], ids=[*STABLE, *LONG])
+def test_v_falls_everywhere_below_its_level(stable):
+    """In states that were not among those tested."""
+    rest = rest_at(stable())
+    near, random, n = Neighbourhood(rest), np.random.default_rng(2), rest.state.shape[1]
+    radius = near.computed()[0]
+    v3, v4, size = near._levels(np.arange(1))
+    assert size[0] == 0 or size[0] >= radius
+    if not size[0]:
+        return  # the ball is larger
+    decay = near.decay[0]
+    way = random.normal(size=(8000, n)) * (np.min(decay) / decay) ** random.uniform(0, 1, size=(8000, 1))
+    rays = Rays.along((way / np.linalg.norm(way, axis=1)[:, None])[None], v3, v4)
+    worst = np.inf
+    for share in (0.05, 0.3, 0.6, 0.9, 1.0):
+        rho = rays.distance((share * size) ** 2)
+        q, gradient = (rho[..., None] * rays.way)[0], rays.gradient(rho)[0]
+        scales = rest.scales[0]
+        rates = rates_at(rest, (rest.state[0] + scales * (q @ near.basis[0].T))[None])[0] / scales
+        matrix = near.inverse[0] @ rest.matrix[0] @ near.basis[0]
+        linear = 2 * np.sum(q * (q @ matrix.T), axis=1)
+        worst = min(worst, np.min(np.sum(gradient * (rates @ near.inverse[0].T), axis=1) / linear))
+    assert worst > 0.35
 
 
 def test_unstable_or_neutral_sliding_has_none():

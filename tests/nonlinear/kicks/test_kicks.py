@@ -42,7 +42,7 @@ def test_ringing_while_the_block_sticks_is_no_cycle():
 def test_a_block_may_be_stopped_beyond_floating_point(direction):
     """Friction follows ln v to -65 000 e-folds while the spring is taken up again: no kick is too large to be told."""
     a_rig = heavy(ss.laws.Slip(), 1.3, 1e10)
-    found = ss.threshold(a_rig, "displacement", direction=direction)
+    found = ss.threshold(a_rig, "displacement", direction=direction, up_to=1e5)
     assert (found.size, found.searched, found.decided) == (np.inf, 1e5, True)
     lengths = 2000.0
     step = ss.protocol.DisplacementStep(at=0.0, by=direction * lengths * 1e-6)

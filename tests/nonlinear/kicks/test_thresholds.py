@@ -147,6 +147,21 @@ def test_no_kick_is_large_enough_for_a_hardening_rig():
     assert found.to_dict()["size"] is None
 
 
+def test_what_is_survived_is_told_up_to_a_limit():
+    """1e4 times the drive's velocity unless told; a threshold beyond the limit is none."""
+    a_rig = unit_rig("slip", -0.3, 0.5)
+    assert ss.threshold(a_rig).searched == pytest.approx(np.log(1e4))
+    found = ss.threshold(a_rig, up_to=3.0)
+    assert (found.size, found.searched, found.decided) == (np.inf, 3.0, True)
+    assert found.survived == pytest.approx(np.exp(3.0))
+    fails = unit_rig("slip", 0.5, 0.5)  # at ln 3
+    assert ss.threshold(fails, up_to=1.0).size == np.inf
+    assert ss.threshold(fails, up_to=1.2, precision=1e-4).size == pytest.approx(np.log(3), rel=1e-3)
+    assert ss.threshold_map(fails, {"stiffness": [0.5]}, up_to=1.0)[0] == np.inf
+    with pytest.raises(ss.ParameterError, match=r"up_to: got 30\.0; allowed: 0\.001 to 25"):
+        ss.threshold(a_rig, up_to=30.0)
+
+
 def test_unstable_sliding_survives_nothing():
     found = ss.threshold(unit_rig("slip", 0.5, 0.4))
     assert (found.size, found.outcome) == (0.0, "unstable")

@@ -68,6 +68,7 @@ class Brackets:
     kick=NAME,
     reference=NAME,
     direction=SIGN,
+    up_to=finite(0),
 )
 def threshold_map(
     rig: Slider | Machine,
@@ -77,6 +78,7 @@ def threshold_map(
     at: str | None = None,
     direction: int = 1,
     reference: str = "before",
+    up_to: float | None = None,
     precision: float = 1e-4,
     rtol: float = 1e-8,
     threads: int | None = None,
@@ -87,7 +89,7 @@ def threshold_map(
 
     Parameters
     ----------
-    rig, kick, at, direction, reference, precision, rtol, branch
+    rig, kick, at, direction, reference, up_to, precision, rtol, branch
         As for `threshold`.
     vary : mapping of str to array_like or xarray.DataArray
         Parameters by dotted name, SI units; arrays broadcast, DataArrays by dimension name.
@@ -114,7 +116,7 @@ def threshold_map(
     array([0.   , 2.038])
     """
     found, dims, coords = threshold_brackets(
-        rig, vary, kick, at=at, direction=direction, reference=reference, precision=precision, rtol=rtol,
+        rig, vary, kick, at=at, direction=direction, reference=reference, up_to=up_to, precision=precision, rtol=rtol,
         threads=threads, progress=progress, branch=branch,
     )  # fmt: skip
     if not dims:
@@ -137,6 +139,7 @@ def threshold_brackets(
     at: str | None = None,
     direction: int = 1,
     reference: str = "before",
+    up_to: float | None = None,
     precision: float = 1e-4,
     rtol: float = 1e-8,
     threads: int | None = None,
@@ -153,7 +156,7 @@ def threshold_brackets(
         for group_rig, chosen, index in regimes(rig, flat, size):
             part = {name: np.broadcast_to(np.asarray(a, dtype=float), (size,)) for name, a in chosen.items()}
             part = {name: a if index is None else a[index] for name, a in part.items()}
-            kicked = Kicked(group_rig, kick, direction, reference, part, branch, rtol, at)
+            kicked = Kicked(group_rig, kick, direction, reference, part, branch, rtol, at, up_to)
             where = slice(None) if index is None else index
             search = _Search(kicked, size if index is None else len(index), threads, advanced)
             search.run(precision)

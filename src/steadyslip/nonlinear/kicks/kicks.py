@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import log
 from typing import Any
 
 import numpy as np
@@ -41,8 +42,8 @@ class Kick:
     name : str
     unit : str
         Of `amount`.
-    low, high : float
-        Range of sizes that is searched.
+    low, high, most : float
+        Range of sizes that is searched unless told, and how far it can be.
     size : str
         What a size without unit counts.
     doc : str
@@ -54,6 +55,7 @@ class Kick:
     unit: str
     low: float
     high: float
+    most: float
     size: str
     doc: str
     usual: bool = False
@@ -62,10 +64,10 @@ class Kick:
 KICKS = {
     kick.name: kick
     for kick in (
-        Kick("velocity", "m/s", 1e-3, 25.0, "ln(new/old velocity)", "step of the load-point velocity", True),
-        Kick("displacement", "m", 1e-4, 1e5, "natural lengths (d_c)", "step of the load point", True),
-        Kick("normal-stress", "Pa", 1e-6, 1e2, "share of the steady one", "step of the normal stress"),
-        Kick("impulse", "Pa s", 1e-4, 1e10, "change of velocity over the drive's", "blow on a block with mass"),
+        Kick("velocity", "m/s", 1e-3, log(1e4), 25.0, "ln(new/old velocity)", "step of the load-point velocity", True),
+        Kick("displacement", "m", 1e-4, 1e5, 1e5, "natural lengths (d_c)", "step of the load point", True),
+        Kick("normal-stress", "Pa", 1e-6, 10.0, 1e2, "share of the steady one", "step of the normal stress"),
+        Kick("impulse", "Pa s", 1e-4, 1e4, 1e10, "change of velocity over the drive's", "blow on a block with mass"),
     )
 }
 OF_MACHINES = {
@@ -73,8 +75,8 @@ OF_MACHINES = {
     for kick in (
         replace(KICKS["velocity"], doc="step of the drive's velocity, or of that of the body at which it is"),
         replace(KICKS["displacement"], doc="step of the load point, or of the body at which it is", usual=False),
-        Kick("force", "N", 1e-6, 1e2, "share of the largest steady normal force", "step of a force on a body"),
-        Kick("normal-force", "N", 1e-6, 1e2, "share of the steady one", "step of the normal force at a contact"),
+        Kick("force", "N", 1e-6, 10.0, 1e2, "share of the largest steady normal force", "step of a force on a body"),
+        Kick("normal-force", "N", 1e-6, 10.0, 1e2, "share of the steady one", "step of the normal force at a contact"),
         replace(KICKS["impulse"], unit="N s", size="change of velocity over its own", doc="blow on a body with mass"),
     )
 }
@@ -129,6 +131,8 @@ class Kicked:
         the velocity after it. Everything the rig says of itself, such as a steady normal stress, holds at its drive.
     vary : mapping of str to ndarray
         Parameters of the rig, flat arrays of equal length.
+    up_to : float or None
+        Largest size of interest; the `Kick.high` of its kind unless given.
 
     Attributes
     ----------
@@ -145,7 +149,7 @@ class Kicked:
 
     def __init__(
         self, rig: Slider | Machine, kick: str, direction: int, reference: str, vary: Mapping[str, Any], branch: int,
-        rtol: float | None, at: str | None = None,
+        rtol: float | None, at: str | None = None, up_to: float | None = None,
     ) -> None:  # fmt: skip
         problems, known = kick_problems(rig, kick, at), kicks_of(rig)
         if direction not in (1, -1):
@@ -155,6 +159,11 @@ class Kicked:
         if problems:
             raise ParameterError(problems)
         self.kick, self.sign, self.budget, self.at = known[kick], float(direction), StepBudget(), at or ""
+        most = known["impulse"].most if kick == "velocity" and at else self.kick.most
+        if up_to is not None and not self.kick.low <= up_to <= most:
+            allowed = f"{self.kick.low:g} to {most:g}"
+            raise ParameterError([Problem("up_to", f"got {up_to!r}; allowed: {allowed} ({self.kick.size})")])
+        self.up_to = up_to
         self.of_drive = not at and kick in ("velocity", "displacement")
         self.from_other = kick == "velocity" and reference == "after" and self.of_drive
         values = operating_point(rig, vary, branch=branch)
@@ -185,10 +194,10 @@ class Kicked:
 
     @property
     def highest(self) -> float:
-        """Largest size that is physically meaningful."""
-        if self.sign < 0 and (self.kick.name in ("normal-stress", "normal-force", "impulse") or self._is_blow):
-            return 0.999
-        return 1e10 if self._is_blow else self.kick.high
+        """Largest size that is searched: as told, or the usual; what would stop or lift the body is left out."""
+        usual = KICKS["impulse"].high if self._is_blow else self.kick.high
+        stops = self.sign < 0 and (self.kick.name in ("normal-stress", "normal-force") or self._is_blow)
+        return min(self.up_to or usual, 0.999 if stops else np.inf)
 
     @property
     def _is_blow(self) -> bool:

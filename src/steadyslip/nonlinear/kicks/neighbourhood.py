@@ -12,15 +12,20 @@ ball this alone would make V' positive at tiny distances (with mass rates differ
 weighted by the square root of their decay times. For the same reason V' changes from direction to direction most
 steeply next to the slow modes, where little of the fast ones decides its sign; directions are spread there too, as
 evenly as V' sees them.
+
+Where modes ring on almost undamped such balls are tiny. Near them, V = |q|² + V3 + V4 (`quartic`)
+takes the place of |q|², and a level of V that of the radius.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
 from steadyslip.nonlinear.kicks.field import motion_at
+from steadyslip.nonlinear.kicks.quartic import REACH, Rays, terms
 from steadyslip.nonlinear.kicks.rest import Rest
 
 Array = np.ndarray
@@ -29,6 +34,7 @@ SHRINK = 0.6  # factor between successive trial radii
 LONG = 30.0  # ratio of slip to all else, in natural sizes, above which a mode is scaled by all else
 SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
 INNER = (0.75, 0.5, 0.25, 0.1)  # radii of inner shells that are checked too, as shares of the ball's
+FEW = 8  # share of the directions in which levels are tried first
 MARGIN = 0.5  # required share of the linear decay of V
 
 
@@ -43,6 +49,8 @@ class Neighbourhood:
     ----------
     radius : ndarray (m,)
         In the norm of q; 0 where steady sliding is not stable or no ball was found, NaN where nobody has asked yet.
+    levels : dict of int to list
+        Of rigs by their number in `key`, as far as anyone has asked: V3, V4, and the root of the level of V.
     """
 
     def __init__(self, rest: Rest) -> None:
@@ -52,12 +60,14 @@ class Neighbourhood:
         self.inverse = np.zeros((count, n, n))
         self.decay = np.ones((count, n))
         self.radius = np.where(rest.stable, np.nan, 0.0)
+        self.key, self.levels = np.arange(count), dict[int, list[Array]]()  # shared by copies of a rig
 
     def part(self, which: Array) -> Neighbourhood:
         """Balls of some of the rigs."""
         found = Neighbourhood(self.rest.part(which))
-        for name in ("basis", "inverse", "decay", "radius"):
+        for name in ("basis", "inverse", "decay", "radius", "key"):
             setattr(found, name, getattr(self, name)[which])
+        found.levels = self.levels
         return found
 
     def computed(self, which: Array | None = None) -> Array:
@@ -95,38 +105,84 @@ class Neighbourhood:
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
     def holds(self, which: Array, states: Array) -> Array:
-        """True (k,) for states (k, n) of rigs `which` inside their balls."""
-        radius = self.computed(which)
-        return np.asarray(self.distance(which, states) < radius)
+        """True (k,) for states (k, n) of rigs `which` inside their balls, or where V has not reached its level."""
+        radius, away = self.computed(which), self.distance(which, states)
+        inside = np.asarray(away < radius)
+        left = np.flatnonzero(~inside & (away < REACH) & (radius > 0))
+        if len(left):
+            inside[left] = self._below(which[left], states[left])
+        return inside
+
+    def _below(self, which: Array, states: Array) -> Array:
+        """True (k,) where V is below its level, which is computed for rigs of which nobody has asked yet."""
+        keys, first = np.unique(self.key[which], return_index=True)
+        new = np.array([key not in self.levels for key in keys])
+        if new.any():
+            for key, *found in zip(keys[new], *self._levels(which[first[new]]), strict=True):
+                self.levels[key] = found
+        v3, v4, size = (np.stack(one) for one in zip(*(self.levels[key] for key in self.key[which]), strict=True))
+        q = self.coordinates(which, states)
+        rho = np.linalg.norm(q, axis=1)
+        rays = Rays.along((q / rho[:, None])[:, None, :], v3, v4)
+        return np.asarray((rays.value(rho[:, None])[:, 0] < size**2) & (rho < rays.farthest[:, 0]))
+
+    def _levels(self, which: Array) -> tuple[Array, Array, Array]:
+        """Terms of V, and the root of the level below which it falls; 0 where the ball reaches farther."""
+        v3, v4 = terms(self.rest.part(which), self.basis[which], self.inverse[which])
+        known = np.all(np.isfinite(v3), axis=(1, 2, 3)) & np.all(np.isfinite(v4), axis=(1, 2, 3, 4))
+        size, around = np.where(known, LARGEST, 0.0), self.around(which)
+        for ways in (around[:, ::FEW], around):
+            rays = Rays.along(ways, v3, v4)
+
+            def falls(some: Array, size: Array, rays: Rays = rays) -> Array:
+                own = rays.part(some)
+                rho = own.distance(size**2)
+                return self._falls(which[some], rho[..., None] * own.way, own.gradient(rho))
+
+            size = _largest(size, self.radius[which], falls)
+        return v3, v4, size
 
     def _radii(self, which: Array) -> Array:
-        radius = np.full(len(which), LARGEST)
-        trying = np.arange(len(which))
-        while len(trying):
-            good = self._decays(which[trying], radius[trying])
-            for share in INNER:
-                inside = np.flatnonzero(good)
-                if len(inside):
-                    good[inside] = self._decays(which[trying[inside]], share * radius[trying[inside]])
-            trying = trying[~good]
-            radius[trying] *= SHRINK
-            lost = radius[trying] < SMALLEST
-            radius[trying[lost]] = 0.0
-            trying = trying[~lost]
-        return radius
+        """Radii of the balls."""
+        around = self.around(which)
 
-    def _decays(self, which: Array, radius: Array) -> Array:
-        """True where V falls at least `MARGIN` times as fast as linearly, everywhere on a shell."""
+        def falls(some: Array, size: Array) -> Array:
+            q = around[some] * size[:, None, None]
+            return self._falls(which[some], q, 2 * q)
+
+        return _largest(np.full(len(which), LARGEST), np.full(len(which), SMALLEST), falls)
+
+    def _falls(self, which: Array, q: Array, gradient: Array) -> Array:
+        """True (k,) where V falls at least `MARGIN` times as fast as |q|² does linearly, at all q (k, d, n)."""
         rest = self.rest.part(which)
-        q = self.around(which) * radius[:, None, None]
         away = np.einsum("kij,kdj->kdi", self.basis[which], q)
         rates, velocity = motion_at(rest, rest.state[:, None, :] + rest.scales[:, None, :] * away)
-        with np.errstate(all="ignore"):
-            back = np.einsum("kij,kdj->kdi", self.inverse[which], rates / rest.scales[:, None, :])
         linear = np.einsum("kij,kdj->kdi", self.inverse[which] @ rest.matrix @ self.basis[which], q)
         with np.errstate(all="ignore"):
-            slope, asked = np.sum(q * back, axis=2), MARGIN * np.sum(q * linear, axis=2)
+            back = np.einsum("kij,kdj->kdi", self.inverse[which], rates / rest.scales[:, None, :])
+            slope, asked = np.sum(gradient * back, axis=2), 2 * MARGIN * np.sum(q * linear, axis=2)
             return np.asarray(np.all((slope < asked) & (velocity > 0), axis=1))
+
+
+def _largest(start: Array, least: Array, falls: Callable[[Array, Array], Array]) -> Array:
+    """Largest sizes (m,) of shells on and inside which V falls, among those that shrink from `start`.
+
+    `falls` says so of some of the m, and of their sizes. Zero where none is as large as `least`.
+    """
+    size = start.copy()
+    trying = np.flatnonzero(size > 0)
+    while len(trying):
+        good = falls(trying, size[trying])
+        for share in INNER:
+            inside = np.flatnonzero(good)
+            if len(inside):
+                good[inside] = falls(trying[inside], share * size[trying[inside]])
+        trying = trying[~good]
+        size[trying] *= SHRINK
+        lost = size[trying] < least[trying]
+        size[trying[lost]] = 0.0
+        trying = trying[~lost]
+    return size
 
 
 def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:

@@ -41,11 +41,12 @@ from steadyslip.nonlinear.kicks.spans import (
 )
 
 Array = np.ndarray
-MOST_STEPS = 400_000  # integration steps, times the effort, after which a motion is undecided
+MOST_STEPS = 2_000_000  # integration steps, times the effort, after which a motion is undecided
 EARLY, HALFWAY = (
     0.05,
     0.4,
 )  # share of the time allowed after which longer cycles are looked for; where sliding is stable
+AT_ONCE = 1e-12  # share of the first span after which nothing has moved yet
 ALIKE = 1e-2  # relative change of the time between slip events below which a cycle is searched for
 PEAKS = 40  # velocity peaks in the last span that irregular motion must have,
 HIGHER = 0.01  # share of ln(velocity/drive) by which these may exceed all before,
@@ -121,6 +122,8 @@ class _Course:
 
     def run(self, advanced: Callable[[int], None] | None) -> Array:
         """Simulate until every motion has an outcome; indices into `OUTCOMES`, (m,)."""
+        if not self.started:
+            self._return_at_once()
         open_ = np.flatnonzero(self.found == OPEN)
         while len(open_):
             before = self.begun[open_]
@@ -139,6 +142,14 @@ class _Course:
             rest = np.maximum(self.most[open_] - self.elapsed[open_], 0.1 * self.span[open_])
             self.span[open_] = np.minimum(2 * self.span[open_], rest)
         return self.found
+
+    def _return_at_once(self) -> None:
+        """Record the motions that begin in the neighbourhood of steady sliding."""
+        which = np.arange(len(self.found))
+        begun = advanced_runs(self.runs, which, None, AT_ONCE * self.span, False, self.threads)
+        near = which[begun.status == CODE["done"]]
+        near = near[self.runs.rest.stable[near]]
+        self.found[near[self.runs.near.holds(near, begun.state[near])]] = RETURNS
 
     def _advanced(self, open_: Array) -> SpanResults:
         """Simulate one span of some motions, grouped by method and by first span or later."""

@@ -9,8 +9,7 @@ point that does not come back nearer, every motion returns: orbits on a surface 
 farther form a band through which everything in it is carried outwards; if motion from one turn's worth of points at its
 outer end comes to the same, so does all that is in the band.
 
-Elsewhere distances after one turn are compared on whole shells |q| = R. Inside the largest ball on all of whose shells
-the distance falls, every motion returns; nothing is said of motion outside.
+Elsewhere nothing is said; the `neighbourhood` reaches far there.
 """
 
 from __future__ import annotations
@@ -68,11 +67,9 @@ class Shells:
         group = self.runs.group[which]
         self._ask(np.unique(group))
         useful = (self.inner[group] > 0) | (self.band[group, 0] < self.band[group, 1])
-        away = self.runs.near.distance(which, states)
-        flat = self.flat[group]
-        away[flat & ~useful] = np.inf
-        if (flat & useful).any():
-            away[flat & useful] = self._on_ray(which[flat & useful], states[flat & useful])
+        away = np.full(len(which), np.inf)
+        if useful.any():
+            away[useful] = self._on_ray(which[useful], states[useful])
         found = np.where(away < self.inner[group], RETURNS, OPEN)
         inside = (away > self.band[group, 0]) & (away < self.band[group, 1])
         for one in np.unique(group[inside & ~self.fate_known[group]]):  # costly: only where a motion is
@@ -87,14 +84,13 @@ class Shells:
         leading = rest.leading[group]
         with np.errstate(invalid="ignore"):
             slow = rest.stable[group] & (np.abs(leading.real) < SLOW * np.abs(leading.imag))
-        group = group[slow]
+        group = group[slow & self.flat[group]]
         group = group[near.computed(group) > 0]
-        for part in (group[self.flat[group]], group[~self.flat[group]]):
-            if len(part):
-                self._compute(part)
+        if len(group):
+            self._compute(group)
 
     def _compute(self, group: Array) -> None:
-        """Ball and band of a group of equal rigs, on a two-dimensional surface or not."""
+        """Ball and band of some of the rigs."""
         near, leading = self.runs.near, self.runs.rest.leading[group]
         with np.errstate(divide="ignore"):
             blurred = NOISE * self.runs.jobs.options.rtol * np.abs(leading.imag / (2 * np.pi * leading.real))
@@ -116,34 +112,25 @@ class Shells:
             inner, nearer, to = _drifts(fine, falls, rises)
             begin = np.where(to == fine[:, -1], nearer, begin)
         self.inner[group] = inner
-        if self.flat[group[0]]:
-            self.band[group] = np.column_stack([begin, end])
+        self.band[group] = np.column_stack([begin, end])
 
     def _drift(self, group: Array, radii: Array) -> tuple[Array, Array]:
-        """True where distances fall, and where they rise, over a turn from radii (k, r)."""
+        """True where distances fall, and where they rise, over a turn from radii (k, r) on the ray."""
         rest, near = self.runs.rest, self.runs.near
         n = rest.state.shape[1]
-        flat = self.flat[group[0]]
-        around = np.eye(n)[None, :1] if flat else near.around(group)[:, ::3]
-        q = radii[:, :, None, None] * around[:, None]
-        away = np.einsum("kij,krdj->krdi", near.basis[group], q)
-        states = (rest.state[group][:, None, None] + rest.scales[group][:, None, None] * away).reshape(-1, n)
+        away = radii[:, :, None] * near.basis[group][:, None, :, 0]
+        states = (rest.state[group][:, None] + rest.scales[group][:, None] * away).reshape(-1, n)
         turn = 2 * np.pi / np.abs(rest.leading[group].imag)
-        lane = np.repeat(group, radii.shape[1] * around.shape[1])
-        each = np.repeat(turn, radii.shape[1] * around.shape[1])
-        begin = np.broadcast_to(radii[:, :, None], q.shape[:3])
-        if flat:
-            end, states = self._to_ray(lane, states, each)
-            if n > 2:  # on the surface now
-                begin = end.reshape(q.shape[:3])
-                end, _ = self._to_ray(lane, states, each)
-        else:
-            ended = advanced_runs(self.runs, lane, states, each, False, self.threads)
-            end = near.distance(lane, ended.state)
-        least = SHARE * np.abs(rest.leading[group].real * turn)[:, None, None]
+        lane, each = np.repeat(group, radii.shape[1]), np.repeat(turn, radii.shape[1])
+        begin = radii.ravel()
+        end, states = self._to_ray(lane, states, each)
+        if n > 2:  # on the surface now
+            begin = end
+            end, _ = self._to_ray(lane, states, each)
+        least = SHARE * np.abs(rest.leading[group].real * turn)[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            change = np.log(end.reshape(q.shape[:3]) / begin)
-        return np.all(change < -least, axis=2), np.all(change > least, axis=2)
+            change = np.log(end / begin).reshape(radii.shape)
+        return change < -least, change > least
 
     def _to_ray(self, which: Array, states: Array, guess: Array) -> tuple[Array, Array]:
         """Times at which runs from `states` (k, n) meet the ray, near those guessed (k,), and the states there.

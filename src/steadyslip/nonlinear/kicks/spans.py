@@ -41,7 +41,8 @@ STIFF = "rodas4"  # method for stiff motions, and for those for which the explic
 LOADING = 40.0  # smallest advance of the load point, natural lengths, to take up what a kick has released,
 TURNS = 3.0  # natural periods,
 DECAYS = 6.0  # and decay times in the first span of a run; each span is twice as long as the one before
-MOST_TURNS = 1000.0  # natural periods, and
+MOST_TURNS = 1000.0  # natural periods,
+MOST_DECAYS = 20.0  # decay times, and
 MOST_LOADING = 4000.0  # natural lengths after which a motion is undecided
 RELOAD = 1.5  # factor on the time in which the load point catches up with the block, without motion to wait for
 NEUTRAL_TURNS = 100.0  # natural periods of bounded motion that count as a return where sliding is neutrally stable
@@ -110,12 +111,11 @@ class MotionBatch:
         with np.errstate(all="ignore"):
             turn = 2 * np.pi / np.abs(leading)
             turn = np.where(np.isfinite(turn), turn, 0.0)
-            decays = np.where(rest.stable, DECAYS / np.abs(leading.real), 0.0)
-            decays = np.minimum(np.where(np.isfinite(decays), decays, 0.0), 0.1 * MOST_TURNS * turn)
-        first = reload + LOADING * unit + TURNS * turn + decays
-        turns = np.where(rest.neutral, NEUTRAL_TURNS, self.effort * MOST_TURNS)
+            decay = np.where(rest.stable & ~rest.neutral, 1 / np.abs(leading.real), 0.0)
+        first = reload + LOADING * unit + TURNS * turn + np.minimum(DECAYS * decay, 0.1 * MOST_TURNS * turn)
+        turns = np.where(rest.neutral, NEUTRAL_TURNS * turn, np.maximum(MOST_TURNS * turn, MOST_DECAYS * decay))
         loading = np.where(rest.neutral, LOADING, self.effort * MOST_LOADING)
-        return first, reload + loading * unit + turns * turn
+        return first, reload + loading * unit + turns * np.where(rest.neutral, 1.0, self.effort)
 
     def reload(self, which: Array, states: Array) -> Array:
         """Time, s, that the load point needs to catch up with blocks far from where they would slide, (k,)."""

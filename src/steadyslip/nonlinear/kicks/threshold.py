@@ -33,7 +33,7 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
 
 Array = np.ndarray
-COARSE = 240  # sizes in the first scan of a single rig
+COARSE = 192  # sizes in the first scan of a single rig
 BLOCK = 48  # sizes simulated at a time
 FINE = 47  # sizes between the ends of a bracket in each round of narrowing
 STEPS = 1e9  # integration steps for all motions of one threshold
@@ -52,7 +52,7 @@ class Threshold(Displayed):
     size : float
         Smallest kick that does not return, without unit: ln(new/old velocity), natural lengths, share of the steady
         normal stress, or change of velocity over the drive's. 0 if steady sliding is unstable, inf if every
-        kick in the range searched returns, NaN if nothing in it is known to fail and not all is known to return.
+        kick up to `searched` returns, NaN if nothing in it is known to fail and not all is known to return.
     bracket : tuple of float
         Sizes of the largest kick up to which all that were tried return, and of the smallest known not to.
     amount : float
@@ -111,7 +111,8 @@ class Threshold(Displayed):
         if self.size == 0:
             return f"{what}: none survived, steady sliding is unstable"
         if np.isinf(self.size):
-            return f"{what}: none is large enough, up to {self.searched:.4g} (size without unit)"
+            most = format_quantity(self.survived, self.unit, 4, self.area)
+            return f"{what}: none is large enough, up to {most} (size {self.searched:.4g})"
         if self.interrupted and low == 0 and np.isnan(self.size):
             return f"{what}: stopped before anything was found"
         if np.isnan(self.size):
@@ -164,6 +165,7 @@ class Threshold(Displayed):
     kick=NAME,
     reference=NAME,
     direction=SIGN,
+    up_to=finite(0),
 )
 def threshold(
     rig: Slider | Machine,
@@ -172,6 +174,7 @@ def threshold(
     at: str | None = None,
     direction: int = 1,
     reference: str = "before",
+    up_to: float | None = None,
     precision: float = 1e-8,
     rtol: float | None = None,
     branch: int = 0,
@@ -194,6 +197,9 @@ def threshold(
     reference : str, optional
         For ``velocity``: whether the rig's drive is the velocity ``before`` or ``after`` the step. After is right
         for comparing with results that take normal stress and critical stiffness at the new velocity.
+    up_to : float, optional
+        Largest size that is searched, without unit like `Threshold.size`. Unless given it is 1e4 times the velocity
+        (of the drive, or of the body that gets the blow), 1e5 natural lengths, or 10 times the normal force or stress.
     precision : float, optional
         Relative width of the bracket.
     rtol : float, optional
@@ -236,7 +242,7 @@ def threshold(
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
     steady_states(rig)  # raises, and says why
-    kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol, at)
+    kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol, at, up_to)
     if not kicked.exists[0]:
         raise out_of_range_error(kicked.jobs.point)
     if not kicked.stable[0]:

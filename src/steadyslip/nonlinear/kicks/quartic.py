@@ -1,0 +1,168 @@
+"""Cubic and quartic terms of a Lyapunov function of stable steady sliding, from the Taylor series of the rates.
+
+In complex modes z' = Λ z + N2(z) + N3(z) + ..., V2 = |q|² falls as far as Λ goes. What N2 and N3 add to its slope V3
+and V4 take up: along the linear motion a monomial z^m changes at the rate m·λ, by which what it is to cancel is divided
+(the homological equation of Poincaré's normal form). Where m·λ is small, as of (z z̄)² of a mode that rings, it stays.
+
+Derivatives of the rates are differences of their Jacobian, and the terms have no error bounds: whether V falls is asked
+of the full rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations, permutations
+from math import factorial
+
+import numpy as np
+
+from steadyslip.nonlinear.kicks.field import slopes_at, solved_at
+from steadyslip.nonlinear.kicks.rest import Rest
+
+Array = np.ndarray
+STEP = 6e-3  # of differences, in natural sizes: the formulas' error, its fourth power, is near that of rounding
+PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # in steps, and the weights of the first and second derivative
+FIRST = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+SECOND = np.array([-1.0, 16.0, 16.0, -1.0]) / 12.0
+REACH = 8.0  # distance |q| beyond which V is not asked for
+BISECTIONS = 24  # of that range
+RESONANT = 0.1  # |m·λ|, as a share of the sum of the |λ|, below which a term is left
+
+
+def terms(rest: Rest, basis: Array, inverse: Array) -> tuple[Array, Array]:
+    """Symmetric coefficients of V3 (m, n, n, n) and V4 (m, n, n, n, n) in coordinates q, where V2 = |q|².
+
+    `basis` and `inverse` (m, n, n) are the real modes, as of `neighbourhood.modes`.
+    """
+    roots, vectors = np.linalg.eig(inverse @ rest.matrix @ basis)
+    back = np.linalg.inv(vectors)
+    second, third = _curved(rest, basis)
+    second = _times(back @ inverse, _in(second, vectors, 2)) / 2
+    third = _times(back @ inverse, _in(third, vectors, 3)) / 6
+    metric = np.swapaxes(vectors, 1, 2) @ vectors  # of q·q in z
+    v3 = _cancelling(2 * _times(metric, second), roots)
+    slope = 2 * _times(metric, third) + 3 * np.einsum("mija,makl->mijkl", v3, second)
+    v4 = _cancelling(slope, roots)
+    return _in(v3, back, 3).real, _in(v4, back, 4).real
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """V = ρ² + a3 ρ³ + a4 ρ⁴ and its gradient along rays ρ d from steady sliding, arrays (m, d) and (m, d, n).
+
+    V is trusted up to its first maximum on a ray.
+    """
+
+    way: Array
+    gradient3: Array
+    gradient4: Array
+
+    @classmethod
+    def along(cls, way: Array, v3: Array, v4: Array) -> Rays:
+        """Rays along unit vectors (m, d, n), from the forms of `terms`."""
+        count, rays, n = way.shape
+        twice = (way[..., :, None] * way[..., None, :]).reshape(count, rays, -1)
+        thrice = (twice[..., :, None] * way[..., None, :]).reshape(count, rays, -1)
+        forms = (3 * v3.reshape(count, n, -1), 4 * v4.reshape(count, n, -1))
+        return cls(way, *(own @ form.swapaxes(1, 2) for own, form in zip((twice, thrice), forms, strict=True)))
+
+    def part(self, which: Array) -> Rays:
+        """Rays of some of the rigs."""
+        return Rays(self.way[which], self.gradient3[which], self.gradient4[which])
+
+    @cached_property
+    def cubic(self) -> Array:
+        """a3."""
+        return np.asarray(np.sum(self.gradient3 * self.way, axis=2) / 3)
+
+    @cached_property
+    def quartic(self) -> Array:
+        """a4."""
+        return np.asarray(np.sum(self.gradient4 * self.way, axis=2) / 4)
+
+    @cached_property
+    def farthest(self) -> Array:
+        """ρ of the first maximum; inf without one."""
+        with np.errstate(all="ignore"):
+            under = 9 * self.cubic**2 - 32 * self.quartic
+            below = -3 * self.cubic + np.sqrt(under)
+            return np.where((under >= 0) & (below > 0), 4 / below, np.inf)
+
+    def value(self, rho: Array) -> Array:
+        """V at distances (m, d)."""
+        return np.asarray(rho**2 * (1 + rho * (self.cubic + rho * self.quartic)))
+
+    def gradient(self, rho: Array) -> Array:
+        """Gradient of V at distances (m, d)."""
+        rho = rho[..., None]
+        return np.asarray(rho * (2 * self.way + rho * (self.gradient3 + rho * self.gradient4)))
+
+    def distance(self, level: Array) -> Array:
+        """ρ at which V reaches levels (m,); NaN where it does not within `REACH`."""
+        level = level[:, None]
+        low, high = np.zeros(self.cubic.shape), np.minimum(self.farthest, REACH)
+        met = self.value(high) >= level
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            above = self.value(middle) >= level
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        return np.where(met, high, np.nan)
+
+
+def _cancelling(slope: Array, roots: Array) -> Array:
+    """Form (m, n, ..., n) whose slope along the linear motion cancels another, but for resonant terms."""
+    order, even = slope.ndim - 1, np.zeros_like(slope)
+    rates, sizes = np.zeros_like(slope), np.zeros(slope.shape)
+    for k in range(order):
+        own = roots.reshape(len(roots), *(-1 if i == k else 1 for i in range(order)))
+        rates, sizes = rates + own, sizes + np.abs(own)
+    for places in permutations(range(1, order + 1)):
+        even += slope.transpose(0, *places) / factorial(order)
+    with np.errstate(all="ignore"):
+        return np.where(np.abs(rates) > RESONANT * sizes, -even / rates, 0.0)
+
+
+def _curved(rest: Rest, basis: Array) -> tuple[Array, Array]:
+    """Second and third derivatives of the rates in natural sizes, (m, n, n, n) and (m, n, n, n, n), along `basis`."""
+    count, n = rest.state.shape
+    pairs = list(combinations(range(n), 2))
+    sizes = np.max(np.abs(basis), axis=1)  # (m, n)
+    even = basis / sizes[:, None, :]
+    ways = [even[:, :, k] for k in range(n)] + [(even[:, :, k] + even[:, :, i]) for k, i in pairs]
+    away = STEP * PLACES[None, None, :, None] * np.stack(ways, axis=1)[:, :, None, :]  # (m, ways, places, n)
+    away = np.concatenate([np.zeros((count, 1, n)), away.reshape(count, -1, n)], axis=1)
+    states = rest.state[:, None, :] + rest.scales[:, None, :] * away
+    unknowns = solved_at(rest, states)[2]
+    lane = np.repeat(np.arange(count), states.shape[1])
+    inputs = rest.velocity[lane], rest.force[lane], rest.pressure[lane]
+    with np.errstate(all="ignore"):
+        slopes = slopes_at(
+            rest.reduction, rest.point.part(lane), inputs, states.reshape(-1, n),
+            unknowns.reshape(len(lane), -1), rest.scales[lane],
+        ).reshape(count, -1, n, n)  # fmt: skip
+    middle, beside = slopes[:, :1], slopes[:, 1:].reshape(count, -1, len(PLACES), n, n)
+    first = np.einsum("p,mwpij->mwij", FIRST, beside[:, :n]) / STEP
+    bent = np.einsum("p,mwpij->mwij", SECOND, beside - middle[:, :, None]) / STEP**2
+    third = np.zeros((count, n, n, n, n))
+    for k in range(n):
+        third[:, k, k] = bent[:, k]
+    for way, (k, i) in enumerate(pairs):
+        third[:, k, i] = third[:, i, k] = 0.5 * (bent[:, n + way] - bent[:, k] - bent[:, i])
+    third = np.einsum("mk,mi,mkirj->mrkij", sizes, sizes, third)
+    second = np.einsum("mk,mkrj->mrkj", sizes, first)
+    return _in(second, basis, 1), _in(third, basis, 1)
+
+
+def _times(matrix: Array, form: Array) -> Array:
+    """Matrices (m, n, n) times the first index of forms (m, n, ..., n)."""
+    return np.asarray((matrix @ form.reshape(*form.shape[:2], -1)).reshape(form.shape))
+
+
+def _in(form: Array, matrix: Array, count: int) -> Array:
+    """Forms with their last `count` indices, in which they are symmetric, in other coordinates: old = `matrix` new."""
+    for _ in range(count):
+        form = np.moveaxis(
+            _times(np.swapaxes(matrix, 1, 2), np.moveaxis(form, -1, 1)), 1, form.ndim - count
+        )  # fmt: skip
+    return form

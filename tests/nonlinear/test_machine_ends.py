@@ -146,3 +146,13 @@ def test_contacts_that_a_dashpot_joins_run_away_together(to):
     fastest = max(run[f"{name}.slip_rate"][-1] for name in ("first", "second"))
     assert run[f"{run.contact}.slip_rate"][-1] == pytest.approx(fastest, rel=1e-12)  # they are alike to rounding
     assert min(run[f"{name}.slip_rate"][-1] for name in ("first", "second")) > 1e9
+
+
+@pytest.mark.campaign
+def test_a_branch_that_grows_without_bound_ends_where_large_motions_are_undamped():
+    """The telescope's bearing is viscous at large velocities: its peaks grow like one over the distance from there."""
+    found = ss.cycles(ss.read_rig(EXAMPLES / "telescope.toml"), "drive.kp", doublings=0)
+    assert found.end.startswith("the cycles grow without bound")
+    *_, a, b, c = found.cycles
+    nearer = [1 / a.peak_velocity - 1 / b.peak_velocity, 1 / b.peak_velocity - 1 / c.peak_velocity]
+    assert c.value - b.value == pytest.approx((b.value - a.value) * nearer[1] / nearer[0], rel=0.01)

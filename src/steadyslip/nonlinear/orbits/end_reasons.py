@@ -23,11 +23,14 @@ RETRACED = 4  # consecutive cycles between known neighbours after which the bran
 TOO_UNSTABLE = 1e8  # growth in a period: half the digits of floating point are lost in one
 SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
 LARGE = 1e6  # peak velocity, in units of the drive's, beyond which a cycle grows without bound
+STILL = 1e-3  # relative change of value and period, as a share of the peak's, below which they stand still
 ENDS = {
     "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the {block} a mass or {damping} to "
     "follow the cycles further",
     "unbounded": "blow-up: the peak velocity grows without bound as the cycle nears the motions of the massless model "
     "that reach infinite velocity; give the {block} a mass or {damping} to follow the cycles further",
+    "large": "the cycles grow without bound while parameter and period stand still: at large velocities the motion is "
+    "linear, and undamped at this value",
     "growth": "the cycle is too unstable to matter: deviations grow 1e8-fold in each period",
     "contact lost": "contact lost: the normal {force} falls to zero in the cycle",
     "stuck": "the equations have no solution in part of the cycle",
@@ -78,6 +81,9 @@ class EndRules:
             return self.words("unbounded"), True
         longer = np.log(cycle.period / before.cycle.period)
         further = abs(cycle.value - before.cycle.value) / (abs(before.cycle.value) or 1.0)
+        grown = np.log(cycle.peak_velocity / before.cycle.peak_velocity)
+        if fast and bounded and max(further, abs(longer)) < STILL * grown:
+            return ENDS["large"], True
         if cycle.period > 1e3 * first.cycle.period and longer > 1e3 * further:
             return ENDS["runs away"], True
         return "", True

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from lab_records import STEP, columns, record, rig, stepped, two_states
+from lab_records import STEP, STIFFNESS, columns, record, rig, stepped, two_states
 
 TRUE_LEVEL = -0.0035
 
@@ -84,3 +84,24 @@ def test_without_a_displacement_the_rate_is_asked_for_and_named():
     text = " ".join(str(fit).split())
     assert "the protocol that was given, from 3 um/s on" in text
     assert "taken to move at 3 um/s (drive.velocity)" in text
+
+
+def test_derived_numbers_have_intervals_and_b_less_a_is_the_negative():
+    fit = stepped()
+    own, negative = fit["a - b"], fit["b - a"]
+    assert (negative.value, negative.low, negative.high) == (-own.value, -own.high, -own.low)
+    for name in ("a - b", "k_c", "k/k_c"):
+        one, narrow = fit[name], fit.interval(name, 0.68)
+        assert fit.interval(name) == pytest.approx((one.low, one.high))
+        assert one.low < narrow[0] < one.value < narrow[1] < one.high
+    assert fit.interval("b-a") == pytest.approx((negative.low, negative.high))
+    with pytest.raises(ss.ParameterError, match="level"):
+        fit.interval("a - b", 1.5)
+
+
+@pytest.mark.parametrize(
+    ("calibrated", "said"), [(0.5, "early or a servo that overshoots"), (2.0, "late or a servo that")]
+)
+def test_a_calibration_is_told_what_makes_the_stiffness_so(calibrated, said):
+    fit = ss.fit(ss.lab_rig(), record(rig(), STEP, count=300), starts=2, calibrated=calibrated * STIFFNESS)
+    assert f"a channel that comes {said}" in " ".join(str(fit).split())

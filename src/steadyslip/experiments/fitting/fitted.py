@@ -97,17 +97,21 @@ class Fitted(ReadOnly):
         level : float
             Probability, such as 0.95.
         """
-        from scipy.stats import t
-
-        if not 0 < level < 1:
-            raise ParameterError([Problem("level", f"got {level!r}; allowed: a number between 0 and 1")])
         i = self.index(name)
-        reach = float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1))) * float(np.sqrt(self.covariance[i, i]))
+        reach = self._reach(level) * float(np.sqrt(self.covariance[i, i]))
         one = self.space.unknowns[i]
         if not np.isfinite(reach):
             return one.low, one.high
         low, high = (float(one.value(self.coordinates[i] + sign * reach)) for sign in (-1, 1))
         return max(low, one.low), min(high, one.high)
+
+    def _reach(self, level: float) -> float:
+        """Standard deviations to the end of an interval."""
+        from scipy.stats import t
+
+        if not 0 < level < 1:
+            raise ParameterError([Problem("level", f"got {level!r}; allowed: a number between 0 and 1")])
+        return float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1)))
 
     def index(self, name: str) -> int:
         """Index of a parameter; leading parts of its name may be left out."""

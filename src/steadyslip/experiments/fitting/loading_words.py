@@ -140,8 +140,9 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
 def _off_calibration(fit: FitNumbers) -> list[str]:
     """Warning on a fitted stiffness that differs from the calibrated one by more than both are uncertain."""
     return [
-        f"the fitted stiffness is {one.value:.3g} of the calibrated one ({one.range()}): a channel that comes late "
-        "(lag = true), a servo or a clipped peak makes that; where the calibration holds, name the stiffness in fixed"
+        f"the fitted stiffness is {one.value:.3g} of the calibrated one ({one.range()}): a channel that comes "
+        f"{'late or a servo that lags' if one.value < 1 else 'early or a servo that overshoots'} may make "
+        "that (lag = true); where the calibration holds, name the stiffness in fixed"
         for one in fit.derived
         if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
     ]

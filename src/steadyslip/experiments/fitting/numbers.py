@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -21,6 +22,8 @@ from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 
+DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a less all b, or its negative
+
 
 @dataclass(frozen=True, eq=False)
 class FitNumbers(Fitted):  # noqa: D101 -- its base has it
@@ -33,12 +36,29 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return self.plan.comparison()
 
     def __getitem__(self, name: str) -> Estimate:
-        """Estimate of a parameter, or of what follows from them (`derived`)."""
-        if name.partition("@")[0] in DERIVED:
-            for one in self.derived:
-                if one.name == name:
-                    return one
-        return super().__getitem__(name)
+        """Estimate of a parameter, or of what follows from them (`derived`); ``b - a`` is the negative of ``a - b``."""
+        return self._derived(name) or super().__getitem__(name)
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Confidence interval of a parameter, or of what follows from them, in SI units; see `Fitted.interval`."""
+        if (one := self._derived(name)) is None:
+            return super().interval(name, level)
+        share = self._reach(level) / self._reach(0.95)
+        low, high = ((end / one.value) ** share * one.value if DIFFERENCE.search(name) is None else
+                     one.value + share * (end - one.value) for end in (one.low, one.high))  # fmt: skip
+        return low, high
+
+    def _derived(self, name: str) -> Estimate | None:
+        """What follows from the parameters, by its name; None for another name."""
+        found = DIFFERENCE.sub("a - b", name)
+        own = (
+            next((one for one in self.derived if one.name == found), None)
+            if found.partition("@")[0] in DERIVED
+            else None
+        )
+        if own is None or not name.lstrip().startswith("b"):
+            return own
+        return replace(own, name=name, value=-own.value, low=-own.high, high=-own.low)
 
     @property
     def rms(self) -> float:

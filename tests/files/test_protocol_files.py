@@ -110,7 +110,6 @@ def test_all_problems_of_rig_and_protocol_at_once():
         "friction.a": (None, "got -1"),
         "protocol.pieces.1.at": (start + 5, "wrong dimension"),
         "protocol.pieces.2.kind": (start + 8, "did you mean 'normal-stress-table'?"),
-        "protocol.pieces.3.duration": (start + 11, "missing (duration of the hold)"),
         "protocol.pieces.3.durration": (start + 14, "did you mean 'duration'?"),
         "protocol.pieces.4.kind": (start + 15, "missing; allowed: velocity-step"),
     }

@@ -78,6 +78,48 @@ def test_lag_and_overshoot_are_found(lag, beyond, total):
             assert course.at(np.array([at - 5, at + 15]))[1] == pytest.approx(change.after, rel=1e-9)
 
 
+@pytest.mark.parametrize("sensor", [1e-9, 1e-8])
+@pytest.mark.parametrize(("lag", "beyond", "total"), [(0.3, 0.0, 0.3), (0.75, 0.35, 0.0374)])
+def test_fine_sensors_show_a_servo_and_no_slips(lag, beyond, total, sensor):
+    """What lines take for rates and levels of the sensor is the response: steps with eleven slips were found."""
+    course = load_course(*displacement(5, lag, beyond, sensor, 50))
+    assert [change.lag for change in course.changes] == pytest.approx([total, total], rel=0.05)
+    assert course.levels == pytest.approx([1e-6, 1e-5, 1e-6], rel=1e-4)
+    assert course.slips == 0
+
+
+def along_steps(lag, seed, sensor, steps, until):
+    """Displacement of a first-order servo that follows `steps` (time, rate), by the exact response to each."""
+    time, place, before = np.arange(0, until, 0.05), 0.0, 1e-6
+    place = before * time
+    for at, to in steps:
+        since = np.maximum(time - at, 0.0)
+        place = place + (to - before) * (since + lag * np.expm1(-since / lag))
+        before = to
+    return time, place + sensor * np.random.default_rng(seed).standard_normal(len(time))
+
+
+FIVE = ((30, 1e-5), (45, 3e-6), (70, 1e-6), (110, 3e-5), (116, 1e-6))
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_rates_between_late_changes_are_those_of_the_command(seed):
+    """Between changes a few lags apart lines were drawn through the response: 2.992 um/s for 3, lag 547 ms for 500."""
+    course = load_course(*along_steps(0.5, seed, 1e-7, FIVE, 160.0))
+    assert [change.time for change in course.changes] == pytest.approx([at for at, _ in FIVE], abs=0.06)
+    assert [change.lag for change in course.changes] == pytest.approx(5 * [0.5], rel=0.15)
+    for k, (_, rate) in enumerate(FIVE, start=1):
+        assert abs(course.levels[k] - rate) < 5 * course.errors[k]
+
+
+@pytest.mark.parametrize("seed", [3004, 3005, 3006])
+def test_the_overshoot_of_a_single_step_is_found(seed):
+    """A coarse sensor and a short record: in 6 of 20 a step with a slip of the sensor was found."""
+    time, moved = displacement(seed, 1.5, 0.25, 1e-7, 25)
+    (change,) = load_course(time[time < 55], moved[time < 55]).changes
+    assert overshoot(change.damping) == pytest.approx(0.25, abs=0.06)
+
+
 @cache
 def fitted(law, lag, beyond, seed):
     found, source = record(seed, lag, beyond, getattr(ss.laws, law.title())())

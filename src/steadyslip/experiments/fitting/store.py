@@ -29,7 +29,7 @@ from steadyslip.experiments.numerics.smoothing import Smooth
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 8, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 9, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 RESULT_ATTRIBUTES = {"ssq": float, "search": str, "unidentified": str, "noise": str, "steadyslip": str}
 ATTRIBUTES = RESULT_ATTRIBUTES | dict.fromkeys(("rig", "options", "records", "loading", "refits"), str)
 _OPTIONS = {
@@ -38,7 +38,8 @@ _OPTIONS = {
     "calibrated": {float, None}, "rtol": float,
 }  # fmt: skip
 _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
-_COURSE = (float, [{(float,) * 8, (float,) * len(fields(Change))}], [float], [_CURVE], float, int, int, int, int)
+_CHANGE = {(float,) * 8, (float,) * len(fields(Change))}
+_COURSE = (float, [_CHANGE], [float], [_CURVE], float, int, int, int, int, [(float, float)])
 _COLUMNS = (*ROLES, "worth")
 RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
@@ -238,7 +239,7 @@ def _loading_to_json(loading: Loading | None) -> Any:
 def _course_to_json(course: Course) -> list[Any]:
     changes = [list(astuple(change)) for change in course.changes]
     return [course.first, changes, list(course.errors), _curves_to_json(course.curve), course.strays, course.slips,
-            course.glitches, course.early, course.late]  # fmt: skip
+            course.glitches, course.early, course.late, [list(one) for one in course.servos]]  # fmt: skip
 
 
 def _curves_to_json(curve: Any) -> list[Any]:
@@ -259,12 +260,13 @@ def _loading_from_json(table: ExpectedTable, written: list[Any]) -> Loading | No
 
 
 def _course_from_json(one: list[Any]) -> Course:
-    first, changes, errors, curves, *rest = one
+    first, changes, errors, curves, *rest, servos = one
     own = [(ends, Smooth.from_parts(*parts)) for ends, *parts in curves]
     curve: Any = None
     if own:
         curve = JoinedCurves([(*ends, smooth) for ends, smooth in own]) if own[0][0] else own[0][1]
-    return Course(first, tuple(Change(*change) for change in changes), np.array(errors), curve, *rest)
+    course = Course(first, tuple(Change(*change) for change in changes), np.array(errors), curve, *rest)
+    return replace(course, servos=tuple((lag, damping) for lag, damping in servos))
 
 
 def _record(

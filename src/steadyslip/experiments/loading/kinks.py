@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from copy import copy
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -12,9 +12,9 @@ from scipy.optimize import minimize_scalar
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import REST_SHARE, reversed_column, samples_off_line
+from steadyslip.experiments.loading.following import Kinks, followed
 from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
-from steadyslip.experiments.loading.servo import GAIN, fitted_servo, settling, travel
 from steadyslip.experiments.numerics.noise import Noise, describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
@@ -29,13 +29,11 @@ SLOW = 0.02  # share of the highest rate up to which a rate may be a hold, if th
 MOST_CHANGES = 40  # more changes than this, or
 MOST_BETWEEN = 0.35  # a larger share of the time between runs, and the loading is not piecewise linear; chosen by trial
 ENOUGH_SAMPLES = 30  # samples that determine their own noise; chosen by trial
-LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which nothing else changes; chosen by trial
-LEFT = 4.0  # standard errors by which the mean misfit around a change may be above that of normal noise, which is 0.83
-AROUND = 3.0  # times in which a servo settles that count as around a change
+BRIEF_RUN = 0.3  # share of a run beside it that a run lasts which may be a part of a servo's response; by trial
+MOST_BRIEF = 4  # such runs that are left out, the shortest first: more would be too many for one record
 LAG_ERROR = 0.1  # of a servo, relative, by which the time of its command is uncertain too
-NEAR = 30.0  # samples on each side of a change that are kept one by one where a servo is looked for
-PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
 LASTING = 2.0  # samples per independent sample from which correlation is taken into account where runs are found
+EXACTLY = 1e-9  # share of a column's range below which deviations are rounding
 EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
 
 
@@ -56,34 +54,91 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
         if _piecewise_linear(others := straight_runs(time, displacement, lasting), time):
             runs = others
             strays, errors, inflation = _errors(runs, time, displacement)
-    rates = np.array([run.rate for run in runs])
+    kinks = _kinks(time, displacement, runs, strays, errors, inflation)
+    servo = None
+    if any(one.tells for one in kinks):
+        durations = np.array([one.ramp[0] if one.tells else 0.0 for one in kinks])
+        noise = max(float(np.median(strays)), EXACTLY * float(np.ptp(displacement)))
+        some = {len(fewer) - 1: fewer for fewer in _without_brief(runs, time)}
+        ways = (replace(_as_lines(time, fewer), durations=durations[:n]) for n, fewer in some.items())
+        best = followed(time - time[0], displacement, noise, ways)
+        servo = best if best.lag else None
+        if len(best.times) < len(kinks):
+            runs = some[len(best.times)]
+            strays, errors, inflation = _errors(runs, time, displacement)
+            kinks = _kinks(time, displacement, runs, strays, errors, inflation)
+    rates = np.array([run.rate for run in runs]) if servo is None else servo.rates
+    rest = _at_rest(rates, runs, errors, time, displacement)
+    rates = np.where(rest, 0.0, rates)
+    levels = list(pairwise(rates.tolist()))
+    if servo is None:
+        changes = [kink.change(*own, blurred) for kink, own in zip(kinks, levels, strict=True)]
+    else:
+        changes = [kink.late_change(time[0] + at, *own, servo.lag, servo.damping)
+                   for kink, at, own in zip(kinks, servo.times.tolist(), levels, strict=True)]  # fmt: skip
+    found = tuple(_within_record(one, time) for one in _without_overlap(changes))
+    return Course(
+        float(rates[0]), found, np.where(rest, 0.0, errors), None, float(np.median(strays)),
+        sum(max(run.groups) for run in runs) if servo is None else len(servo.levels),
+        sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs) if servo is None else 0,
+        samples_off_line(time, displacement, runs[0], max(strays)),
+        samples_off_line(reversed_column(time), reversed_column(displacement), runs[-1].reversed(time), max(strays)),
+        () if servo is None else servo.others(),
+    )  # fmt: skip
+
+
+def _at_rest(rates: Array, runs: list[Run], errors: list[float], time: Array, displacement: Array) -> Array:
+    """True for runs in which the load point is held, (runs,)."""
     top = float(np.max(np.abs(rates)))
     slow = np.array([SLOW if len(run.rows) >= ENOUGH_SAMPLES else REST_SHARE for run in runs]) * top
     travel = np.abs(rates) * [time[run.last - 1] - time[run.first] for run in runs]
     still = (np.abs(rates) <= AT_REST * top) & (travel <= STILL * np.ptp(displacement))
     known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # backward and so slowly: a sensor that drifts in a hold
     rest = still | (np.abs(rates) <= np.minimum(known, slow))
-    rest &= len(runs) > 1
-    rates = np.where(rest, 0.0, rates)
-    kinks = [
+    return np.asarray(rest & (len(runs) > 1))
+
+
+def _kinks(
+    time: Array, displacement: Array, runs: list[Run], strays: list[float], errors: list[float], inflation: list[float]
+) -> list[_ChangeFit]:
+    return [
         _ChangeFit(time, displacement, before, after, pair, max(scales), max(worths))
         for (before, after), pair, scales, worths in zip(
             pairwise(runs), pairwise(errors), pairwise(strays), pairwise(inflation), strict=True
         )
     ]
-    servo = _servo_of(kinks)
-    changes = [
-        kink.change(*levels, blurred) if servo is None else kink.late_change(*levels, blurred, *servo)
-        for kink, levels in zip(kinks, pairwise(rates.tolist()), strict=True)
+
+
+def _without_brief(runs: list[Run], time: Array) -> Iterator[list[Run]]:
+    """All runs, then without the shortest between two others, and so on while that is brief beside one of these."""
+    for _ in range(MOST_BRIEF + 1):
+        yield runs
+        lasts = [float(time[one.last - 1] - time[one.first]) for one in runs]
+        brief = [k for k in range(1, len(runs) - 1) if lasts[k] < BRIEF_RUN * max(lasts[k - 1], lasts[k + 1])]
+        if not brief:
+            return
+        shortest = min(brief, key=lasts.__getitem__)
+        runs = runs[:shortest] + runs[shortest + 1 :]
+
+
+def _as_lines(time: Array, runs: list[Run]) -> Kinks:
+    """Changes between runs as steps, with the times at which the level of the sensor seems to change."""
+    pairs = list(pairwise(runs))
+    meets = [
+        np.clip((one.levels[-1] - other.levels[0]) / (other.rate - one.rate),
+                *(time[[one.first + 1, other.last - 2]] - time[0]))
+        for one, other in pairs
+    ]  # fmt: skip
+    levels = [
+        0.5 * (time[one[1] - 1] + time[other[0]]) - time[0]
+        for run in runs
+        for (one, other), (group, after) in zip(pairwise(run.members), pairwise(run.groups), strict=True)
+        if group != after
     ]
-    found = tuple(_within_record(one, time) for one in _without_overlap(changes))
-    return Course(
-        float(rates[0]), found, np.where(rest, 0.0, errors), None, float(np.median(strays)),
-        sum(max(run.groups) for run in runs),
-        sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs),
-        samples_off_line(time, displacement, runs[0], max(strays)),
-        samples_off_line(reversed_column(time), reversed_column(displacement), runs[-1].reversed(time), max(strays)),
-    )  # fmt: skip
+    lasts = [time[run.last - 1] - time[run.first] for run in runs]
+    reach = min(2 * min(pair) + time[after.first] - time[before.last - 1]
+                for pair, (before, after) in zip(pairwise(lasts), pairs, strict=True))  # fmt: skip
+    return Kinks(np.array(meets), np.zeros(len(meets)), np.array(levels), float(reach))
 
 
 def _piecewise_linear(runs: list[Run], time: Array) -> bool:
@@ -153,17 +208,6 @@ class _Scatter:
         return cls(scale, describe(np.clip(r, -4 * scale, 4 * scale), rows=np.vstack([levels, u])), share)
 
 
-def _servo_of(kinks: list[_ChangeFit]) -> tuple[float, float] | None:
-    """Lag (s) and damping ratio of the servo behind all changes; None if steps or ramps fit as well."""
-    kinks = [one.thinned() for one in kinks if one.tells]
-    if not kinks:
-        return None
-    shortest, longest = 0.1 * min(one.spacing for one in kinks), LONGEST_LAG * min(one.reach for one in kinks)
-    servo = fitted_servo(lambda *one: sum(kink.of_servo(*one) for kink in kinks), shortest, longest)
-    better = sum(kink.at_once - kink.of_servo(*servo) for kink in kinks if kink.explained_by(*servo))
-    return servo if better > GAIN else None
-
-
 class _ChangeFit:
     """Change between two runs: the meeting point of their lines, and a ramp or step there."""
 
@@ -195,17 +239,6 @@ class _ChangeFit:
         self.reach += self.zone[1] - self.zone[0]
         rows = slice(*np.searchsorted(time, [self.meet - self.reach, self.meet + self.reach]))
         self.time, self.displacement = time[rows], displacement[rows]
-        self.worth = np.ones(len(self.time))
-
-    def thinned(self) -> _ChangeFit:
-        """The same with means of the samples far from the change, over times that grow with the distance from it."""
-        far = np.abs(self.time - self.meet) / (NEAR * self.spacing)
-        bins = NEAR * np.where(far < 1, far, 1 + PER_EFOLD * np.log(np.maximum(far, 1)) / NEAR)
-        _, own = np.unique((np.floor(bins) + 0.5) * np.where(self.time < self.meet, -1.0, 1.0), return_inverse=True)
-        found, count = copy(self), np.bincount(own)
-        found.time, found.displacement = (np.bincount(own, x) / count for x in (self.time, self.displacement))
-        found.worth = count.astype(float)
-        return found
 
     def change(self, before: float, after: float, blurred: bool) -> Change:
         """Change that fits the displacement best."""
@@ -214,11 +247,11 @@ class _ChangeFit:
         if not self.zone[0] - slack <= self.meet <= self.zone[1] + slack:
             return self._uncertain_change(before, after, own + slack)
         at_once = self.adjacent and self.zone[0] <= self.meet <= self.zone[1]
-        if not blurred and own < EXACT * self.spacing and (at_once or self._ramp()[0]):
-            duration, _, _ = self._ramp()
+        if not blurred and own < EXACT * self.spacing and (at_once or self.ramp[0]):
+            duration, _, _ = self.ramp
             start = self.meet - 0.5 * duration
             return Change(start, duration, before, after, start, start, duration, duration)
-        duration, shortest, longest = self._ramp()
+        duration, shortest, longest = self.ramp
         half = own + self.spacing + 0.5 * max(longest - shortest, 0.0) * (duration > 0)
         half = max(half, 0.5 * (self.zone[1] - self.zone[0]) - 0.5 * duration)
         start = self.meet - 0.5 * duration
@@ -227,42 +260,13 @@ class _ChangeFit:
 
     @property
     def tells(self) -> bool:
-        """True if the samples around the change can tell how a servo follows it."""
+        """True if the samples around the change can tell how the load point follows it."""
         return len(self.time) >= ENOUGH_SAMPLES and self.reach > 0
 
-    @cached_property
-    def at_once(self) -> float:
-        """Misfit of the better of a step and the best ramp, per independent sample."""
-        return min(self._misfit(duration) for duration in (0.0, self._ramp()[0])) / self.inflation
-
-    def of_servo(self, lag: float, damping: float) -> float:
-        """Misfit of the two lines joined by a servo, per independent sample."""
-        return self._robust(self._off_servo(lag, damping)) / self.inflation
-
-    def explained_by(self, lag: float, damping: float) -> bool:
-        """True if a servo leaves no more than noise of the samples around the change, as it does not of a glitch."""
-        near = np.abs(self.time - self.meet) <= AROUND * (settling(lag, damping) + self.spacing)
-        count = max(int(np.sum(near)), 1)
-        return bool(self._robust(self._off_servo(lag, damping), near) / count < 1.0 + LEFT / np.sqrt(count))
-
-    def _off_servo(self, lag: float, damping: float) -> Array:
-        since = self.time - (self.meet - lag)
-        beyond = (self.rates[1] - self.rates[0]) * travel(since, lag, damping)
-        return np.asarray(self.displacement - self._lines()[0] - beyond)
-
-    def late_change(self, before: float, after: float, blurred: bool, lag: float, damping: float) -> Change:
-        """Step that a servo follows late; its time is as uncertain as that where the lines meet.
-
-        Where a servo does not explain the samples, a glitch or a slip of the sensor is there too.
-        """
-        if not (self.tells and self.explained_by(lag, damping)):
-            step = self.change(before, after, blurred)
-            if step.duration:
-                return step
-            earlier = {"time": step.time - lag, "earliest": step.earliest - lag}
-            return replace(step, **earlier, longest=0.0, lag=lag, damping=damping)
-        start, half = self.meet - lag, 6 * self.deviation + self.spacing + LAG_ERROR * lag
-        return Change(start, 0.0, before, after, start - half, start + half, lag=lag, damping=damping)
+    def late_change(self, at: float, before: float, after: float, lag: float, damping: float) -> Change:
+        """Step commanded at a time (s) that a servo follows late; the time is as uncertain as where the lines meet."""
+        half = 6 * self.deviation + self.spacing + LAG_ERROR * lag
+        return Change(at, 0.0, before, after, at - half, at + half, lag=lag, damping=damping)
 
     def _uncertain_change(self, before: float, after: float, slack: float) -> Change:
         """Change where the lines do not meet between the runs, because of a glitch or a slip of the sensor."""
@@ -275,7 +279,8 @@ class _ChangeFit:
         low, high = min(first, middle, *near) - slack, max(last, middle, *near) + slack
         return Change(middle, 0.0, before, after, low, high, 0.0, length)
 
-    def _ramp(self) -> tuple[float, float, float]:
+    @cached_property
+    def ramp(self) -> tuple[float, float, float]:
         """Best duration (zero for a step), and the range of durations that fit nearly as well."""
         if len(self.time) < 8 or not self.reach > 0:
             return 0.0, 0.0, 0.0
@@ -311,7 +316,7 @@ class _ChangeFit:
 
     def _robust(self, deviations: Array, rows: Array | slice = slice(None)) -> float:
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
-        squares = self.worth[rows] * (deviations[rows] / scale) ** 2
+        squares = (deviations[rows] / scale) ** 2
         return float(OUTLIER * np.sum(np.log1p(squares / OUTLIER)))
 
 

@@ -92,6 +92,8 @@ class Course(ReadOnly):
     early, late : int
         Number of samples at the beginning and at the end of the record that are not on the course; too few to tell if
         the sensor or the loading differed.
+    servos : tuple of (float, float)
+        Lag (s) and damping ratio of servos one standard deviation from that of the changes, in independent directions.
     """
 
     first: float
@@ -103,6 +105,7 @@ class Course(ReadOnly):
     glitches: int = 0
     early: int = 0
     late: int = 0
+    servos: tuple[tuple[float, float], ...] = ()
 
     @property
     def levels(self) -> Array:
@@ -175,7 +178,7 @@ def resting_rate(loading: Loading) -> float | None:
 
 
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
-    """Loadings with one level each raised by its standard deviation, for levels with an error above rounding."""
+    """Loadings with one level each raised by its standard deviation, where that is above rounding, and other servos."""
     for channel in ("load", "stress", "pore") if pressed else ("load",):
         course = getattr(loading, channel)
         if course is None:
@@ -191,3 +194,9 @@ def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
                 for i, change in enumerate(course.changes)
             )
             yield replace(loading, **{channel: replace(course, first=float(moved[0]), changes=changes)})
+        for lag, damping in course.servos:
+            changes = tuple(
+                replace(one, time=one.time + one.lag - lag, lag=lag, damping=damping) if one.lag else one
+                for one in course.changes
+            )
+            yield replace(loading, **{channel: replace(course, changes=changes)})

@@ -8,17 +8,14 @@ and after meet `lag` after the command.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import minimize
 
 from steadyslip.core.arrays import Array
 
-DAMPINGS = (0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 1.05, 1.5, 3.0, 10.0)
+DAMPINGS = (0.2, 0.35, 0.6, 1.05, 2.0, 8.0)
 """Damping ratios from which a search starts: overshoot of 53 % down to none, and a single exponential."""
-LAGS = 12  # lags from which it starts, in geometric progression
 GAIN = 14.0
 """Decrease of chi squared by which a servo must fit better than steps or ramps. Of 120 records without one, with white
 or correlated noise, one reached 13.9, the next 4.8."""
@@ -68,26 +65,3 @@ def ramps(lag: float, damping: float) -> tuple[tuple[float, float, float], ...]:
 def overshoot(damping: float) -> float:
     """Largest share of a step by which the rate passes its new level."""
     return float(np.exp(-np.pi * damping / np.sqrt(1 - damping**2))) if damping < 1 else 0.0
-
-
-def fitted_servo(misfit: Callable[[float, float], float], shortest: float, longest: float) -> tuple[float, float]:
-    """Lag (s) and damping ratio of the servo that fits best.
-
-    Parameters
-    ----------
-    misfit : callable
-        Chi squared of a lag and a damping ratio.
-    shortest, longest : float
-        Range of lags that are tried, s.
-    """
-    starts = [(lag, damping) for lag in np.geomspace(shortest, longest, LAGS) for damping in DAMPINGS]
-    begin = min(starts, key=lambda one: misfit(*one))
-
-    def cost(x: Array) -> float:
-        lag, damping = np.exp(x)
-        inside = 0.2 * shortest <= lag <= longest and 0.1 <= damping <= 50
-        return float(misfit(lag, damping)) if inside else np.inf
-
-    found = minimize(cost, np.log(begin), method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2})
-    lag, damping = np.exp(found.x)
-    return float(lag), float(damping)

@@ -380,5 +380,14 @@ def test_bad_records_are_named():
         lab.stepped()["mass"]
 
 
+@pytest.mark.parametrize("records", [5, None, "run.csv", [1, 2], [], object()])
+@pytest.mark.parametrize("rig", ["lab", "machine"])
+def test_what_is_no_record_is_named(rig, records):
+    """The number 5 ended in a TypeError."""
+    chosen = ss.lab_rig() if rig == "lab" else ss.read_rig("examples/machines/two-guides.toml")
+    with pytest.raises(ss.ParameterError, match="records: got"):
+        ss.fit(chosen, records)
+
+
 def test_lag_one_of_a_constant_is_zero():
     assert lag_one(np.ones(5)) == 0

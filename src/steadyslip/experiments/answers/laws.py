@@ -235,7 +235,7 @@ def compare_laws(
     aging           6     1.70956e-05  36.5   36.5   0.000               0.0002388
     'slip' it is: 'aging', the next, has a sum of squares +9.54% and is 36.5 behind in BIC.
     """
-    many = (records,) if isinstance(records, Record) else tuple(records)
+    many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
     rigs = {label: with_law(rig, label) for label in (_usual_labels(rig, many) if laws is None else laws)}
     effort = options.pop("effort", 1.0)
     fits: dict[str, Fit] = {}

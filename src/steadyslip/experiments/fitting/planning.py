@@ -46,10 +46,10 @@ def make_plan(
     ParameterError
         Listing everything that is wrong.
     """
-    many = (records,) if isinstance(records, Record) else tuple(records)
+    many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
     if not many or not all(isinstance(record, Record) for record in many):
         raise ParameterError(
-            [Problem("records", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
+            [Problem("records", f"got {records!r:.80}; allowed: a Record, as read_record gives, or several")]
         )
     plan_protocol = None if protocol is None else in_units_of(rig, Protocol.of(protocol))
     if plan_protocol is not None:

@@ -36,7 +36,7 @@ def make_machine_plan(
     NotAvailable
         If the machine is of a kind that is not fitted.
     """
-    many = (records,) if isinstance(records, (MotionRecord, ResponseData)) else tuple(records)
+    many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
     if not many or not all(isinstance(record, (MotionRecord, ResponseData)) for record in many):
         message = (
             f"got {records!r:.80}; allowed for a machine: what experiments.read_motion or read_frequency_response "

@@ -248,4 +248,4 @@ def test_a_memory_that_fits_better_is_told_though_residuals_are_white():
     fit = ss.fit(ss.lab_rig("slip"), pressed_once(ss.laws.Slip()), starts=9)
     assert fit.whiteness.p > 0.01
     assert "with friction.normal_memory = 'linker-dieterich'" in (said := " ".join(str(fit).split()))
-    assert "do not use these numbers" in said
+    assert "do not use the values above" in said

@@ -111,10 +111,11 @@ def fit(
     if table is not None:
         for path in listed:
             write_table(table, path)
+        for path in others:
+            if path.suffix.lower() == ".json":
+                write_fit(found, comparison, path, draws, table)
     if as_json:
-        data = plain(found, comparison)
-        if table is not None:
-            data["steps"] = table.to_dict()
+        data = plain(found, comparison, table)
         if draws is not None:
             data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
         print_json(data)

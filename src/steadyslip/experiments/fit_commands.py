@@ -41,8 +41,10 @@ def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
     return records, specs[0] if specs else None
 
 
-def write_fit(fit: Fit | MachineFit, comparison: LawComparison | None, path: Path, draws: Draws | None = None) -> None:
-    """Write a fit in the format that the file's ending names; an HTML document includes the draws.
+def write_fit(fit: Fit | MachineFit, comparison: LawComparison | None, path: Path, draws: Draws | None = None,
+    table: StepTable | None = None,
+) -> None:  # fmt: skip
+    """Write a fit in the format that the file's ending names; HTML includes the draws, JSON the table of steps.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def write_fit(fit: Fit | MachineFit, comparison: LawComparison | None, path: Pat
     """
 
     def as_text(target: Path) -> None:
-        write_text(target, json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n")
+        write_text(target, json.dumps(as_json(fit, comparison, table), indent=2, allow_nan=False) + "\n")
 
     def as_page(target: Path) -> None:
         write_page(fit, target, "Fit", comparison=comparison, draws=draws)
@@ -100,9 +102,9 @@ def write_speeds(found: SpeedFit, path: Path) -> None:
     write_text(path, json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n" if numbers else found.rig_text())
 
 
-def as_json(fit: Fit | MachineFit, comparison: LawComparison | None) -> dict[str, Any]:
-    """Data of a fit for JSON, with those of the laws that it was compared with."""
-    data = fit.to_dict()
+def as_json(fit: Fit | MachineFit, comparison: LawComparison | None, table: StepTable | None = None) -> dict[str, Any]:
+    """Data of a fit for JSON, with those of the laws that it was compared with, and of its steps alone."""
+    data = fit.to_dict() | ({} if table is None else {"steps": table.to_dict()})
     if comparison is not None:
         data["comparison"] = {
             label: {"ssq": one.ssq, "aic": comparison.criteria[label][0], "bic": comparison.criteria[label][1],

@@ -18,7 +18,7 @@ from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
-from steadyslip.experiments.fitting.words import short_names
+from steadyslip.experiments.fitting.words import short_names, warnings
 from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
 from steadyslip.files.output import write_columns, write_text
@@ -117,7 +117,7 @@ class StepTable(Displayed):
         for line in self.lines:
             own = {name: {"value": one.value, "error": one.error if one.determined else None, "unit": one.unit}
                    for name, one in line.estimates().items()}  # fmt: skip
-            lines.append(line.about() | {"estimates": own})
+            lines.append(line.about() | {"estimates": own, "warnings": warnings(line.fit)})
         return {"lines": lines, "left_out": list(self.left_out), "methods": self.methods}
 
     def to_csv(self, path: str | PathLike[str]) -> None:
@@ -181,7 +181,12 @@ class StepTable(Displayed):
         memories = [one.name for one in parts if one is not evolution and hasattr(one, "name")]
         kind += "" if law.forgets_stress() else "".join(f", {name} memory of normal stress" for name in memories)
         free = [name for name, one in line.estimates().items() if one not in self.joint.derived]
+        late = [one for loading in plan.loading if loading.load for one in loading.load.changes if one.lag]
         further = [
+            f"The load point was taken to follow changes of its rate late, as a servo of second order does (by "
+            f"{format_quantity(late[0].lag, 's')} in the end)."
+            if late
+            else "",
             f"A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else "",
             "A constant was added to friction." if plan.offset else "",
             "Friction was free to come later than the loading." if plan.lag else "",
@@ -204,6 +209,7 @@ class StepTable(Displayed):
             where = f"{line.record}: {line.step}" if line.step else f"all together ({line.record})"
             lines.append(where)
             lines.append("  " + ", ".join(f"{name} {one.shown()}" for name, one in line.estimates().items()))
+            lines += [f"  ! {text}" for text in (warnings(line.fit) if line.step else ())]
         return "\n".join([*lines, *(f"! {text}" for text in self.left_out), "", self.methods])
 
 

@@ -215,7 +215,7 @@ def _structure(fit: FitNumbers) -> list[str]:
     return [
         f"{said}: with {asked} the sum of squares is "
         f"{best.ssq / fit.ssq:.2g} of this, BIC {best.gain:.0f} less, {', '.join([rest, *moved])}; "
-        "do not use these numbers, and ask for that with --set or in the file of the fit (lab_rig and fit in Python)"
+        "do not use the values above, but fit again with that, by --set or in the file (lab_rig and fit in Python)"
     ]
 
 

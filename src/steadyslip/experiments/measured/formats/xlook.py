@@ -63,7 +63,8 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
     units = [*units, *([None] * columns)][:columns]
     for kind in (kind for kind in NUMBER_KINDS if int(kind[-1]) == width):
         values = np.frombuffer(raw, kind, rows * columns, body).reshape(columns, rows)
-        found = values.astype(float)
+        with np.errstate(invalid="ignore"):  # bytes in the other order may be no numbers
+            found = values.astype(float)
         size_of = np.abs(found[found != 0.0])
         if np.all(np.isfinite(found)) and (not len(size_of) or (size_of.max() < 1e20 and np.median(size_of) > 1e-20)):
             return names, units, found

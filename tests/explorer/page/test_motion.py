@@ -66,7 +66,7 @@ def test_curves_are_those_of_the_disturbance_that_is_asked_for(browser, moved):
     with Visit(browser, moved["explorer"]) as visit:
         visit.told("slip event")
         hint, curves = visit.page.locator(".motion .hint"), visit.page.locator(".strips")
-        assert re.fullmatch(r"At .* s \(dashed line\): step of the drive velocity, × 2\.", hint.inner_text())
+        assert re.fullmatch(r"At .* s \(dashed line\): step of the drive velocity, ×\s2\.", hint.inner_text())
         frame, step = visit.page.locator(".strips .frame").first.bounding_box(), visit.page.locator(".strips .step")
         assert step.bounding_box()["x"] == pytest.approx(frame["x"] + frame["width"] / 20, abs=2)
         visit.page.emulate_media(media="print")
@@ -146,7 +146,7 @@ def own_time(visit, run):
     assert friction == pytest.approx(there, abs=2e-3)
     assert visit.page.evaluate(place) != before
     visit.page.locator(".events summary").click()
-    visit.page.get_by_role("button", name=re.compile("^go to ")).nth(1).click()
+    visit.page.get_by_title(re.compile("^go to ")).nth(1).click()
     assert visit.page.inner_text(".reading").startswith(f"{run.slip_events[1].begin:.4g} s")
     visit.page.get_by_role("button", name="play").click()
     visit.page.wait_for_timeout(100)

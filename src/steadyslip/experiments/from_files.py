@@ -82,40 +82,39 @@ def population_files(
 ) -> Population:
     """Read records, fit each on its own and pool what they say, as the command line does; shows progress on a terminal.
 
-        Parameters
-        ----------
-        paths : sequence of path
-            Records, each an experiment of its own.
-        spec : path
-            The file of the fit; its table ``[population]`` says which parameters differ, and on what they may depend.
-        changes : iterable of str
-            As for `read_spec`.
-        skip_bad_lines : bool
+    Parameters
+    ----------
+    paths : sequence of path
+        Records, each an experiment of its own.
+    spec : path
+        The file of the fit; its table ``[population]`` says which parameters differ, and on what they may depend.
+    changes : iterable of str
+        As for `read_spec`.
+    skip_bad_lines : bool
 
-        Returns
-        -------
-        Population
-            Its experiments labelled by the names of the files.
+    Returns
+    -------
+    Population
+        Its experiments labelled by the names of the files.
 
-        Raises
-        ------
-        ParameterError
-            Listing everything that is wrong with the files, or if they do not determine a population.
-        NotAvailable
-            If emcee is not installed.
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong with the files, or if they do not determine a population.
+    NotAvailable
+        If emcee is not installed.
 
-        Examples
-        --------
-        >>> from pathlib import Path
-    from typing import Any
-        >>> head, *rows = Path("examples/data/made_velocity_step.csv").read_text().splitlines()
-        >>> paths = [Path(f"part{k}.csv") for k in range(3)]
-        >>> for k, path in enumerate(paths):  # in place of three experiments
-        ...     _ = path.write_text("\\n".join([head, *rows[k::3]]))
-        >>> changes = ["fit.trend=0", "population.parameters=['friction.a', 'friction.b']", "population.draws=100"]
-        >>> pooled = ss.experiments.population_files(paths, "examples/fits/basalt.toml", changes)
-        >>> pooled.names
-        ('friction.a', 'friction.b')
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> head, *rows = Path("examples/data/made_velocity_step.csv").read_text().splitlines()
+    >>> paths = [Path(f"part{k}.csv") for k in range(3)]
+    >>> for k, path in enumerate(paths):  # in place of three experiments
+    ...     _ = path.write_text("\\n".join([head, *rows[k::3]]))
+    >>> changes = ["fit.trend=0", "population.parameters=['friction.a', 'friction.b']", "population.draws=100"]
+    >>> pooled = ss.experiments.population_files(paths, "examples/fits/basalt.toml", changes)
+    >>> pooled.names
+    ('friction.a', 'friction.b')
     """
     plan = spec_of(spec, changes)
     if not isinstance(plan, Spec):

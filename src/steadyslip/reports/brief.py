@@ -73,7 +73,8 @@ DIMENSIONLESS = frozenset(
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _HIDDEN = frozenset(
-    "rig version plan data protocol area unit units html start fit fits draws search noise plot map resonances".split()  # noqa: SIM905
+    """rig version plan data protocol area unit units html start fit fits draws search noise plot map resonances told
+    columns""".split()  # noqa: SIM905
 )
 _SKETCH_CAPTION = (
     "Motion is to the right. Solid blue: what the drive does; dashed: what it measures; red: constant forces."

@@ -11,10 +11,10 @@ the equations and the search range for stability edges are all derived from that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cache
-from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
+from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from steadyslip.core.areas import total_unit
 from steadyslip.core.domains import Condition, Domain
@@ -244,20 +244,6 @@ class FrozenRecord(Displayed):
         problems = problems or [p for condition in self.conditions() if (p := condition.problem()) is not None]
         if problems:
             raise ParameterError(problems, title=type(self).__name__)
-        if not self.written_in:  # `dataclasses.replace` keeps the parts, and with them the units of the file
-            self.told_in(name for inner in self._parts() for name in inner.written_in)
-
-    def _parts(self) -> Iterator[FrozenRecord]:
-        for item in fields(self):  # type: ignore[arg-type]
-            held = getattr(self, item.name, None)  # absent until the constructor has set it
-            inside = held.values() if isinstance(held, Mapping) else held if isinstance(held, tuple) else (held,)
-            yield from (inner for inner in inside if isinstance(inner, FrozenRecord))
-
-    def told_in(self, names: Iterable[str]) -> Self:
-        names = tuple(names)
-        for part_of_it in self._parts():
-            part_of_it.told_in(names)
-        return super().told_in(names)
 
     def _settled(self) -> Iterator[Problem]:
         """Convert totals (N, N/m, ...) of a contact to values per unit area; yield a Problem for each without area."""

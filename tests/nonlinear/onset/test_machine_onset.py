@@ -9,6 +9,7 @@ import sympy as sp
 import steadyslip as ss
 from machine_onsets import compared
 from machines import rate_state, renamed, same_block, surface, three_bodies, two_mass
+from steadyslip.machine.letters import said
 
 KP = "drive.kp"
 
@@ -187,7 +188,9 @@ def test_the_verdict_on_a_machine_tells_the_onset_at_its_nearest_edge():
         nearest = next(one for one in found.margins if one.edge is not None and one.edge.kind == "oscillatory")
         own = ss.hopf(machine, nearest.parameter)
         np.testing.assert_allclose(numbers(found.onset), numbers(own), rtol=1e-9)
-        assert f"onset {own.kind}: just beyond the edge in {nearest.parameter}" in " ".join(str(found).split())
+        assert f"onset {own.kind}: just beyond the edge in {said(machine, nearest.parameter)}" in " ".join(
+            str(found).split()
+        )
         data = found.to_dict()["onset"]
         told = data["parameter"], data["contact"], data["coefficient"]
         assert told == (nearest.parameter, "guide", own.coefficient)

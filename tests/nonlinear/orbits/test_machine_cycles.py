@@ -124,7 +124,7 @@ def test_tables_and_words_are_in_forces(tmp_path):
     assert found.to_xarray()["force_drop"].attrs["units"] == "N"
     np.testing.assert_array_equal(found["guide.peak_velocity"], found["peak_velocity"])
     axes = found.plot()
-    assert axes.get_xlabel() == "kp (N/m)"
+    assert axes.get_xlabel() == r"drive proportional gain $k_{\mathrm{p}}$ (N/m)"
     assert axes.get_ylabel() == "highest and lowest velocity at guide (m/s)"
 
 

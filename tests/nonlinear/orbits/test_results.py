@@ -133,7 +133,7 @@ def test_files_and_figure(damped, tmp_path):
     head = (tmp_path / "branch.csv").read_text().splitlines()[0]
     assert head.startswith("slider.stiffness (Pa/m),period (s)")
     ax = damped.plot()
-    assert ax.get_xlabel() == "stiffness (mPa/m)"
+    assert ax.get_xlabel() == "stiffness k (mPa/m)"
     assert "stable cycle" in ax.get_legend_handles_labels()[1]
     plain = damped.to_dict()
     assert len(plain["cycles"]) == len(damped)

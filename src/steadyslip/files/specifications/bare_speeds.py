@@ -15,6 +15,7 @@ from steadyslip.machine.rig import Rig
 
 SPEEDS = ("m/s", "rad/s")
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
+FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
 
@@ -34,7 +35,7 @@ def question_speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
 def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
     for si in SPEEDS:
         own = {name: raw for name, (raw, its) in read.items() if its == si}
-        bare = {name: raw for name, raw in own.items() if isinstance(raw, (int, float)) and raw}
+        bare = {name: raw for name, raw in own.items() if isinstance(raw, (int, float)) and 0 < abs(raw) <= FASTEST}
         texts = [raw for raw in own.values() if isinstance(raw, str) and units_in([raw])]
         written = sorted(units_in(texts))
         for name, raw in bare.items():

@@ -223,10 +223,17 @@ class Map(Displayed):
         if name.startswith("protocol."):
             return given
         if isinstance(given, Grid):
-            return replace(given, start=self.rig.read(name, given.start), stop=self.rig.read(name, given.stop))
+            return replace(given, start=self._end(name, "from", given.start), stop=self._end(name, "to", given.stop))
         if isinstance(given, (list, tuple)):
             return type(given)(one if one in SPACINGS else self.rig.read(name, one) for one in given)
         return given
+
+    def _end(self, name: str, which: str, given: Any) -> Any:
+        """An end of a grid as `Rig.read` reads it; problems name it ``from`` or ``to``."""
+        try:
+            return self.rig.read(name, given)
+        except ParameterError as error:
+            raise ParameterError([Problem(f"{one.name}.{which}", one.message) for one in error.problems]) from error
 
     def _allowed(self, name: str, values: Any) -> tuple[Problem, ...]:
         """Problems of varying a parameter through these values."""

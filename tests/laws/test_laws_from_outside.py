@@ -242,7 +242,7 @@ def test_onset(case):
 @CASES
 def test_a_kick_it_survives(case):
     rig = RIGS[case]
-    found = ss.threshold(rig, precision=1e-2)
+    found = ss.threshold(rig, precision=1e-2, up_to=25.0)
     assert found.decided
     assert 0 < found.bracket[0] < found.searched
     assert found.outcome in ("blow-up", "oscillation", "contact lost")

@@ -449,7 +449,7 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
     >>> step = ss.protocol.VelocityStep(at=0, to="2 um/s")
     >>> print(ss.margin_to_kick(rig, step))
     survives it: the limit is 2.94 times this step
-    velocity kick: survives up to 7.67288... um/s (size 2.037693, bracket ...); beyond: blow-up
+    velocity kick: survives up to 7.67288... um/s (size 2.037692, bracket ...); beyond: blow-up
     """
     possible = kicks_of(rig)
     kinds: dict[type, tuple[str, str]] = {

@@ -199,7 +199,7 @@ def test_kicks_of_creep_that_just_run_away():
     """Cut-offs end slip that runs away: the smallest kick that does reaches them from fifteen decades below."""
     v = 1e-20
     own = rig_of(law_with(evolution=ss.laws.Aging(), **FADING), stiffness=6e9, drive=ss.machine.SteadyDrive(v))
-    size = ss.threshold(own, "velocity").size
+    size = ss.threshold(own, "velocity", up_to=25.0).size
     steps = [ss.protocol.VelocityStep(at=0.0, to=v * np.exp(share * size)) for share in (0.99, 1.01)]
     ends = [ss.simulate(own, step, until=200 * 8e-6 / step.to).status for step in steps]
     assert ends == ["done", "blow-up"]

@@ -85,6 +85,7 @@ def judged(text: str) -> None:
 @given(st.data())
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @pytest.mark.campaign
+@pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")  # numbers without a unit are asked about
 def test_any_value_anywhere(data):
     lines = TEXT.splitlines()
     keys = [i for i, line in enumerate(lines) if re.match(r"\w+ =", line)]

@@ -90,6 +90,7 @@ def test_a_misspelt_table_hides_no_other_problem():
     [
         ("v_stribeck =", "v_stribek =", "unknown key 'v_stribek'; did you mean 'v_stribeck'?"),
         ("mu_coulomb =", "mu_coulom =", "unknown key 'mu_coulom'; did you mean 'mu_coulomb'?"),
+        ("preload =", "preloat =", "unknown key 'preloat'; did you mean 'preload'?"),
         ("[contact]", "[contacts]", "unknown table 'contacts'; did you mean 'contact'?"),
         ('"240 kg"', '"-240 kg"', "got -240.0; allowed: a finite number >= 0 in kg,"),
     ],

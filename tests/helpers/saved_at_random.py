@@ -165,8 +165,6 @@ def placed(piece, rig, random):
 def rigs(random, folder):
     """Rig and protocol as a file."""
     rig = rig_at_random(random)
-    if any((one.area or 0.0) > 1e290 for one in rig.contacts.values()):
-        raise NoCase  # total forces are no numbers, and refused when the file is read
     plan = protocol_at_random(random, rig) if random.random() < 0.7 else None
     ss.write_rig(rig, folder / "rig.toml", plan)
     again, its_plan = ss.read_rig(folder / "rig.toml"), ss.read_protocol(folder / "rig.toml") if plan else None

@@ -234,7 +234,7 @@ class Parameter(Entry):
                 value = _per_area(raw, self.unit, area)
             except QuantityError as error:
                 raise fault(str(error)) from error
-            if math.isfinite(value):
+            if math.isfinite(value * area):
                 whole.checked(value * area)  # so that a message is of the total
             return self.checked(value)
         return self.checked(whole.checked(raw) / area)

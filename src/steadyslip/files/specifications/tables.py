@@ -175,8 +175,11 @@ class TableReader:
             if elsewhere:
                 told = f"unknown key {repr_short(name)} here; it is a key of {elsewhere}"
             self.problem(prefix + legible(name), told + another)
-            for key in [key for key in missing if f"did you mean {key!r}?" in told]:
-                del missing[key]  # it is there, misspelt
+            for item, role in own_fields(law):
+                if f"did you mean {key_of(item)!r}?" in told and item.name not in arguments:
+                    missing.pop(key_of(item), None)  # it is there, misspelt: nothing else follows from that
+                    if (meant := self._value(role, value, prefix + name)) is not None:
+                        arguments[item.name] = meant
         self.problems += missing.values()
         return arguments
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from steadyslip.core.domains import moving, nonnegative, speed
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.machine.holding import Holding, limit, windup
+from steadyslip.machine.holding import Holding, dead_time, limit, windup
 from steadyslip.machine.mechanism import Limits
 
 
@@ -61,15 +61,7 @@ class PD(Holding, Drive, name="pd", kw_only=False):
         "Pa/m", nonnegative, "proportional gain", default=0.0, structural=True, kind="stiffness", letter="k_p"
     )
     kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
-    delay: float = parameter(
-        "s",
-        nonnegative,
-        "dead time between measuring and acting",
-        default=0.0,
-        structural=True,
-        kind="delay",
-        letter="t_d",
-    )
+    delay: float = dead_time()
 
     def proportional(self) -> Any:
         return self.kp

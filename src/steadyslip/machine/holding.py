@@ -1,6 +1,6 @@
-"""What a controller at rest has besides its gains: limits, a dead band, samples and an encoder (theory 14).
+"""What controllers have besides their gains: a dead time; at rest limits, a dead band, samples, an encoder (theory 14).
 
-At a velocity other than 0 it follows a ramp and is linear, so these fields are refused there.
+At a velocity other than 0 a controller follows a ramp and is linear, so the fields of rest are refused there.
 """
 
 from __future__ import annotations
@@ -8,10 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from steadyslip.core.domains import positive, speed
+from steadyslip.core.domains import nonnegative, positive, speed
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, option, parameter
 from steadyslip.machine.mechanism import Limits
+
+
+def dead_time() -> Any:
+    """Declare the time between measuring and acting."""
+    doc = "dead time between measuring and acting"
+    return parameter("s", nonnegative, doc, default=0.0, structural=True, kind="delay", letter="t_d")
 
 
 def limit(unit: str) -> Any:

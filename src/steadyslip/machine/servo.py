@@ -13,7 +13,7 @@ from steadyslip.core.domains import moving, nonnegative, positive, speed
 from steadyslip.core.entries import Text
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter, setting
-from steadyslip.machine.holding import Holding, band, encoder, limit, windup
+from steadyslip.machine.holding import Holding, band, dead_time, encoder, limit, windup
 from steadyslip.machine.mechanism import Limits
 
 
@@ -71,15 +71,7 @@ class _Controller(Holding, MachineDrive):
     measured: str | None = setting(
         Text("the body whose place it measures; that on which it acts unless given"), default=None
     )
-    delay: float = parameter(
-        "s",
-        nonnegative,
-        "dead time between measuring and acting",
-        default=0.0,
-        structural=True,
-        kind="delay",
-        letter="t_d",
-    )
+    delay: float = dead_time()
 
     def lateness(self) -> Any:
         return self.delay

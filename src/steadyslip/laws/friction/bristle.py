@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -16,6 +17,12 @@ REST = sp.Rational(1, 10**12)
 Chosen by trial, far below any velocity of interest."""
 
 
+def _viscous() -> Any:
+    """Declare the viscous coefficient that all laws here have."""
+    doc = "viscous coefficient s_2 (σ2 of LuGre), per unit normal stress"
+    return parameter("s/m", nonnegative, doc, default=0.0, kind="viscosity", letter="s_2")
+
+
 class Coulomb(FrictionLaw, name="coulomb"):
     """Coulomb friction, constant in sliding, with larger friction at rest and viscosity if given.
 
@@ -27,14 +34,7 @@ class Coulomb(FrictionLaw, name="coulomb"):
     mu_static: float | None = parameter(
         "1", positive, "friction coefficient at rest μ_S; μ_C unless given", default=None, letter="mu_S"
     )
-    viscous: float = parameter(
-        "s/m",
-        nonnegative,
-        "viscous coefficient s_2 (σ2 of LuGre), per unit normal stress",
-        default=0.0,
-        kind="viscosity",
-        letter="s_2",
-    )
+    viscous: float = _viscous()
 
     def conditions(self) -> Iterator[Condition]:
         if self.mu_static is not None:
@@ -68,14 +68,7 @@ class StribeckCurve(FrictionLaw):
     mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C", letter="mu_C")
     mu_static: float = parameter("1", positive, "static friction coefficient μ_S", letter="mu_S")
     v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S", kind="velocity scale", letter="v_S")
-    viscous: float = parameter(
-        "s/m",
-        nonnegative,
-        "viscous coefficient s_2 (σ2 of LuGre), per unit normal stress",
-        default=0.0,
-        kind="viscosity",
-        letter="s_2",
-    )
+    viscous: float = _viscous()
     stribeck_exponent: float | None = parameter(
         "1",
         positive,

@@ -247,6 +247,26 @@ def test_bad_changes(change, words):
     assert any(word in message for word in words.split("|")), message
 
 
+@pytest.mark.parametrize(
+    ("changes", "begins"),
+    [
+        (["friction.normal_memory=foo"], "changes (--set): friction.normal_memory.law: unknown"),
+        (["evolution=foo", "mass=x"], "changes (--set): 2 problems"),
+        (["contact.law=foo"], "changes (--set): contact.law: unknown"),
+    ],
+)
+def test_a_fault_of_a_change_is_not_said_to_be_the_file_s(changes, begins):
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(TEXT, "rig.toml", changes)
+    assert str(caught.value).startswith(begins)
+    assert all(one.line is None for one in caught.value.problems)
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(TEXT.replace("b = 0.0160", "b = 'x'"), "rig.toml", changes)
+    first, *_, last = str(caught.value).splitlines()
+    assert first.startswith("rig.toml: ")
+    assert last.endswith("(of the changes (--set))")
+
+
 def test_with_an_area_the_file_is_in_newtons():
     text = TEXT.replace("[slider]", '[slider]\narea = "20 cm^2"\nmass = 4').replace('"9 GPa/m"', '"18 MN/m"')
     rig = ss.rig_from_text(text.replace('"5 MPa"', '"10 kN"'))

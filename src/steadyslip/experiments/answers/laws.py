@@ -21,7 +21,6 @@ from steadyslip.experiments.fitting.loading_words import enumerated
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.words import short_names
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
@@ -145,7 +144,7 @@ def _agreement(one: Fit, other: Fit) -> str:
               and b.low <= a.value <= b.high]  # fmt: skip
     if len(agreed) == len(pairs):
         return "they agree on all numbers that both have"
-    return f"they agree on {enumerated(short_names(tuple(agreed)))} only" if agreed else "they agree on no number"
+    return f"they agree on {enumerated(agreed)} only" if agreed else "they agree on no number"
 
 
 @checked()

@@ -18,7 +18,7 @@ from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
-from steadyslip.experiments.fitting.words import short_names, warnings
+from steadyslip.experiments.fitting.words import warnings
 from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
 from steadyslip.files.output import write_columns, write_text
@@ -73,12 +73,11 @@ class FittedStep:
         return dict(zip(ABOUT, values, strict=True))
 
     def estimates(self) -> dict[str, Estimate]:
-        """Estimates of the rig's parameters and what follows from them, by short name."""
+        """Estimates of the rig's parameters and what follows from them, by name."""
         rig = [one for one in self.fit.estimates if one.name.partition("@")[0] in self.fit.plan.free]
         stiff = self.fit.plan.rig.of_kind("stiffness")
-        names = short_names(tuple(one.name for one in rig))
-        bare = [f"k{one.name.removeprefix(own)}" if (own := one.name.partition("@")[0]) in stiff else name
-                for one, name in zip(rig, (name.removeprefix("friction.") for name in names), strict=True)]  # fmt: skip
+        bare = [f"k{one.name.removeprefix(own)}" if (own := one.name.partition("@")[0]) in stiff
+                else one.name.removeprefix("friction.") for one in rig]  # fmt: skip
         return dict(zip(bare, rig, strict=True)) | {one.name: one for one in self.fit.derived}
 
 

@@ -42,14 +42,13 @@ MAX_JUMP_ERROR = (
 
 def words(fit: FitNumbers) -> str:
     """Text of a fit: estimates, quality and warnings."""
-    names = short_names(fit.names)
-    wide = max(len(name) for name in (*names, *(one.name for one in fit.derived)))
+    wide = max(len(one.name) for one in (*fit.estimates, *fit.derived))
     rows = []
-    for name, one in zip(names, fit.estimates, strict=True):
+    for one in fit.estimates:
         interval = f"   95 %: {one.range()}" if one.determined else ""
         per_stress = _over_stress(fit, one)
         if per_stress is None or not _stress_assumed(fit):
-            rows.append(f"  {name:<{wide}}  {one.shown()}{interval}")
+            rows.append(f"  {one.name:<{wide}}  {one.shown()}{interval}")
         if per_stress is not None:
             rows.append(f"  {'k/σ':<{wide}}  {per_stress}")
     follows = [one for one in fit.derived if one.unit == "1" or not _stress_assumed(fit)]
@@ -77,17 +76,6 @@ def _over_stress(fit: FitNumbers, one: Any) -> str | None:
     if not one.determined:
         return f"{value:.4g} /um ({one.undetermined})"
     return f"{value:.4g} ± {error:.2g} /um   95 %: {low:.4g} to {high:.4g} /um"
-
-
-def short_names(names: tuple[str, ...]) -> list[str]:
-    """Dotted names without their middle parts, where these remain unique."""
-    found = []
-    for name in names:
-        first, last = name.split(".")[0], name.split(".")[-1]
-        whole = first in ("protocol", "step", "start", "initial") or ".states." in name
-        brief = name if whole or first == last else f"{first}.{last}"
-        found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
-    return found
 
 
 def _quality(fit: FitNumbers) -> list[str]:

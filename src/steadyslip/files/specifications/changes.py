@@ -24,7 +24,7 @@ from steadyslip.machine.slider import Slider
 
 
 def apply(text: str, tables: Table, lines: dict[str, int], section: Section | None = None) -> list[Problem]:
-    """Write ``name=value`` into the tables and drop the line number of the old value; returns the problems.
+    """Write ``name=value`` into the tables and drop the line numbers of the old value; returns the problems.
 
     `section` is the further table of the name, None for tables of the rig and protocol.
     """
@@ -54,7 +54,9 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
         table[last] = value_of(raw, name)
     except ParameterError as error:
         return list(error.problems)
-    lines.pop(".".join([*path, last]), None)  # a fault of the new value is not on that line
+    place = ".".join([*path, last])
+    for key in [key for key in lines if f"{key}.".startswith(f"{place}.")]:  # a fault of the new value is not there
+        del lines[key]
     return []
 
 

@@ -52,6 +52,7 @@ from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
+CHANGES = "changes (--set)"  # where faults of what they give are, in place of a file
 LIKE = 0.6  # likeness of a misspelt table's name to the one that is meant: body and bodies
 
 
@@ -154,7 +155,7 @@ class RigFileContents:
         Records of the declared further tables; of a faulty table, its valid part.
     problems : list of Problem
     changed : set of str
-        Full names of the values that changes replaced.
+        Names of the values that changes replaced, as given and in full.
     tables : dict
         As parsed, with the changes.
     tolerances : dict of str to Tolerance
@@ -176,13 +177,23 @@ class RigFileContents:
         return line_of(name, self.lines)
 
     def refuse(self, *others: Problem) -> None:
-        """Raise an error with all problems of the file and `others`, each with its line; does nothing without
-        problems.
+        """Raise an error with all problems of the file and `others`, each with its line, or the change that made it;
+        does nothing without problems.
         """
         if self.problems or others:
-            every = dict.fromkeys([*self.problems, *others])
-            found = [Problem(p.name, p.message, p.line or self.line(p.name)) for p in every]
+            every = list(dict.fromkeys([*self.problems, *others]))
+            if all(map(self._is_of_change, every)):
+                raise RigFileError(every, title=CHANGES)
+            found = [Problem(p.name, f"{p.message} (of the {CHANGES})") if self._is_of_change(p) else
+                     Problem(p.name, p.message, p.line or self.line(p.name)) for p in every]  # fmt: skip
             raise RigFileError(sorted(found, key=lambda p: (p.line is None, p.line or 0)), title=self.source)
+
+    def _is_of_change(self, problem: Problem) -> bool:
+        """True for a problem with what a change gives, or with what it names, which is not in the file."""
+        name, line = problem.name, problem.line or self.line(problem.name)
+        below = any(f"{name}.".startswith(f"{one.removesuffix('.law')}.") for one in self.changed)
+        missing = line is None and any(one.startswith(f"{name}.") for one in self.changed)
+        return problem.line is None and (missing or (below and name not in self.lines))
 
     def refuse_machine(self) -> None:
         """Raise an error if the file describes a machine."""
@@ -252,6 +263,7 @@ def read_tables(
     names = {section.name: section for section in further}
     every = [changes] if isinstance(changes, str) else list(changes)
     own = {change: first for change in every if (first := split(change)[0].partition(".")[0]) in {*names, MAP}}
+    changed = {name for change in every for name in (split(change)[0], repr_short(change))}
     for change, first in own.items():
         if first in names:
             reader.problems += apply(change, tables, lines, names[first])
@@ -259,7 +271,6 @@ def read_tables(
             reader.problem(split(change)[0], f"has no effect here: the table [{MAP}] is read by what computes maps")
     if complete is not None:
         complete(tables)
-    changed = set()
     for change in [change for change in every if change not in own]:
         changed.add(full_name(split(change)[0], tables)[0])
         reader.problems += apply(change, tables, lines)

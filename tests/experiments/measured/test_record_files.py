@@ -42,9 +42,11 @@ def test_xlook_files_are_read(tmp_path, layout):
 
 
 def test_a_damaged_xlook_file_is_refused(tmp_path):
-    (tmp_path / "p1").write_bytes(xlook("f4")[:-3])
-    with pytest.raises(ss.NotAvailable, match="not text"):
-        ss.read_record(tmp_path / "p1")
+    whole = xlook("f4")
+    for damaged in (whole[:-3], whole[: len(whole) // 2], whole + b"\0"):
+        (tmp_path / "p1").write_bytes(damaged)
+        with pytest.raises(ss.NotAvailable, match=r"damaged XLOOK file.*copy it anew"):
+            ss.read_record(tmp_path / "p1")
 
 
 def workbook(path, rows, *, title="p1", more=()):

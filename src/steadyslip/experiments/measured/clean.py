@@ -14,8 +14,15 @@ RESTART = 0.02  # share of rows in a row with times before the latest one from w
 COARSE, EVEN = 0.6, 1.25  # share of distinct times below which a clock may be coarse; deviation of even rows, in ticks
 AROUND = 25  # rows on each side whose mean spacing is the usual one; chosen by trial
 LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay within floating point
+ASSUMED = "(assumed; give area)"  # in the note on a force without an area, so that its stress says nothing
 PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside, a unit is wrong
-USUAL_RATES, USUAL_TRAVEL = (1e-11, 1e-2), 1.0  # mean rate (m/s) and travel (m) of a load point; else a word is said
+USUAL = {
+    "the load point moves at": ("m/s", (5e-9, 3e-3), "displacement and time in the units that are said here (um, s)"),
+    "the load point moves": ("m", (0.0, 1.0), "displacements in the unit that is said here (mm for um)"),
+    "samples come every": ("s", (5e-5, 10.0), "times in the unit that is said here (ms for s)"),
+    "the normal stress is": ("Pa", (2e5, 2e9), "stresses in the unit that is said here (kPa for MPa)"),
+}
+"""Units and ranges of means in laboratories, and what to look at beyond: a factor of 1000 leaves most of the ranges."""
 PLACEHOLDERS = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
 """Placeholders, of either sign, that instruments and programs write for missing values."""
 PLACEHOLDER_RATIO = (
@@ -94,7 +101,7 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
         steps = 0.5 * (si["velocity"][1:] + si["velocity"][:-1]) * spacing
         si["displacement"] = np.concatenate([[0.0], np.cumsum(steps)])
         notes.append("displacement of the load point integrated from its velocity")
-    notes += _unusual_load(si)
+    notes += _unusual(si, any(ASSUMED in note for note in notes))
     normal, shear, displacement, velocity = (
         None if name not in si else frozen(si[name]) for name in ("normal", "shear", "displacement", "velocity")
     )
@@ -279,15 +286,15 @@ def _check_stress(si: dict[str, Array], source: str, lines: Array) -> None:
         raise ParameterError([Problem("normal", message)], title=source)
 
 
-def _unusual_load(si: dict[str, Array]) -> list[str]:
-    """Note on a load point that moves unusually far or fast, as it does where a unit is wrong; no other notes."""
-    travel = float(np.ptp(si["displacement"])) if "displacement" in si else 0.0
-    rate = travel / float(np.ptp(si["time"]))
-    if not travel > 0 or (USUAL_RATES[0] <= rate <= USUAL_RATES[1] and travel <= USUAL_TRAVEL):
-        return []
+def _unusual(si: dict[str, Array], forces: bool) -> list[str]:
+    """Notes on columns whose means are unusual, as they are where a unit is wrong."""
+    time, travel = si["time"], float(np.ptp(si.get("displacement", 0.0)))
+    normal = 0.0 if forces else float(np.mean(si.get("normal", 0.0)))
+    means = (travel / float(np.ptp(time)), travel, float(np.median(np.diff(time))), normal)
     return [
-        f"the load point moves {format_quantity(travel, 'm')}, at {format_quantity(rate, 'm/s')} on average, which is "
-        "unusual in a laboratory; are displacement and time in the units that are said here (mm for um)?"
+        f"{what} {format_quantity(mean, unit)}, which is unusual in a laboratory; are {look}?"
+        for (what, (unit, (low, high), look)), mean in zip(USUAL.items(), means, strict=True)
+        if mean > 0 and not low <= mean <= high
     ]
 
 

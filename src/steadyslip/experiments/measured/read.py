@@ -16,7 +16,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.roles import Parameter
-from steadyslip.experiments.measured.clean import cleaned, without_placeholders
+from steadyslip.experiments.measured.clean import ASSUMED, cleaned, without_placeholders
 from steadyslip.experiments.measured.columns import ROLES, Column, assign_columns, listed, missing_roles
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
@@ -185,7 +185,7 @@ def checked_option(name: str, unit: str, value: Any) -> float:
 def _format_unit(column: Column, area: float, assumed: bool) -> str:
     text = f", {column.unit}" if column.unit != "1" else ""
     if column.force:
-        text += f", a force over {area:g} m^2" + (" (assumed; give area)" if assumed else "")
+        text += f", a force over {area:g} m^2" + (f" {ASSUMED}" if assumed else "")
     return text
 
 

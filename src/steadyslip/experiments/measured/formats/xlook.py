@@ -22,8 +22,22 @@ NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 
 
 def is_xlook(raw: bytes) -> bool:
-    """True if the sizes in the header match the size of the file."""
-    return _size(raw) is not None
+    """True if the sizes in the header match the size of the file, or channels are described as XLOOK does."""
+    return _size(raw) is not None or _described(raw) is not None
+
+
+def _described(raw: bytes) -> tuple[int, int, int] | None:
+    """Channels, rows and columns of a file of any size with descriptions of channels; None if it has none."""
+    for channels in dict.fromkeys(channels for channels, _ in LAYOUTS):
+        heads = [raw[k : k + 26] for k in range(HEAD, HEAD + channels * CHANNEL, CHANNEL)]
+        fields = [_text(part) for head in heads for part in (head[:13], head[13:])]
+        if len(raw) <= HEAD + channels * CHANNEL or not all(field.isprintable() for field in fields):
+            continue
+        for order in (">", "<"):
+            rows, columns = struct.unpack(f"{order}ii", raw[20:28])
+            if 0 < columns <= channels and rows > 0 and all(fields[: 2 * columns : 2]):
+                return channels, rows, columns
+    return None
 
 
 def _size(raw: bytes) -> tuple[int, int, int, int] | None:
@@ -49,7 +63,12 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
     """
     size = _size(raw)
     if size is None:
-        raise NotAvailable(f"{source!r} is no XLOOK file: its header does not say as many numbers as it has")
+        channels, rows, columns = _described(raw) or (0, 0, 0)
+        here = len(raw) - HEAD - channels * CHANNEL
+        raise NotAvailable(
+            f"{source!r} is a damaged XLOOK file: its header says {rows} rows of {columns} columns, "
+            f"{4 * rows * columns} or {8 * rows * columns} bytes, and it has {here}; copy it anew, as a binary file"
+        )
     channels, rows, columns, width = size
     body = HEAD + channels * CHANNEL
     names, units = [], []

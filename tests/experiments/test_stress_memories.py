@@ -13,6 +13,7 @@ import lab_records as lab
 import steadyslip as ss
 import stress_steps_at_random as random_steps
 from steadyslip.experiments.answers.laws import with_law
+from steadyslip.experiments.fitting.memories import Rival, opened
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.spec import spec_from_text
 
@@ -242,6 +243,17 @@ def test_a_step_of_normal_stress_alone_leaves_open_what_no_memory_would_tell():
     found = ss.experiments.compare({"none": none, "free": free})
     assert found.best == "free"
     assert "the records do not tell friction.normal_memory.alpha: 'none' has" in found.verdict
+
+
+def test_a_memory_of_equal_fit_widens_the_intervals_of_what_it_moves_by_some_errors():
+    fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300), starts=9)
+    own = np.sqrt(np.diag(fit.covariance))
+    moved = 3 * own * (np.arange(len(own)) == 0)
+    covariance, found = opened(fit.space, fit.covariance, [Rival(None, fit.space, f * moved) for f in (1.0, 0.5)])
+    wider = np.sqrt(np.diag(covariance))
+    assert 1.96 * wider[0] > 3 * own[0]
+    assert wider[1:] == pytest.approx(own[1:])
+    assert not found
 
 
 def test_a_memory_that_fits_better_is_told_though_residuals_are_white():

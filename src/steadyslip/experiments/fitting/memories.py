@@ -23,6 +23,7 @@ from steadyslip.experiments.numerics.least_squares import minimise
 SIZES = (0.5, 1.0, 1.5, 2.5)  # natural sizes of a memory that are tried: α .1 to .5, as laboratories find
 AS_GOOD = 3.84  # rise of −2 log likelihood up to which a fit is as good: 95 %
 FAR = 4.0  # errors by which a memory moves what is then not determined: its error is less than half of what it must be
+NEAR = 1.0  # errors from which it widens an interval; less makes one wider by less than an eighth
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +43,15 @@ class Rival:
     space: Space
     moved: Array
 
-    def far(self, space: Space, deviations: Array) -> Array:
-        """Mask (p,) of the unknowns without a memory that it moves far beyond their errors, if they have any."""
-        moved = {u.name: abs(x) for u, x in zip(self.space.unknowns, self.moved, strict=True) if not is_time(u)}
-        own = np.array([moved.get(u.name, 0.0) for u in space.unknowns])
-        return np.asarray((own > LEAST_CHANGE) & ((own > FAR * deviations) | ~np.isfinite(deviations)))
+    def shift(self, space: Space) -> Array:
+        """Coordinates (p,) of the unknowns without a memory, less those without it; 0 for times."""
+        moved = {u.name: x for u, x in zip(self.space.unknowns, self.moved, strict=True) if not is_time(u)}
+        return np.array([moved.get(u.name, 0.0) for u in space.unknowns])
+
+    def far(self, space: Space, deviations: Array, errors: float = FAR) -> Array:
+        """Mask (p,) of the unknowns without a memory that it moves by more than so many errors, if they have any."""
+        own = np.abs(self.shift(space))
+        return np.asarray((own > LEAST_CHANGE) & ((own > errors * deviations) | ~np.isfinite(deviations)))
 
 
 def forgets_changes(plan: Plan) -> bool:
@@ -58,7 +63,8 @@ def forgets_changes(plan: Plan) -> bool:
 def equal_memories(
     plan: Plan, ssq: float, values: Mapping[str, float], deviations: Array, independent: float
 ) -> list[Rival]:
-    """Minima with a memory of normal stress held at each of several sizes, that fit as well as none and change much.
+    """Minima with a memory of normal stress held at each of several sizes, that fit as well as none and change more
+    than errors say.
 
     Parameters
     ----------
@@ -74,7 +80,7 @@ def equal_memories(
     """
     space, most = plan.space(), ssq * np.exp(AS_GOOD / independent)
     found = [one for own in _with_memory(plan) for one in _rivals(plan, own, ssq, values)]
-    found = [one for one in found if one.remedy.ssq < most and np.any(one.far(space, deviations))]
+    found = [one for one in found if one.remedy.ssq < most and np.any(one.far(space, deviations, NEAR))]
     return sorted(found, key=lambda one: -one.remedy.gain)
 
 
@@ -103,17 +109,20 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float]) -> I
         yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - idle)
 
 
-def opened(space: Space, deviations: Array, rivals: list[Rival]) -> tuple[Array, tuple[Combination, ...]]:
-    """Mask (p,) of what a memory of equal fit moves far beyond its error, and the combination that it leaves open.
+def opened(space: Space, covariance: Array, rivals: list[Rival]) -> tuple[Array, tuple[Combination, ...]]:
+    """Covariance (p, p) that allows for memories of equal fit, and the combination that they leave open.
+
+    The 95 % interval of what the furthest moves reaches as far as it does; what it moves far beyond has no error.
 
     Parameters
     ----------
     space : Space
         Unknowns of the law without a memory.
-    deviations : ndarray (p,)
-        Their standard deviations, in coordinates.
+    covariance : ndarray (p, p)
+        Of their coordinates.
     rivals : list of Rival
     """
+    deviations = np.sqrt(np.diag(covariance))
     lost, best = np.zeros(len(space), dtype=bool), (-np.inf, 0.0)
     found: tuple[Combination, ...] = ()
     own = [u.name for u in space.unknowns]
@@ -123,7 +132,12 @@ def opened(space: Space, deviations: Array, rivals: list[Rival]) -> tuple[Array,
         names = {name for name, is_far in zip(own, far, strict=True) if is_far}
         inside, added = (np.array([u.name in some for u in one.space.unknowns]) for some in (names, own))
         reach = (-len(one.space), float(np.linalg.norm(one.moved[inside])))  # of the simplest memory, the furthest
-        if reach > best:
+        if names and reach > best:
             direction = np.where(inside | ~added, one.moved, 0.0)
             best, found = reach, (combination(direction, float(np.linalg.norm(direction)), one.space, direction != 0),)
-    return lost, found
+    shifts = [np.where(lost | ~np.isfinite(deviations), 0.0, one.shift(space)) for one in rivals]
+    furthest = max(shifts, key=lambda s: float(np.max(np.abs(s) / deviations)), default=np.zeros(len(space)))
+    wider = covariance + np.outer(furthest, furthest) / AS_GOOD
+    wider[lost, :] = wider[:, lost] = 0.0
+    wider[lost, lost] = np.inf
+    return wider, found

@@ -101,7 +101,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return tuple(one.remedy for one in self._equal_memories())
 
     def with_memories(self) -> Self:
-        """The same fit, without an error of what a memory of normal stress that fits as well moves far.
+        """The same fit, with wider errors of what a memory of normal stress that fits as well moves, or none if far.
 
         Where one fits better, the text says so, as it does where residuals have structure.
         """
@@ -109,10 +109,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
             return self
         rivals = self._equal_memories()
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
-        lost, found = opened(self.space, self._deviations, equal if len(equal) == len(rivals) else [])
-        covariance = self.covariance.copy()
-        covariance[lost, :] = covariance[:, lost] = 0.0
-        covariance[lost, lost] = np.inf
+        covariance, found = opened(self.space, self.covariance, equal if len(equal) == len(rivals) else [])
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found)
         same.__dict__["remedies"] = tuple(one.remedy for one in rivals)
         return same

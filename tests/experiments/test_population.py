@@ -197,6 +197,11 @@ def test_rocks_that_have_a_minus_b_alike_tell_of_the_next_one():
     assert middle > 0.95
     text = str(rock)
     assert "a - b: mean -0.003" in text
+    about = {part.partition(":")[0].split()[-1]: part.partition("differ by")[2] for part in text.split("\n\n")}
+    shares = {name: "%" in said.partition("\n")[0] for name, said in about.items() if said}
+    assert shares.pop("b") is False  # of a − b, which may be 0
+    assert set(shares) > {"friction.a", "friction.b"}
+    assert all(shares.values())
     assert "differ together friction.a and friction.b" in text
     found = rock.others(3)
     np.testing.assert_allclose(found["a - b"], found["friction.a"] - found["friction.b"], rtol=1e-12)

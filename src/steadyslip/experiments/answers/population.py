@@ -145,8 +145,10 @@ class Population(ReadOnly):
         for name, one in self.axes.quantities.items():
             mean, other = self.mean(name), self.another(name)
             lines += ["", f"{name}: mean {mean.shown()}, 95 %: {mean.range()}"]
-            lines.append(f"  experiments differ by {_spread_words(self.spread(name), one)}")
-            lines += [f"  {_slope_words(self.slope(name, c), one, c, x)}" for c, x in self.conditions.items()]
+            lines.append(f"  experiments differ by {_spread_words(self.spread(name), one, mean.value)}")
+            lines += [
+                f"  {_slope_words(self.slope(name, c), one, c, x, mean.value)}" for c, x in self.conditions.items()
+            ]
             lines.append(f"  another experiment, 95 %: {other.range()}")
             if name == DIFFERENCE:
                 lines.append(f"  of further experiments {format_percent(self.weakening)} have b > a")
@@ -291,26 +293,29 @@ def _plain(one: Estimate) -> dict[str, float]:
     return {"value": one.value, "error": one.error, "low": one.low, "high": one.high}
 
 
-def _spread_words(found: tuple[float, float, float], one: MemberQuantity) -> str:
+def _spread_words(found: tuple[float, float, float], one: MemberQuantity, mean: float) -> str:
     middle, low, high = found
-    if one.logarithmic:
-        return f"{100 * middle:.2g} % ({100 * low:.2g} to {100 * high:.2g} %)"
-    return f"{format_quantity(middle, one.unit)} ({format_range(low, high, one.unit)})"
+    if one.name == DIFFERENCE:  # whose mean may be 0
+        return f"{format_quantity(middle, one.unit)} ({format_range(low, high, one.unit)})"
+    middle, low, high = (100 * x / (1.0 if one.logarithmic else abs(mean)) for x in found)
+    return f"{middle:.2g} % ({low:.2g} to {high:.2g} %)"
 
 
-def _slope_words(found: tuple[float, float, float], one: MemberQuantity, condition: str, values: Array) -> str:
+def _slope_words(
+    found: tuple[float, float, float], one: MemberQuantity, condition: str, values: Array, mean: float
+) -> str:
     """Text of the change of the mean from the least to the largest value of a condition."""
     ends = (float(np.min(values)), float(np.max(values)))
     whole = " to ".join(_condition(condition, x) for x in ends)
     middle, low, high = (x * (ends[1] - ends[0]) for x in found)
-    if one.logarithmic:  # of the mean itself, not its logarithm
-        middle, low, high = (100 * np.expm1(x) for x in (middle, low, high))
-        change = f"{middle:+.3g} % ({low:+.3g} to {high:+.3g} %)"
-    else:
+    if one.name == DIFFERENCE:
         change = (
             f"{format_quantity(middle, one.unit)} ({format_quantity(low, one.unit)} to "
             f"{format_quantity(high, one.unit)})"
         )
+    else:
+        middle, low, high = (100 * np.expm1(x) if one.logarithmic else 100 * x / mean for x in (middle, low, high))
+        change = f"{middle:+.3g} % ({low:+.3g} to {high:+.3g} %)"
     return f"from {condition} {whole} the mean changes by {change}"
 
 

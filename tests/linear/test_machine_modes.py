@@ -85,7 +85,7 @@ def test_modes_are_those_of_an_undamped_pair():
     assert fast.energy["links.screw"] == pytest.approx(0.5, rel=1e-7)
     assert fast.energy["bodies.motor"] == pytest.approx(0.5 * 5 / 7, rel=1e-6)
     assert fast.words() == (
-        "the motor judders, table by 40 % of that; 50 % of the energy is in the screw"
+        "the motor oscillates, table by 40 % of that; 50 % of the energy is in the screw"
         if fast.energy["links.screw"] >= fast.energy["bodies.motor"]
         else fast.words()
     )
@@ -93,7 +93,7 @@ def test_modes_are_those_of_an_undamped_pair():
 
 def test_a_pad_that_moves_both_ways_is_one_body():
     words = ss.modes(brake(rate_state(0.02, -0.01, 0.5)))[0].words()
-    assert words.startswith("the pad (along and normal) judders;")
+    assert words.startswith("the pad (along and normal) oscillates;")
 
 
 def test_motors_and_tables_are_measured_by_the_rigid_motion():

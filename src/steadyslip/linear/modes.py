@@ -26,13 +26,13 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import delays_of
 
 WORDS = {
-    "judder": "judders|judder", "drift": "drifts|drift", "still": "hardly moves|hardly move",
+    "oscillate": "oscillates|oscillate", "drift": "drifts|drift", "still": "hardly moves|hardly move",
     "opposed": " against each other", "the": "the {name}", "and": " and ", "normal": " (normal)",
     "both": " (along and normal)", "share": "{name} by {share} of that",
     "energy": "; {share} of the energy is in the {name}",
 }  # fmt: skip
 """Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""
-MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body judders, below the second it hardly moves
+MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body oscillates, below the second it hardly moves
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Mode(Displayed):
         rest = [name for name, size in sizes.items() if HARDLY <= size < MOVES]
         still = [name for name, size in sizes.items() if size < HARDLY]
         movers = _merged(leads)
-        parts = [f"{_listed(movers)} {_does('judder' if self.eigenvalue.imag else 'drift', movers)}"]
+        parts = [f"{_listed(movers)} {_does('oscillate' if self.eigenvalue.imag else 'drift', movers)}"]
         if len(leads) == 2 and self._opposed(*leads):
             parts[0] += WORDS["opposed"]
         if rest:

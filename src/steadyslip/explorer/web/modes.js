@@ -102,7 +102,7 @@ export function words(mode, { moves, hardly, suffix, words: said }) {
     return all.length === 1 ? all[0] : all.slice(0, -1).join(", ") + said.and + all[all.length - 1];
   };
   const does = (what, names) => said[what].split("|")[names.length > 1 ? 1 : 0];
-  const parts = [`${listed(movers)} ${does(mode.eigenvalue.im ? "judder" : "drift", movers)}`];
+  const parts = [`${listed(movers)} ${does(mode.eigenvalue.im ? "oscillate" : "drift", movers)}`];
   if (leads.length === 2 && leads[0].replace(suffix, "") !== leads[1].replace(suffix, "")) {
     const [a, b] = leads.map((name) => mode.amplitudes[name]);
     if (a.re * b.re + a.im * b.im < 0) parts[0] += said.opposed;

@@ -14,7 +14,7 @@ from delays import apart, lagging, late_axis, some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
 from steadyslip.linear import quasipolynomial as quasi, windows
 from steadyslip.linear.argument import count_by_argument
-from steadyslip.linear.spectrum import unstable_roots
+from steadyslip.linear.spectrum import outgrown, unstable_roots
 from steadyslip.linear.waves import Waves
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model import build_model
@@ -221,6 +221,18 @@ def test_late_machines_at_random_have_the_roots_of_theory_11s_matrix(seed):
         values, near = (np.linalg.svd(matrix(z), compute_uv=False) for z in (s, s * (1 + 1e-6)))
         assert values[-1] < 1e-8 * values[0] or values[-1] < 1e-3 * near[-1]
     assert int(unstable_roots(operating_point(machine))) == winding(matrix, 300.0)
+
+
+def test_edges_under_a_delay_are_judged_by_counts_without_eigenvalues(monkeypatch):
+    machine = at_random(8, delay=0.208)[0]
+    right = ss.eigenvalues(machine, {"drive.kp": (gains := np.geomspace(1.0, 300.0, 9))}).real[:, 0]
+    assert 0 < np.sum(right > 0) < len(gains)
+    assert np.array_equal(outgrown(operating_point(machine, {"drive.kp": gains}), False, 1e-9), right > 0)
+    monkeypatch.setattr(quasi, "rightmost", lambda *_: pytest.fail("all eigenvalues, which take seconds"))
+    edges = ss.boundary(machine, "drive.kp")
+    at_edges = operating_point(machine, {"drive.kp": np.array([edge.value for edge in edges])})
+    assert edges
+    assert np.array_equal(outgrown(at_edges, False, 1e-9), [edge.stable == "neither" for edge in edges])
 
 
 # --- what people see --------------------------------------------------------------------------------

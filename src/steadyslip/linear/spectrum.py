@@ -206,6 +206,8 @@ def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray
     neutral : bool or ndarray of bool
         True where one root is zero to within rounding; the smallest root is then left out.
     """
+    if point.model.delays:
+        return _grows_late(point, neutral, share)
     s = spectrum(point)
     with np.errstate(all="ignore"):
         size = np.abs(s)
@@ -213,3 +215,14 @@ def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray
         least = np.min(size, axis=-1, keepdims=True, where=~np.isnan(size), initial=np.inf)
         grows &= ~(np.asarray(neutral)[..., None] & (size <= least))
         return np.asarray(np.any(grows, axis=-1) | is_ill_posed(point))
+
+
+def _grows_late(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
+    """As `outgrown`, with delays: those right of a line, at `share` of the mean size without delay, are counted."""
+    sets = delays_in_terms(point.model)
+    with np.errstate(all="ignore"):
+        c, h, _ = with_delays.nondimensional(*quasipolynomial(point))
+        right = with_delays.count_right_if_feasible(c, h, sets, share)
+        static, slope = np.sum(c[..., 0], axis=-1), np.sum(c[..., 1] - h * c[..., 0], axis=-1)
+        least = np.asarray(neutral) & (-static / slope > share)
+        return np.asarray((right > least) | is_ill_posed(point))

@@ -374,3 +374,20 @@ def test_a_brief_stop_is_no_glitch():
         course = load_course(time, measured(time, [(48.0, 10.0, 0.0), (48.0 + stop, 0.0, 10.0)], 0.03, 0, 0, 7))
         assert len(course.changes) == 2, stop
         assert course.levels[1] == 0.0
+
+
+@pytest.mark.parametrize("begin", [75.0, 75.07])
+@pytest.mark.parametrize("lasts", [0.8, 1.0])
+def test_a_hold_of_few_samples_between_long_slides_is_one_and_a_slip_of_the_sensor_is_none(begin, lasts):
+    """One of 1 s, sampled every .15 s, in a series with others of 10 to 1000 s was a slip of the sensor."""
+    time = np.arange(0.0, 150.0, 0.15)
+    sensor = 2e-8 * np.random.default_rng(3).standard_normal(len(time))
+    held = 1e-6 * moved(time, [(begin, 10.0, 0.0), (begin + lasts, 0.0, 10.0)]) + sensor
+    course = load_course(time, held)
+    assert [change.time for change in course.changes] == pytest.approx([begin, begin + lasts], abs=0.02)
+    assert (course.levels[1], course.slips, course.glitches) == (0.0, 0, 0)
+    for over in (0.0, lasts):  # at once, and through samples between
+        slipped = 1e-5 * (time - lasts * (time > begin) - 0.5 * lasts * (np.abs(time - begin - over / 2) < over / 2))
+        course = load_course(time, slipped + sensor)
+        assert not course.changes
+        assert course.slips > 0

@@ -30,6 +30,8 @@ LEAD = 8.0  # displacement by which rates must differ over a run, in standard de
 STRAIGHT = 20  # samples on one line from which a part that is over soon is no slip of the sensor, which is over at once
 PLAIN = 100.0  # the same displacement that makes a piece a run of its own, however short; chosen by trial
 RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record; chosen by trial
+HELD, FLAT = 20.0, 4
+"""Standard deviations of the noise by which a brief hold must part the lines beside it, and samples at rest in it."""
 COARSE = 20_000  # samples above which means are segmented, to bound the time; chosen by trial
 
 
@@ -136,6 +138,7 @@ def _runs_of(time: Array, displacement: Array, lasting: float) -> list[Run]:
         count = len(groups)
         groups = _joined_across_wander(_without_glitches(_joined_by_rate(groups, pieces), pieces), pieces)
     runs = [fitted_run(Run([pieces.ends[k] for k in members]), time, displacement, lasting) for members in groups]
+    runs = [part for run in runs for part in _parted_by_holds(run, time, displacement, pieces.usual, lasting)]
     runs = _joined_across_flanks(runs, time, displacement, pieces.usual, lasting)
     return _with_ends(runs, time, displacement, pieces.usual, lasting)
 
@@ -174,6 +177,40 @@ def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement
         if abs(sample - before.last) <= 2 * step and first + 1 < sample < last - 1:
             before.members[-1], after.members[0] = (first, sample), (sample, last)
     return [fitted_run(run, time, displacement, lasting) for run in runs]
+
+
+def _parted_by_holds(run: Run, time: Array, displacement: Array, noise: float, lasting: float) -> list[Run]:
+    """Parts of a run before, within and after holds so brief that they seem to be slips of the sensor."""
+    parts, own = [], [run.members[0]]
+    for k, other in enumerate(run.members[1:]):
+        lines = [run.levels[group] + run.rate * (time - time[0]) for group in run.groups[k : k + 2]]
+        held = _brief_hold(lines, run.rate, slice(own[-1][1] - 2, other[0] + 2), displacement, noise)
+        if held is None:
+            own.append(other)
+            continue
+        first, last = held
+        parts += [[*own[:-1], (own[-1][0], min(own[-1][1], first))], [held]]
+        own = [(max(other[0], last), other[1])]
+    return [run] if not parts else [fitted_run(Run(m), time, displacement, lasting) for m in [*parts, own]]
+
+
+def _brief_hold(
+    lines: list[Array], rate: float, rows: slice, displacement: Array, noise: float
+) -> tuple[int, int] | None:
+    """Range of samples at rest that leads from one line to the next of the same rate; None if the sensor slipped."""
+    x, before, after = (column[rows] for column in (displacement, *lines))
+    drop = float(before[0] - after[0])
+    if drop * rate <= 0 or abs(drop) < HELD * noise:
+        return None
+    level, sign = float(np.median(x)), np.sign(rate)
+    for _ in range(3):  # which samples are at rest depends on the level, and the level on these
+        flat = (sign * (before - level) > 0) & (sign * (after - level) < 0)
+        if np.sum(flat) < FLAT:
+            return None
+        level = float(np.mean(x[flat]))
+    model = np.where(flat, level, np.where(sign * (before - level) <= 0, before, after))
+    first = rows.start + int(np.argmax(flat))
+    return (first, first + int(np.sum(flat))) if np.max(np.abs(x - model)) <= BACK * noise else None
 
 
 def _joined_across_flanks(

@@ -4,13 +4,16 @@ Tests of a folder of src/steadyslip are in the folder of the same name here; tho
 in whole, those of documents, packaging and the code itself in house. What tests share is in helpers, with the oracles
 and the scripts that try random things without end; numbers found elsewhere are in reference.
 
-Fresh random examples on a developer's machine, fewer and the same ones every time in continuous integration. What
-``-m "not slow"`` leaves out is listed in slow.txt: each test, and how many of its parameters come before.
-``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.
+Fresh random examples on a developer's machine, fewer and the same ones every time in continuous integration.
 
 Tests marked ``campaign`` do a fixed part of what scripts do by the thousand: random rigs and files against a second
-route, killed processes, repeated fits, pages of many fits. A run of the whole leaves them out,
-``-m campaign`` runs them; CI does both.
+route, killed processes, repeated fits. So do the parameters of a test beyond its first `LONG` CPU seconds, and a test
+that takes longer by itself. A run of the whole leaves them out, ``-m campaign`` runs them; CI does both, and what is
+asked for by file or name runs in full. ``-m "not slow"`` leaves out what is beyond `QUICK`.
+
+slow.txt lists those tests: how many of their parameters are quick, and how many belong to a run of the whole.
+``pytest --measure -n 0`` runs everything and writes that list anew, from CPU seconds with those of processes that were
+waited for.
 """
 
 import gc
@@ -27,11 +30,9 @@ if os.environ.get("CI"):
     settings.load_profile("ci")
 
 SLOW = Path(__file__).with_name("slow.txt")
-CAMPAIGN_PAGES = tuple(
-    f"docs/{name}.md::" for name in ("how-to/fit-normal-stress-steps", "how-to/fit-a-record", "explanation/slow-slip")
-)
-"""Pages of many fits or many branches of cycles, 6 to 18 CPU seconds each."""
-QUICK = 0.3  # CPU seconds that a test, with all of its parameters, may take before the rest of them is slow
+QUICK, LONG = 0.3, 1.0
+"""CPU seconds that a test, with all of its parameters, may take before the rest of them is slow, and of campaigns: so
+the quick tests take half a minute on two cores, and the whole four."""
 
 
 def pytest_addoption(parser):
@@ -39,18 +40,20 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(items):
-    listed = (line.rsplit(" ", 1) for line in SLOW.read_text(encoding="utf-8").splitlines())
-    left = {test: int(quick) for test, quick in listed}
+    left = {test: [int(quick), int(whole)] for test, quick, whole in _listed()}
     for item in items:
-        if item.nodeid.startswith(CAMPAIGN_PAGES):
-            item.add_marker(pytest.mark.campaign)
         if item.get_closest_marker("campaign") or "browser" in item.fixturenames:
             item.add_marker(pytest.mark.slow)  # a browser works in processes of its own, whose seconds are not measured
-        test = item.nodeid.partition("[")[0]
-        if test in left:
-            if not left[test]:
-                item.add_marker(pytest.mark.slow)
-            left[test] -= left[test] > 0
+        counts = left.get(item.nodeid.partition("[")[0], [])
+        for place, mark in enumerate((pytest.mark.slow, pytest.mark.campaign)[: len(counts)]):
+            if not counts[place]:
+                item.add_marker(mark)
+            counts[place] -= counts[place] > 0
+
+
+def _listed():
+    """Tests of slow.txt, and their counts of parameters that are quick and that belong to a run of the whole."""
+    return [line.rsplit(" ", 2) for line in SLOW.read_text(encoding="utf-8").splitlines()]
 
 
 def pytest_collection_finish():
@@ -88,10 +91,10 @@ def unpainted(monkeypatch):
 
 
 def pytest_configure(config):
-    if config.args_source is config.ArgsSource.TESTPATHS and not config.option.markexpr:
-        config.option.markexpr = "not campaign"
     if config.getoption("--measure"):
         config.pluginmanager.register(_Measured(), "measured")
+    elif config.args_source is config.ArgsSource.TESTPATHS and not config.option.markexpr:
+        config.option.markexpr = "not campaign"
 
 
 class _Measured:
@@ -110,7 +113,7 @@ class _Measured:
     def pytest_sessionfinish(self):
         """Tests that did not run keep their line."""
         ran = {name.partition("[")[0] for name in self.seconds}
-        others = [line for line in SLOW.read_text(encoding="utf-8").splitlines() if line.rsplit(" ", 1)[0] not in ran]
+        others = [" ".join(line) for line in _listed() if line[0] not in ran]
         SLOW.write_text("\n".join([*sorted([*others, *slow_ones(self.seconds)]), ""]), encoding="utf-8")
 
     def pytest_terminal_summary(self, terminalreporter):
@@ -120,12 +123,13 @@ class _Measured:
 
 
 def slow_ones(seconds: dict[str, float]) -> list[str]:
-    """Tests that take longer than `QUICK`, and how many parameters they have until then."""
+    """Tests that take longer than `QUICK`, and how many parameters they have until then and until `LONG`."""
     groups: dict[str, list[float]] = {}
     for name, own in seconds.items():
         groups.setdefault(name.partition("[")[0], []).append(own)
-    quick = {test: sum(used <= QUICK for used in accumulate(own)) for test, own in groups.items()}
-    return sorted(f"{test} {count}" for test, count in quick.items() if count < len(groups[test]))
+    counts = {test: [sum(used <= most for used in accumulate(own)) for most in (QUICK, LONG)]
+              for test, own in groups.items()}  # fmt: skip
+    return sorted(f"{test} {quick} {whole}" for test, (quick, whole) in counts.items() if quick < len(groups[test]))
 
 
 def _cpu() -> float:

@@ -452,9 +452,9 @@ def test_contours_beside_a_gain_that_is_enough_alone_are_left_out():
     rig = ss.read_rig("examples/slow-axis.toml")
     ax = ss.figures.stability_chart(rig, "friction.b", "drive.kp", points=61)
     (lines,) = [one for one in ax.collections if isinstance(one, ContourSet)]
+    known, edge = _edge_over(rig.with_values({"drive.kp": 1e3}), np.linspace(0.012, 0.024, 30))
     for level, path in zip(1 / lines.levels, lines.get_paths(), strict=True):
         b, kp = np.concatenate(path.to_polygons(closed_only=False)).T
-        known, edge = _edge_over(rig.with_values({"drive.kp": 1e3}), np.linspace(0.012, 0.024, 30))
         inner = (b > known[0]) & (kp < 0.9 * ax.get_ylim()[1])
         assert level < 1
         assert np.abs(np.log(kp / (level * np.interp(b, known, edge))))[inner].max() < 0.05

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from steadyslip import figures
 from steadyslip.core import palette
 from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
+from steadyslip.figures.hunting import hunting
 from steadyslip.figures.map_axes import Scale, is_geometric
 from steadyslip.figures.style import EDGES, save_with_footer
 from steadyslip.maps.view.cut import _quantiles, _with_failures
@@ -111,4 +113,44 @@ def test_a_saved_figure_says_what_it_shows(tmp_path, ending):
         assert b"/FontFile2" in (tmp_path / "run.pdf").read_bytes()
     if ending == "svg":
         assert "<text" not in (tmp_path / "run.svg").read_text(encoding="utf-8")
+    plt.close(figure)
+
+
+def _of_column(kind):
+    """A figure of some kind as a column of a journal has it, and the result that it is of."""
+    if kind == "machine verdict":
+        found = ss.analyze(ss.read_rig("examples/machines/feed-axis.toml"))
+        return figures.machine_verdict(found), found
+    if kind == "hunting":
+        held = ss.hunt(ss.read_rig("examples/hunting-axis.toml"))
+        return hunting(held), held
+    rig = ss.read_rig("examples/triaxial.toml" if kind == "chart" else "examples/double-direct-shear.toml")
+    if kind == "chart":
+        return figures.stability_chart(rig, "friction.b", "axial_stiffness", points=21), ss.analyze(rig)
+    if kind == "locus":
+        return figures.root_locus(rig), ss.analyze(rig)
+    rig = ss.read_rig("examples/inclined-spring.toml")
+    if kind == "mass":
+        return figures.critical_stiffness_against_mass(rig), ss.analyze(rig)
+    within = ss.tolerate(rig, {"friction.a": "10 %", "friction.b": "10 %"})
+    return figures.tolerances(within), within
+
+
+@pytest.mark.parametrize("kind", ["machine verdict", "hunting", "chart", "locus", "mass", "tolerances"])
+def test_a_column_of_a_journal_holds_all_words(tmp_path, kind):
+    """Nothing is cut at the edge of a saved figure of 85 mm, numbers of an axis do not touch, and axes keep room."""
+    with figures.journal():
+        axes, found = _of_column(kind)
+        save_with_footer(axes, str(tmp_path / "figure.png"), found)
+    figure = np.ravel(axes)[0].figure
+    assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+    figure.draw_without_rendering()
+    for ax in np.ravel(axes):
+        assert ax.get_window_extent().width > 0.25 * figure.bbox.width
+        numbers = [one.get_window_extent() for one in ax.get_xticklabels() if one.get_text()]
+        assert not any(a.x1 > b.x0 > a.x0 for a, b in pairwise(numbers))
+        box = ax.get_tightbbox()
+        assert min(box.x0, box.y0) > -1
+        assert box.x1 < figure.bbox.x1 + 1
+        assert box.y1 < figure.bbox.y1 + 1
     plt.close(figure)

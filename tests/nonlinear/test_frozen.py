@@ -56,6 +56,18 @@ def test_verdicts_go_on_where_the_motion_ends():
     assert "the motion ends at 20" in str(found)
 
 
+def test_a_rig_that_is_unstable_from_the_start():
+    """Disturbances grow from the start on, whatever crossings come later: growth and words count from there."""
+    halt = [ss.protocol.VelocityStep(at=1, to=1.2e-5), ss.protocol.VelocityStep(at=300, to=0.0),
+            ss.protocol.VelocityStep(at=310, to=1e-5)]  # fmt: skip
+    found = ss.frozen_verdicts(press(stiffness=2e9), halt, until=320)
+    assert [verdict for _, verdict in found.crossings] == ["no steady sliding", "unstable"]
+    assert 1 < found.departure < 300
+    rates = np.interp(np.linspace(0, found.departure, 10_001), found.t, found.growth_rate)
+    assert found.e_folds == pytest.approx(np.mean(rates) * found.departure, rel=0.02)  # moments are some 1 s apart
+    assert "later" not in str(found)
+
+
 def test_a_heavy_block_departs_where_it_takes_off():
     heavy = press(mass=1e12, stiffness=1e9)
     found = ss.frozen_verdicts(heavy, ss.protocol.NormalStressRamp(at=0, by=-10e6, duration=1), until=1)

@@ -17,6 +17,7 @@ from fuzz_rigs import DRIVES, FRICTION
 from public_names import public_results
 from read_pages import words
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
+from steadyslip.core.format import format_quantity
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.files.standalone import write_page
@@ -301,7 +302,11 @@ def test_a_threshold_says_in_its_headline_that_all_or_nothing_is_survived(kicked
     none = ss.threshold(own.with_values({"stiffness": 1e9}), "velocity")
     assert "No kick is survived" in words(ss.report(none, explorer=False).html)
     every = dataclasses.replace(found[0], size=np.inf, bracket=(25.0, np.inf), amount=np.inf)
-    assert "Every kick that was tried is survived" in words(ss.report(every, explorer=False).html)
+    told = ss.report(every, explorer=False).html
+    amount = format_quantity(every.survived, "m/s", 4)
+    assert f"Survives every velocity kick up to {amount}, the largest tried" in words(told)
+    undecided = dataclasses.replace(found[0], size=np.nan, bracket=(0.0, np.inf), amount=np.inf)
+    assert "Not decided: which kicks are survived" in words(ss.report(undecided, explorer=False).html)
 
 
 @pytest.mark.usefixtures("unpainted")

@@ -161,3 +161,10 @@ def test_orders_and_subsets_are_complete():
     assert {tuple(row) for row in between._all_subsets(3)} == set(itertools.product((False, True), repeat=3))
     rows = between._prefixes(np.array([[2, 0, 1]]))
     assert rows.tolist() == [[False] * 3, [False, False, True], [True, False, True], [True] * 3]
+
+
+def test_items_of_lists_are_told_by_their_values():
+    """The states of a friction law that the other lacks: keys and values with units, no Python."""
+    one, two = (ss.read_rig(f"examples/{name}.toml") for name in ("inclined-spring", "double-direct-shear"))
+    text = str(ss.compare_rigs(one, two))
+    assert re.search(r"friction\.states +none -> b 0\.006, d_c 4 um; b 0\.002, d_c 40 um", text)

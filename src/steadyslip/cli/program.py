@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Annotated, Any
 
 import typer
@@ -21,6 +22,9 @@ COMMANDS = (
     *(simulate, cycles, threshold, response, hunt, verdicts),
     *(map_, sensitivity, reproduce, examples, init, schema),
 )
+GARBAGE = 50_000
+"""Objects made between two searches for garbage: imports and formulas make some 10⁵ that live on, and Python's own 700
+take a tenth of a verdict's time."""
 
 
 class _Commands(TyperGroup):
@@ -58,4 +62,5 @@ for command in COMMANDS:
 
 def main() -> None:
     """Run the command line and exit; entry point of the package."""
+    gc.set_threshold(GARBAGE)
     end(app)

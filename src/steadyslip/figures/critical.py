@@ -77,7 +77,7 @@ def critical_stiffness_against_mass(
             _vertical_text(ax, limit, f"$m_{{*cr2}}$, {angle / deg:.4g}°", style["color"])
     ax.set(xscale="log", yscale="log", xlim=(m_star.min(), m_star.max()))
     ax.set_xlabel("dimensionless mass $m_* = m v_0^2 / (σ_{ss} d_c)$ (1)")
-    ax.set_ylabel("dimensionless critical stiffness $κ_{cr} = k_{cr} d_c / σ_{ss}$ (1)")
+    ax.set_ylabel("dimensionless critical stiffness\n$κ_{cr} = k_{cr} d_c / σ_{ss}$ (1)")
     _limit_height(ax, kappa)
     _mark_crossing(ax, rig, angles, m_star)
     ax.legend(loc="upper left", title=_lock_up_note(rig), title_fontsize="small", frameon=False, alignment="left")

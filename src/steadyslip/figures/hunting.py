@@ -11,7 +11,7 @@ from steadyslip.nonlinear.hunting.hunt_result import Hunt
 
 def hunting(result: Hunt) -> np.ndarray:
     """Plot error and force of the drive over time in two panels; grey: the target."""
-    panels = new_panels(2, 1, (6.4, 4.4), sharex=True)[:, 0]
+    panels = new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0]
     across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)
     series = (("target less place", result.error, result.unit), ("force of the drive", result.force, result.force_unit))
     for axes, (name, values, si) in zip(panels, series, strict=True):

@@ -156,7 +156,8 @@ def _own_label(ax: Axes, own_roots: Any) -> str:
     outside = own_roots[(own_roots.real < left) | (own_roots.real > right) | (np.abs(own_roots.imag) > top)]
     if not outside.size:
         return "this rig"
-    return "this rig; out of view: " + ", ".join(_format_complex(s) for s in outside if s.imag >= 0) + " 1/s"
+    values = ",\n".join(_format_complex(s) for s in outside if s.imag >= 0)
+    return f"this rig; out of view\n{values} 1/s"
 
 
 def _format_complex(s: complex) -> str:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLUE, GREY, ORANGE, SKY, STABLE, VERMILION
-from steadyslip.figures.style import axes_or_new, parameter_label
+from steadyslip.figures.style import add_legend_above, axes_or_new, is_narrow, parameter_label
 from steadyslip.linear import Modes
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
@@ -42,20 +44,26 @@ def machine_verdict(found: Analysis) -> np.ndarray:
     rows = max(len(_drawn_margins(found)), 4)
     if found.mode is None:
         return np.array([stable_ranges(found, axes_or_new(None, 1.4 + 0.32 * rows))])
-    beside = 3.6 + 0.28 * len(found.mode.amplitudes)  # inches for the mode, its energies and the eigenvalues
-    figure = plt.figure(figsize=(9.6, max(1.6 + 0.34 * rows, beside)), layout="constrained")
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.5, 1), height_ratios=(1.3, 1))
-    axes = [figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])]
-    for draw, ax in zip((stable_ranges, mode_shape, eigenvalue_plane), axes, strict=True):
-        draw(found, ax)
-    return np.array(axes)
+    width = rcParams["figure.figsize"][0]
+    bars = 1.2 + 0.28 * len(found.mode.amplitudes)  # inches for the mode and its energies
+    if not is_narrow():
+        size = 1.5 * width, max(1.6 + 0.34 * rows, 2.4 + bars)
+        layout: Any = [["ranges", "mode"], ["ranges", "plane"]]
+        shares: Any = {"width_ratios": (1.5, 1), "height_ratios": (1.3, 1)}
+    else:
+        heights = (0.6 + 0.2 * rows, 0.7 * bars, 1.7)
+        size, layout, shares = (width, sum(heights)), [["ranges"], ["mode"], ["plane"]], {"height_ratios": heights}
+    axes = plt.figure(figsize=size, layout="constrained").subplot_mosaic(layout, **shares)
+    for draw, name in ((stable_ranges, "ranges"), (mode_shape, "mode"), (eigenvalue_plane, "plane")):
+        draw(found, axes[name])
+    return np.array([axes[name] for name in ("ranges", "mode", "plane")])
 
 
 def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     """Plot the stable range of each parameter, the others held, as a bar over the parameter divided by its own value.
 
-    Only positive parameters with an edge within a factor of 100 are drawn, nearest edge first; the text is the value at
-    that edge.
+    Only positive parameters with an edge within a factor of 100 are drawn, nearest edge first; beside each is
+    the value at that edge.
 
     Raises
     ------
@@ -72,6 +80,8 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     if not margins:
         raise NotAvailable("no parameter of this machine has an edge that could be drawn")
     ax = axes_or_new(ax, 1.4 + 0.32 * len(margins))
+    beside = partial(ax.text, 1.02, va="center", fontsize="small", transform=ax.get_yaxis_transform())
+    beside(-0.8, "edge")
     for row, margin in enumerate(margins):
         known = (
             max(margin.searched[0] / margin.value, 1 / _SPAN_FACTOR),
@@ -83,15 +93,16 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
             a, b = max(low / margin.value, known[0]), min(high / margin.value, known[1])
             if a < b:
                 ax.barh(row, b - a, left=a, height=0.62, color=STABLE, edgecolor=BLACK, linewidth=0.6, label="_stable")
-        _edge_text(found, ax, row, margin)
+        if margin.edge is not None:
+            beside(row, typeset(told(found.rig, margin.parameter, margin.edge.value)))
     ax.axvline(1.0, color=BLACK, linewidth=2.5)
     ax.set_xscale("log")
     ax.set_xlim(1 / _SPAN_FACTOR, _SPAN_FACTOR)
-    ax.set_xticks([0.01, 0.1, 1, 10, 100], ["1/100", "1/10", "as it is", "× 10", "× 100"])
+    ax.set_xticks([0.01, 0.1, 1, 10, 100], ["1/100", "1/10", "1", "10", "100"])
     _label_rows(ax, [parameter_label(found.rig, margin.parameter) for margin in margins])
     left = len(undrawn_edges(found))
     more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
-    ax.set_xlabel(f"value over its own; blue: stable, hatched: unstable or none{more}")
+    ax.set_xlabel(f"value over its own, now at 1\nblue: stable, hatched: unstable or none{more}")
     return ax
 
 
@@ -123,21 +134,6 @@ def _stable_intervals(margin: Margin) -> list[tuple[float, float]]:
     stable = [edges[0].stable == "below"]
     stable += [edge.stable == "above" for edge in edges]
     return [(low, high) for low, high, good in zip(ends[:-1], ends[1:], stable, strict=True) if good]
-
-
-def _edge_text(found: Analysis, ax: Axes, row: int, margin: Margin) -> None:
-    edge = margin.edge
-    if edge is None:
-        return
-    text = typeset(told(found.rig, margin.parameter, edge.value))
-    ratio = edge.value / margin.value
-    left = (
-        1 / _SPAN_FACTOR**0.75 < ratio < 1 or ratio > _SPAN_FACTOR**0.75
-    )  # text on the side of the edge with more room
-    ax.annotate(
-        text, (ratio, row), xytext=(-3 if left else 3, 0), textcoords="offset points", ha="right" if left else "left",
-        va="center", fontsize=7.5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85},
-    )  # fmt: skip
 
 
 def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
@@ -172,10 +168,10 @@ def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
         degrees = math.degrees(math.atan2(one.imag, one.real))
         behind = f", {degrees:+.0f}°" if abs(math.sin(math.radians(degrees))) > 0.1 and abs(one) > 0.01 else ""
         ax.text(0.03 if size < 0 else -0.03, row, f"{abs(one):.2g}{behind}".replace("-", "−"), va="center",
-                ha="left" if size < 0 else "right", fontsize=7.5)  # fmt: skip
+                ha="left" if size < 0 else "right", fontsize="small")  # fmt: skip
     for row, (_, share) in enumerate(energy.items(), start=len(names)):
         ax.barh(row, share, height=0.6, color=ORANGE)
-        ax.text(-0.03, row, format_percent(round(share, 3)), va="center", ha="right", fontsize=7.5)
+        ax.text(-0.03, row, format_percent(round(share, 3)), va="center", ha="right", fontsize="small")
     labels = [name.replace(NORMAL, " (normal)") for name in names]
     labels += [f"energy in {name.partition('.')[2]}" for name in energy]
     ax.axvline(0.0, color=BLACK, linewidth=1)
@@ -188,8 +184,8 @@ def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
         else "no oscillation"
     )
     title = f"mode {mode.number}" if isinstance(found, Modes) and mode.number else "leading mode"
-    ax.set_xlabel(typeset(f"{title}\n{does}, {kind}"), fontsize=8)
-    ax.tick_params(axis="x", labelsize=8)
+    ax.set_xlabel(typeset(f"amplitude, share of energy\n{title}: {does}, {kind}"), fontsize="small")
+    ax.tick_params(axis="x", labelsize="small")
     return ax
 
 
@@ -228,10 +224,10 @@ def eigenvalue_plane(found: Analysis, ax: Axes | None = None) -> Axes:
     ax.set_ylim(-top, top)
     for axis, ends in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
         _few_ticks(axis, *ends, least)
-    ax.tick_params(labelsize=8)
-    ax.set_xlabel("growth rate Re s (1/s)", fontsize=8)
-    ax.set_ylabel("Im s (rad/s)", fontsize=8)
-    ax.legend(loc="best", fontsize=7.5, frameon=True)
+    ax.tick_params(labelsize="small")
+    ax.set_xlabel("growth rate Re s (1/s)", fontsize="small")
+    ax.set_ylabel("Im s (rad/s)", fontsize="small")
+    add_legend_above(ax, 2, 1.0, fontsize="small")
     return ax
 
 

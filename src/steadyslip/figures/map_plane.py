@@ -180,7 +180,7 @@ def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: Map
     if not levels:
         return
     lines = ax.contour(x, y, values / factor, levels=levels, colors=BLACK, linewidths=0.6, linestyles="--")
-    ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}")
+    ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}".replace("-", "−"))
     add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label + note))
 
 

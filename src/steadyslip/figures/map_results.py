@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from steadyslip.core.errors import InternalError, ParameterError, Problem
 from steadyslip.core.palette import BLACK, BLUE, ORANGE
 from steadyslip.figures.map_axes import KIND_COLOURS, add_legend, label_axes, short_name
-from steadyslip.figures.style import axes_or_new, new_panels
+from steadyslip.figures.style import axes_or_new, is_narrow, new_panels
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import Sensitivity
 from steadyslip.maps.view.cut import View, own_value
@@ -90,7 +90,8 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
     """
     results = list(found.first)
     if ax is None:
-        ax = new_panels(1, len(results), (4.6 * len(results), 0.42 * len(found.parameters) + 1.6))
+        high, many = 0.42 * len(found.parameters) + 1.6, len(results)
+        ax = new_panels(many, 1, (4.6, high * many)) if is_narrow() else new_panels(1, many, (4.6 * many, high))
     axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
     for one, result in zip(axes, results, strict=True):
         order = found.ranked(result)[::-1]

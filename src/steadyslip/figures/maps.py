@@ -14,7 +14,7 @@ from steadyslip.core.names import resolve
 from steadyslip.figures.map_axes import add_legend, drawn_result, short_name
 from steadyslip.figures.map_curves import draw_curve, draw_scatter
 from steadyslip.figures.map_plane import colour_scale, draw_plane
-from steadyslip.figures.style import axes_or_new
+from steadyslip.figures.style import axes_or_new, is_narrow, new_panels
 from steadyslip.maps.view.cut import View, axes_of, take
 from steadyslip.maps.view.map_result import MapResult
 
@@ -101,17 +101,12 @@ def _facet_name(found: MapResult, facet: str) -> str:
 
 
 def _draw_facets(found: MapResult, names: Sequence[str], show: str | None, third: str, at: Mapping[str, Any]) -> Any:
-    from matplotlib import pyplot as plt
-
     values = np.asarray(found.dataset[third].values)
     chosen = values[np.unique(np.linspace(0, len(values) - 1, min(MAX_FACETS, len(values))).round().astype(int))]
-    columns = min(3, len(chosen))
+    columns = min(1 if is_narrow() else 3, len(chosen))
     rows = -(-len(chosen) // columns)
-    figure, axes = plt.subplots(
-        rows, columns, figsize=(4.2 * columns, 3.6 * rows + 0.6), layout="constrained", squeeze=False,
-        sharex=True, sharey=True,
-    )  # fmt: skip
-    flat = axes.reshape(-1)
+    axes = new_panels(rows, columns, (4.2 * columns, 3.6 * rows + 0.6), sharex=True, sharey=True)
+    flat, figure = axes.reshape(-1), axes[0, 0].figure
     views = [take(found, names, _needed_results(found, show), {**at, third: float(value)}) for value in chosen]
     scale = _common_scale(found, views, drawn_result(found, views[0], show))
     for ax, view, value in zip(flat, views, chosen, strict=False):
@@ -127,7 +122,14 @@ def _draw_facets(found: MapResult, names: Sequence[str], show: str | None, third
     handles: dict[str, Any] = {}
     for ax in flat:
         handles |= dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=4, frameon=False, fontsize="small")
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside upper left",
+        ncols=min(4, columns + 1),
+        frameon=False,
+        fontsize="small",
+    )
     return axes
 
 

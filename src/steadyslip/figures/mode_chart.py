@@ -81,7 +81,7 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
         text = typeset(format_quantity(edge.value, found.unit, area=found.rig.printed_area(found.parameter)))
         axes[1].annotate(
             text, (edge.value / factor, 1), xycoords=("data", "axes fraction"), xytext=(3, -3),
-            textcoords="offset points", va="top", fontsize=7.5,
+            textcoords="offset points", va="top", fontsize="small",
         )  # fmt: skip
     axes[1].axhline(0.0, color=BLACK, linewidth=1, label="_zero")
     if found.is_geometric:
@@ -90,7 +90,7 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
     axes[0].set_ylabel(axis_label("frequency", hertz))
     axes[1].set_ylabel(axis_label("damping ratio", ""))
     axes[1].set_xlabel(axis_label(parameter_label(found.rig, found.parameter), unit))
-    axes[0].legend(fontsize=7.5, loc="best")
+    axes[0].legend(fontsize="small", loc="best")
     return axes
 
 

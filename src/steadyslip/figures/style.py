@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -14,6 +15,7 @@ from matplotlib import rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import unit
@@ -84,6 +86,11 @@ def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
     return plt.subplots(figsize=(width, height * width / WIDTH), layout="constrained")[1]
 
 
+def is_narrow() -> bool:
+    """True where new figures are as narrow as a column of a journal, so that panels stand one below the other."""
+    return bool(rcParams["figure.figsize"][0] < WIDTH)
+
+
 def new_panels(rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
     """Axes of a new pyplot figure, shape (rows, columns); size in inches, further options of `pyplot.subplots`."""
     from matplotlib import pyplot as plt
@@ -149,8 +156,20 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
     if engine := figure.get_layout_engine():
         engine.set(rect=(0, extra / (height + extra), 1, height / (height + extra)))
     figure.text(0.01, 0.03 / (height + extra), text, fontsize=_FOOTER, va="bottom", linespacing=1.2, parse_math=False)
+    for bins in (6, 5, 4, 3):
+        _part_ticks(figure, bins)
     with rc_context(_SAVED):
         figure.savefig(path, dpi=200, facecolor="white")
+
+
+def _part_ticks(figure: Any, bins: int) -> None:
+    """Leave at most so many intervals between ticks of the horizontal axes on which numbers touch their neighbours."""
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        boxes = [one.get_window_extent() for one in ax.get_xticklabels() if one.get_text()]
+        touching = any(a.x1 + 0.2 * a.height > b.x0 > a.x0 for a, b in pairwise(boxes))
+        if touching and isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
+            ax.locator_params(axis="x", nbins=bins)
 
 
 def _footer(result: Any) -> str:

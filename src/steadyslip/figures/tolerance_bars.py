@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.palette import BLACK, STABLE, UNKNOWN, UNSTABLE
-from steadyslip.figures.style import axes_or_new
+from steadyslip.figures.style import add_legend_above, axes_or_new, is_narrow
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
 from steadyslip.machine.letters import said
@@ -14,6 +14,7 @@ from steadyslip.verdict.tolerances import Tolerated
 from steadyslip.verdict.words import told_range
 
 COLOURS = {True: STABLE, False: UNSTABLE, None: UNKNOWN}
+_DECADE = 10.0  # ratio of safety factors from which their axis is logarithmic: how far from 1 is a ratio on both sides
 WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable in a part"}
 
 
@@ -40,7 +41,7 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     edges = bool(found.along)
     spans = {one.parameter: one.safety if edges else one.growth for one in found.alone}
     shown = [one for one in found.alone if np.all(np.isfinite(spans[one.parameter]))][::-1]
-    ax = axes_or_new(ax, 1.6 + 0.55 * len(shown))
+    ax = axes_or_new(ax, (1.6 + 0.55 * len(shown)) * (1.4 if is_narrow() else 1.0))  # letters shrink less
     for row, one in enumerate(shown, start=1):
         low, high = spans[one.parameter]
         label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: row - 1]] else None
@@ -65,6 +66,9 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
     )
     ax.margins(x=0.06)
+    ends = np.concatenate([known, *(spans[one.parameter] for one in shown)])
+    if edges and 0 < ends.min() < ends.max() / _DECADE:
+        ax.set_xscale("log")
     ax.use_sticky_edges = False  # otherwise the widest bar touches the frame
     ax.axvline(1.0 if edges else 0.0, color=BLACK, linewidth=1)
     own = safety_factor(found.rig, along=found.along) if edges else growth_rate(found.rig)
@@ -75,5 +79,5 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
         else f"{said(found.rig, found.along)} over its edge"
     )
     ax.set_xlabel(f"{ratio} (1)" if edges else "growth rate of disturbances (1/s)")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small")
+    add_legend_above(ax, 4, 1.0, fontsize="small")
     return ax

@@ -4,19 +4,6 @@ A rig and a protocol become jobs (arrays), kernels integrate them, and the resul
 here depends on linear stability.
 """
 
-from steadyslip.motion.events import ContactEvent, ContactSlip, Event, SlipEvent
-from steadyslip.motion.many import Ensemble, simulate_many
-from steadyslip.motion.result import History, load_history
-from steadyslip.motion.single import simulate
+import lazy_loader
 
-__all__ = [
-    "ContactEvent",
-    "ContactSlip",
-    "Ensemble",
-    "Event",
-    "History",
-    "SlipEvent",
-    "load_history",
-    "simulate",
-    "simulate_many",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -26,44 +26,6 @@ solution) and `shells.py` (close to an edge).
 `hunting/` is of axes that are held, at velocity 0, where there is no steady sliding: `hunt`.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from steadyslip.nonlinear.forced import response
-from steadyslip.nonlinear.frequency_response import FrequencyResponse
-from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
-from steadyslip.nonlinear.hunting.hunt import hunt
-from steadyslip.nonlinear.hunting.hunt_result import Hunt
-from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
-from steadyslip.nonlinear.kicks.brackets import threshold_map
-from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold
-from steadyslip.nonlinear.onset.hopf import Onset, hopf
-from steadyslip.nonlinear.onset.hopf_curve import HopfCurve, SpecialPoint, hopf_curve
-from steadyslip.nonlinear.orbits.branch import CycleBranch
-from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
-from steadyslip.nonlinear.orbits.follow import cycles
-
-__all__ = [
-    "Basin",
-    "Cycle",
-    "CycleBranch",
-    "FrequencyResponse",
-    "FrozenVerdicts",
-    "HopfCurve",
-    "Hunt",
-    "KickMargin",
-    "Onset",
-    "SpecialCycle",
-    "SpecialPoint",
-    "Threshold",
-    "basin",
-    "cycles",
-    "frozen_verdicts",
-    "hopf",
-    "hopf_curve",
-    "hunt",
-    "margin_to_kick",
-    "orbit",
-    "response",
-    "threshold",
-    "threshold_map",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
@@ -62,11 +62,11 @@ class FrozenVerdicts(ReadOnly):
     crossings : tuple of (float, str)
         Times (s) at which the verdict changes, and to what: ``unstable``, ``stable`` or ``no steady sliding``.
     departure : float
-        Time (s) at which, after the first of those to unstable, slip is twice as fast as the drive asks, and twice as
-        fast as at that crossing (a ramp of the load slows or quickens slip by itself), or at which it cannot go on;
-        NaN if that does not happen.
+        Time (s) at which, after sliding is unstable for the first time, slip is twice as fast as the drive asks, and
+        twice as fast as then (a ramp of the load slows or quickens slip by itself), or at which it cannot go on; NaN if
+        that does not happen.
     e_folds : float
-        Growth of a small disturbance from that crossing to the departure: integral of the growth rate.
+        Growth of a small disturbance from that time to the departure: integral of the growth rate.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -86,16 +86,14 @@ class FrozenVerdicts(ReadOnly):
             lines.append(f"from {format_quantity(time, 's')} on: {verdict}, {self._at(time)}")
         if not self.crossings:
             lines.append("the verdict is the same at every moment")
-        begun = next((time for time, verdict in self.crossings if verdict == UNSTABLE), None)
-        if begun is None and self.growth_rate[0] > 0:
-            begun = 0.0
-        if begun is not None and np.isfinite(self.departure):
+        begun = _first_unstable(self.growth_rate, self.crossings)
+        if np.isfinite(self.departure):
+            later = f", {format_quantity(self.departure - begun, 's')} later" if begun else ""
             lines.append(
-                f"motion departs at {format_quantity(self.departure, 's')}, "
-                f"{format_quantity(self.departure - begun, 's')} later: "
+                f"motion departs at {format_quantity(self.departure, 's')}{later}: "
                 f"small disturbances have grown by {self.e_folds:.3g} e-folds by then"
             )
-        elif begun is not None:
+        elif np.isfinite(begun):
             lines.append("motion does not depart from steady sliding before the run ends")
         if self.run.status != "done":
             lines.append(f"the motion ends at {format_quantity(self.run.end, 's')}: {self.run.status}")
@@ -167,6 +165,11 @@ class FrozenVerdicts(ReadOnly):
 STABLE, UNSTABLE, ABSENT = "stable", "unstable", "no steady sliding"
 
 
+def _first_unstable(rates: Array, crossings: Sequence[tuple[float, str]]) -> float:
+    """Time (s) from which steady sliding is unstable first, 0 for the start; NaN where it never is."""
+    return 0.0 if rates[0] > 0 else next((time for time, verdict in crossings if verdict == UNSTABLE), np.nan)
+
+
 def _verdict(rate: float) -> str:
     return ABSENT if np.isnan(rate) else UNSTABLE if rate > 0 else STABLE
 
@@ -236,7 +239,7 @@ def frozen_verdicts(
     values = slow.values(t)
     rates, critical = slow.growth_rate(values), slow.critical_stiffness(values)
     crossings = tuple(slow.crossings(t, rates))
-    begun = 0.0 if rates[0] > 0 else next((time for time, verdict in crossings if verdict == UNSTABLE), np.nan)
+    begun = _first_unstable(rates, crossings)
     changed = {name: own for name, own in values.items() if np.ptp(own) > 0}
     labels = {name: slow.effective.get(name, name) for name in changed}
     found = FrozenVerdicts(rig, run, t, changed, labels, rates, critical, crossings, np.nan, np.nan)

@@ -92,12 +92,14 @@ def _threshold(result: Threshold) -> Parts:
 def _thresholds(result: Thresholds) -> Parts:
     rows = [str(one).split(": ", 1) for one in result.found]
     limits = [
-        f"a {one.kick} kick up to {format_quantity(one.survived, one.unit, 4, one.area)}"
+        f"{'every' if np.isinf(one.size) else 'a'} {one.kick} kick{f' at {one.at}' if one.at else ''} up to "
+        + format_quantity(one.survived, one.unit, 4, one.area)
+        + (", the largest tried" if np.isinf(one.size) else "")
         for one in result.found
-        if one.bracket[0] > 0 and not np.isinf(one.size)
+        if one.bracket[0] > 0
     ]
     unstable = any(one.size == 0 for one in result.found)
-    none = "No kick is survived: steady sliding is unstable" if unstable else "Every kick that was tried is survived"
+    none = "No kick is survived: steady sliding is unstable" if unstable else "Not decided: which kicks are survived"
     head = f"Survives {' and '.join(limits)}" if limits else none
     basins = [found] if (found := result.__dict__.get("basin")) is not None else []
     body = [

@@ -281,11 +281,20 @@ def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
         return ""
     if isinstance(value, FrozenRecord):
         return value.name or type(value).__name__
+    if isinstance(value, tuple):
+        return "; ".join(_item_text(rig, f"{name}.{i}") for i in range(1, len(value) + 1))
     known = rig.parameters().get(name)
     if known is None or not isinstance(value, float):
         return str(value)
     words = told(rig, name, value)
     return f"{name.rpartition('.')[2]} {words}" if named else words
+
+
+def _item_text(rig: Slider | Machine, name: str) -> str:
+    """Parameters of an item of a list, such as ``b 0.006, d_c 4 um``."""
+    own = {key.removeprefix(f"{name}."): address.value for key, address in rig.parameters().items()
+           if key.startswith(f"{name}.") and address.value is not None}  # fmt: skip
+    return ", ".join(f"{key} {told(rig, f'{name}.{key}', value)}" for key, value in own.items())
 
 
 def _factor(one: Findings) -> float | None:

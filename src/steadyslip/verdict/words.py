@@ -168,7 +168,8 @@ def threshold_words(kick: Threshold) -> str:
     if math.isnan(kick.size) and kick.bracket[0] == 0:
         return f"{why} from the smallest {name}{at} on{reason}"
     if math.isnan(kick.size):
-        return f"every {name}{at} tried up to size {kick.bracket[0]:.4g} is survived; {why} beyond{reason}"
+        most = format_quantity(kick.survived, kick.unit, area=kick.area)
+        return f"survives {what.format(at=at)} {most} and all smaller that were tried; {why} beyond{reason}"
     what = what.format(at=at)
     edge = ", the edge of the sliding that it leads to" if kick.edge else ""
     where = f" at {kick.contact}" if kick.contact else ""

@@ -93,7 +93,7 @@ export class Chart {
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
   }
 
-  /** Draw contours, which are left out while a slider moves; labels stand apart from each other and from words. @param {{x: number, y: number}[]} words */
+  /** Draw contours, which are left out while a slider moves; labels stand apart from each other and from words, which are some three times as wide as high. @param {{x: number, y: number}[]} words */
   contours(i, x, j, y, words) {
     const { size: { width, height }, rig, sliding } = this.page, { phrases, facts } = rig.data, columns = Math.round(1.3 * CELLS);
     this.lines.replaceChildren();
@@ -103,8 +103,8 @@ export class Chart {
     const levels = phrases ? [-1, -0.1, 0.1, 1].map((share) => share * 10 ** top) : LEVELS;
     const drawn = levels.map((level) => line(grid, phrases ? level : Math.log(level), width, height)), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
     drawn.forEach(({ path, middles }, n) => {
-      const beside = [own, ...words.map((one) => [one.x, one.y]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))];
-      const room = ([u, v]) => Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b]) => Math.hypot(a - u, b - v)));
+      const beside = [own, ...words.map((one) => [one.x, one.y, 0.3]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))];
+      const room = ([u, v]) => Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b, wide = 1]) => Math.hypot(wide * (a - u), b - v)));
       const [u, v] = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
       this.lines.append(svg("path", { d: path }), ...(room([u, v]) > TIGHT ? [svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))] : []));
     });

@@ -119,7 +119,8 @@ class Threshold(Displayed):
             beyond = "stopped there" if self.interrupted else f"undecided beyond ({self.doubt})"
             if low == 0 and not self.interrupted:
                 return f"{what}: undecided from the smallest that was tried on ({self.doubt})"
-            return f"{what}: all that were tried are survived up to size {low:.4g}; {beyond}"
+            most = format_quantity(self.survived, self.unit, 4, self.area)
+            return f"{what}: all that were tried are survived up to {most} (size {low:.4g}); {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
         after = self.outcome + where if self.outcome != "undecided" else f"undecided ({self.doubt})"
         amount = format_quantity(self.amount, self.unit, 7, self.area)

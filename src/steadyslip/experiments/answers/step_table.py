@@ -188,7 +188,7 @@ class StepTable(Displayed):
             else "",
             f"A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else "",
             "A constant was added to friction." if plan.offset else "",
-            "Friction was free to come later than the loading." if plan.lag else "",
+            "Friction was free to come later or earlier than the loading." if plan.lag else "",
             "How far records begin from steady sliding was fitted." if plan.initial == "free" else "",
             f"Outliers weighed less ({plan.loss} loss)." if plan.loss != "linear" else "",
             "Samples were weighted." if plan.weights is not None else "",

@@ -102,8 +102,8 @@ def fit(
     offset : bool, optional
         Add a constant to friction as well, beside mu_ref.
     lag : bool, optional
-        Let friction come later than what drives it, every record by a time of its own (``lag``): for channels whose
-        filters or clocks differ.
+        Let friction come later (or earlier) than what drives it, every record by a time of its own (``lag``) from where
+        its displacement shows the first step: for channels whose filters or clocks differ.
     initial : str, optional
         ``steady``: a record begins with steady sliding at the first rate and normal stress; ``free``: it slides at that
         rate but not steadily, and how far friction (``initial.friction``, by the spring's pull) and each memory of it

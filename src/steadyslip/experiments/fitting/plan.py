@@ -27,7 +27,7 @@ from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.input_tables import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
-from steadyslip.experiments.loading.loading import Loading, resting_rate
+from steadyslip.experiments.loading.loading import Loading, resting_rate, with_reference
 from steadyslip.experiments.measured.record import Record
 from steadyslip.kernels.experiment import experiment_program
 from steadyslip.laws.contact import pressed_at
@@ -237,4 +237,10 @@ def with_loading(plan: Plan) -> Plan:
         if plan.drive == "smoothed" and record.displacement is not None:
             loading = replace(loading, load=smooth_load(record.time, record.displacement))
         found.append(loading)
-    return replace(plan, sharp=tuple(Sharp() for _ in plan.records), loading=tuple(found))
+    plan = replace(plan, sharp=tuple(Sharp() for _ in plan.records), loading=tuple(found))
+    return with_lag(plan) if plan.lag else plan
+
+
+def with_lag(plan: Plan) -> Plan:
+    """Plan in which friction may lag its loading, with a time in each record that the lag is counted from."""
+    return replace(plan, lag=True, loading=tuple(map(with_reference, plan.loading)))

@@ -12,7 +12,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.effort import Budget, Effort
-from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.plan import Plan, with_lag
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
 from steadyslip.experiments.numerics.least_squares import minimise
@@ -104,7 +104,7 @@ def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
 def _changed(plan: Plan) -> Iterator[Plan]:
     """Plans with one thing changed, those of brief searches first: lag, evolution and memory of the law, states."""
     if plan.follows and not plan.lag:
-        yield replace(plan, lag=True)
+        yield with_lag(plan)
     law, words = plan.rig.friction, plan.rig.friction.alternatives()
     pressed = plan.pressed and any(record.stress_changes for record in plan.records)
     memories = {word for own in law.decided_by_stress.values() for word in own}

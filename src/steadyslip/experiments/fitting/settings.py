@@ -46,7 +46,7 @@ class FitSettings(Settings):
     )
     lag: bool = option(
         False, True, default=False,
-        doc="friction may come later than what drives it, each record by a time of its own, `lag`",
+        doc="friction may come later or earlier than what drives it, each record by a time of its own, `lag`",
     )  # fmt: skip
     initial: str = option(
         "steady", "free", default="steady",

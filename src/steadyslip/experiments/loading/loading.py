@@ -169,6 +169,24 @@ class Loading:
         return tuple(sorted(found, key=lambda one: (one[2].time, one[0])))
 
 
+def with_reference(loading: Loading) -> Loading:
+    """Loading in which one change at least has a known time: the first step, where its column shows it, if none has.
+
+    A lag of friction has no effect beside times that are all free: all would move together.
+    """
+    if any(not change.free for _, _, change in loading.changes):
+        return loading
+    first = next((one for one in loading.changes if not one[2].duration), None)
+    if first is None:
+        return loading
+    channel, i, change = first
+    course = getattr(loading, channel)
+    known = replace(change, earliest=change.time, latest=change.time)
+    return replace(
+        loading, **{channel: replace(course, changes=(*course.changes[:i], known, *course.changes[i + 1 :]))}
+    )
+
+
 def resting_rate(loading: Loading) -> float | None:
     """Rate (m/s) at which a load point moves after an initial rest; None if it moves from the start."""
     course = loading.load

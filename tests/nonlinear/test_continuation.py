@@ -31,6 +31,53 @@ def test_continuation_follows_a_circle_all_the_way_round():
     assert np.unwrap(angles)[-1] > 2 * np.pi
 
 
+def test_continuation_asks_for_a_jacobian_once_a_point_where_residuals_are_cheap():
+    full, cheap = [], []
+
+    def both(u):
+        return np.array([u @ u - 1]), 2 * u[None]
+
+    def equations(u):
+        full.append(u)
+        return both(u)
+
+    def residuals(u):
+        cheap.append(u)
+        return both(u)[0]
+
+    curve = SolutionCurve(equations, residuals=residuals)
+    here = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    full.clear()
+    points = [point for _, point in zip(range(40), curve.follow(here, 0.05, 1e-6, 0.2), strict=False)]
+    assert max(abs(point.u @ point.u - 1) for point in points) < 1e-12
+    assert (len(full), len(cheap) > 80) == (40, True)
+
+
+def test_continuation_starts_from_an_improved_prediction():
+    """The first unknown is exponential in the second: it is off by far more than the curve is bent."""
+
+    def late(u):
+        grown = np.exp(np.minimum(2000 * (u[0] - np.sin(3 * u[1])), 700.0))
+        return np.array([grown - 1]), 2000 * grown * np.array([[1.0, -3 * np.cos(3 * u[1])]])
+
+    taken = []
+    for improved in (None, lambda u, reach: np.array([u[0] + np.clip(np.sin(3 * u[1]) - u[0], -reach, reach), u[1]])):
+        curve = SolutionCurve(late, improved=improved)
+        here = curve.start(np.zeros(2), np.array([3.0, 1.0]) / np.sqrt(10))
+        taken.append(next(i for i, point in enumerate(curve.follow(here, 0.2, 1e-6, 0.5)) if point.u[1] > 2))
+    assert taken[1] < 0.7 * taken[0]
+
+
+def test_a_zero_is_located_between_points_that_are_not_neighbours_in_length():
+    """Planes lie as far apart as the points do along the tangent, however long the curve between them is."""
+    curve = SolutionCurve(lambda u: (np.array([u @ u - 1]), 2 * u[None]))
+    low = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    high = replace(curve.start(np.array([0.5, 0.8]), np.array([-0.8, 0.5])), length=1.9)
+    ends = [point.u[1] - 0.3 for point in (low, high)]
+    found = curve.located(low, high, lambda point: point.u[1] - 0.3, *ends)[1]
+    assert found.u == pytest.approx([np.sqrt(0.91), 0.3], abs=1e-9)
+
+
 def test_continuation_locates_a_fold():
     def parabola(u):
         return np.array([u[0] ** 2 + u[1] - 0.3]), np.array([[2 * u[0], 1.0]])

@@ -6,6 +6,7 @@ Nothing here knows what the equations mean. Unknowns are expected to be of order
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ Equations = Callable[[Array], tuple[Array, Array]]
 MOST_ITERATIONS = 10  # of Newton's method for one point
 ASIDE = 10.0  # factor of `reach` by which intermediate Newton iterates may be farther away
 NEARLY = 1e-5  # Newton step below which one larger step may follow
+CHORDS = 8  # iterations with an earlier Jacobian: where more are needed, a new one is worth its time
 GROW, FASTER, SHRINK = (
     1.4,
     2.0,
@@ -56,14 +58,22 @@ class SolutionCurve:
         Of the unknowns' squares in lengths and angles; one unless given.
     rounding : float, optional
         Size of Newton steps that counts as converged where they no longer shrink: rounding in the equations.
+    residuals : callable, optional
+        The residuals alone, where they take far less time than with their Jacobian: points are then approached with the
+        Jacobian of the one before.
+    jacobian : ndarray (n, n+1), optional
+        At a point near by.
+    improved : callable, optional
+        Takes the prediction of a point, and how far it may be moved, and returns a better one.
     """
 
     def __init__(
         self, equations: Equations, tolerance: float = 1e-9, most_turn: float = 0.94, weights: Array | None = None,
-        rounding: float = 0.0,
+        rounding: float = 0.0, residuals: Callable[[Array], Array] | None = None, jacobian: Array | None = None,
+        improved: Callable[[Array, float], Array] | None = None,
     ) -> None:  # fmt: skip
         self.equations, self.tolerance, self.most_turn = equations, tolerance, most_turn
-        self.rounding = rounding
+        self.rounding, self.residuals, self.jacobian, self.improved = rounding, residuals, jacobian, improved
         self.weights: Any = 1.0 if weights is None else weights
         self.bend = float(np.sqrt((1 - most_turn) / (1 + most_turn)))
         """tan of half the largest turn: how far an arc that turns by so much leaves its tangent, per length."""
@@ -84,11 +94,13 @@ class SolutionCurve:
         Failure
             If it does not converge, or only farther than `reach` from the guess: on something else.
         """
-        u = guess.copy()
         across = self.weights * tangent
-        before = np.inf
+        u, before = guess.copy(), np.inf
         for iteration in range(MOST_ITERATIONS):
+            if before > NEARLY:
+                u, before = self._approached(u, before, guess, across, ASIDE * reach)
             residual, jacobian = self.equations(u)
+            self.jacobian = jacobian
             matrix = np.vstack([jacobian, across])
             right = np.append(residual, across @ (u - guess))
             try:
@@ -115,6 +127,32 @@ class SolutionCurve:
             before = size
         raise Failure("no convergence")
 
+    def _approached(self, start: Array, moved: float, guess: Array, across: Array, reach: float) -> tuple[Array, float]:
+        """Near the solution, from residuals and the last Jacobian, kept up by Broyden's rule; and the last step's size.
+
+        `start` itself, and the step `moved` that led there, where that does not converge.
+        """
+        if self.residuals is None or self.jacobian is None:
+            return start, moved
+        u, size = start, np.inf
+        with suppress(Failure, np.linalg.LinAlgError):
+            inverse = np.linalg.inv(np.vstack([self.jacobian, across]))
+            left = np.append(self.residuals(u), across @ (u - guess))
+            for _ in range(CHORDS):
+                step = -inverse @ left
+                before, size = size, float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
+                if not size < before or self.size(u + step - guess) > reach:
+                    size = before
+                    break
+                u = u + step
+                if size <= self.tolerance:
+                    break
+                now = np.append(self.residuals(u), across @ (u - guess))
+                change = inverse @ (now - left)
+                inverse += np.outer(step - change, step @ inverse) / (step @ change)
+                left = now
+        return (u, size) if size < NEARLY else (start, moved)
+
     def follow(
         self, first: Point, step: float, least: float, most: float, accept: Callable[[Point], None] | None = None
     ) -> Iterator[Point]:
@@ -140,6 +178,7 @@ class SolutionCurve:
             try:
                 reach = self.bend * step + 100 * self.tolerance
                 guess = here.u + step * here.tangent + 0.5 * step**2 * curvature
+                guess = guess if self.improved is None else self.improved(guess, reach)
                 ahead = self.corrected(guess, here.tangent, here.length + step, reach)
                 turned = float(ahead.tangent @ (self.weights * here.tangent))
                 if turned < self.most_turn and step > 4 * least:
@@ -172,7 +211,7 @@ class SolutionCurve:
         Failure
             If a point between the two cannot be found.
         """
-        a, b, side = 0.0, high.length - low.length, 0
+        a, b, side = 0.0, float((self.weights * low.tangent) @ (high.u - low.u)), 0  # as planes across are apart
         near, far = low, high
         reach = 2 * self.bend * abs(b) + 100 * self.tolerance
         for _ in range(60):

@@ -11,7 +11,7 @@ from dimensionless import two_states
 from doubled_machines import ALONG, closing, drawn, drawn_otherwise, judged, places
 from steadyslip.core.checks import in_words
 from steadyslip.nonlinear.continuation import turned_round
-from steadyslip.nonlinear.orbits import at_value, tracer
+from steadyslip.nonlinear.orbits import at_value, flow as flow_module, tracer
 from steadyslip.nonlinear.orbits.at_value import tracer_of
 from steadyslip.nonlinear.orbits.cycle import End
 from steadyslip.nonlinear.orbits.cycle_search import seed_at
@@ -200,7 +200,7 @@ def test_doubled_cycles_are_followed_through_reversals_of_slip():
     assert last.multiplier_error < 1e-6
     assert closing(machine.with_values({ALONG: last.value}), last) < 1e-5  # deviations grow 18-fold in a period
     follower = tracer_of(branch.onset, 0, None)
-    follower.flow.led = True  # as after one run that needed it
+    follower.flow.slack = flow_module.UNHEARD  # as after one run that needed it
     assert follower.resumed(orbit_of(last), 1.0).cycle.multiplier_error < 1e-6
 
 

@@ -177,6 +177,21 @@ def test_a_frame_that_rings_ten_thousand_times_a_cycle_does_not_lead_its_steps()
 
 
 @pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("name", "along", "end"),
+    [
+        ("two-surfaces", "links.ram.stiffness", "end of the range"),
+        ("feed-axis", "drive.kp", "the cycles grow without bound"),
+        ("telescope", "drive.kp", "the cycles grow without bound"),
+    ],
+)
+def test_branches_of_ringing_machines_come_to_an_end(name, along, end):
+    found = ss.cycles(ss.read_rig(EXAMPLES / f"{name}.toml"), along, doublings=0)
+    assert found.end.startswith(end)
+    assert np.mean([cycle.checks[0].passed for cycle in found]) > 0.99
+
+
+@pytest.mark.campaign
 def test_a_table_that_turns_round_in_its_cycle_is_followed_through_its_ringing():
     """Beside the table that sticks the motor rings, and slip begins, or only just does, at any of its swings."""
     axis = ss.read_rig(EXAMPLES / "feed-axis.toml")

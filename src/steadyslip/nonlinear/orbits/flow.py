@@ -37,7 +37,9 @@ STIFF = "rodas5p"  # Rosenbrock method of order 5, as tolerances are tight
 MOST_STEPS = 100_000  # of one run: some tenths of a second
 FAR_MORE, FEW_STEPS = 20, 5_000  # limit of a run: factor on the steps of the last one, and the least
 MORE = 8  # such a factor for runs next to a known one
-UNHEARD = 1e12  # factor of the tolerances of sensitivities where they are not to affect the steps
+QUICKER = 4  # times as many steps without sensitivities take as long; of machines of three bodies
+HARDLY_HEARD = 1e6  # factor of the tolerances of sensitivities where they hardly affect the steps,
+UNHEARD = 1e12  # and where they are not to affect them
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are reused
 KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
 
@@ -111,7 +113,7 @@ class FlowRunner:
     which : int, optional
         The run whose rig and inputs are meant.
     rtol : float, optional
-        Error allowed per step; 1e-10 for explicit methods, 1e-9 for Rosenbrock methods unless given.
+        Error allowed per step; unless given 1e-10 for explicit methods, 1e-9 for Rosenbrock methods, 1e-8 if `costly`.
     contact : int, optional
         The one at which cycles begin as it speeds up.
 
@@ -129,8 +131,10 @@ class FlowRunner:
         Taken so far, with sensitivities.
     rounding : float
         Size of the error that rounding of forces makes in a state, in natural sizes, where it is known.
-    led : bool
-        True where step sizes follow the error of the motion alone, not that of the sensitivities.
+    costly : bool
+        True of machines with mass, whose sensitivities take ten to a hundred times as long as the motion alone.
+    slack : float
+        Factor of the tolerances of sensitivities: beyond 1 the motion leads the steps.
 
     Raises
     ------
@@ -145,7 +149,9 @@ class FlowRunner:
         method = automatic_method(self.reduction)
         self.stiff = method != "tsit5"
         method = STIFF if self.stiff else method
-        self.options = Options(rtol=rtol or (1e-9 if self.stiff else 1e-10), most_steps=MOST_STEPS)
+        self.costly = self.stiff and not self.reduction.model.is_single
+        usual = 1e-8 if self.costly else 1e-9 if self.stiff else 1e-10
+        self.options = Options(rtol=rtol or usual, most_steps=MOST_STEPS)
         self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if self.stiff else 1e-16
         self.finest = self.noise / self.options.rtol
@@ -153,7 +159,8 @@ class FlowRunner:
             self.reduction.model, Choice(method), jobs.eliminate, jobs.targets.pushes, jobs.targets.presses
         )
         self.sensitive = _with_sensitivities(self.reduction, method)
-        self.steps, self._usual, self.led = 0, MOST_STEPS, False
+        self.steps, self._usual = 0, MOST_STEPS
+        self.slack = HARDLY_HEARD if self.costly else 1.0
         self.far_more = FAR_MORE
         self.rounding = 0.0
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
@@ -162,6 +169,11 @@ class FlowRunner:
         self.own = self._set(own, inputs)
         self.scales = self.own.plain[1][0, self.tolerances] / self.options.rtol
         self.time = self._natural_time()
+
+    @property
+    def led(self) -> bool:
+        """True where step sizes follow the error of the motion, not that of the sensitivities."""
+        return self.slack > 1.0
 
     @property
     def tolerances(self) -> slice:
@@ -233,16 +245,21 @@ class FlowRunner:
         try:
             final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
         except FlowFailure as failure:
-            if failure.status != "too many steps" or not self.stiff or self.led:
+            if failure.status != "too many steps" or not self.stiff or self.slack == UNHEARD:
                 raise
-            self.led = True
+            usual, self.slack = self.slack, UNHEARD
             try:
                 final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
             except FlowFailure:  # the motion itself needs them: a point far off the curve, mostly
-                self.led = False
+                self.slack = usual
                 raise
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return final[:, :n], matrix, final[:, n + n * n :]
+
+    def ends(self, setting: FlowSetting, states: Array, times: Array, amplitude: float = 1.0) -> Array:
+        """Final states (m, n) of runs from `states` (m, n) over `times` (m,), s, without sensitivities."""
+        initial = self._continuous(setting, states)
+        return self._advanced(setting, self._finer(setting.plain[1], amplitude), initial, times, self.machine)
 
     def _sensitive_settings(self, setting: FlowSetting, amplitude: float) -> Array:
         """Settings of the kernel with sensitivities.
@@ -253,8 +270,7 @@ class FlowRunner:
         """
         settings, n, behind = self._finer(setting.varied[1], amplitude), self.size, self.tolerances.stop
         settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, self.far_more * self._usual))
-        if self.led:
-            settings[:, behind : behind + n * n + n] *= UNHEARD
+        settings[:, behind : behind + n * n + n] *= self.slack
         return settings
 
     def _unit(self, count: int) -> Array:
@@ -273,17 +289,20 @@ class FlowRunner:
         found = setting.point.evaluate(restored_of(self.reduction), *states.T, *setting.inputs, 0.0)
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
-    def _advanced(self, setting: FlowSetting, settings: Array, initial: Array, times: Array) -> Array:
-        """Integrate the system with sensitivities; final values, or FlowFailure."""
-        tables = (setting.varied[0], np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
-        call = Call(self.sensitive, tables, len(times), np.empty(0))
+    def _advanced(
+        self, setting: FlowSetting, settings: Array, initial: Array, times: Array, machine: Runner | None = None
+    ) -> Array:
+        """Integrate the system with sensitivities, or that of a plain `machine`; final values, or FlowFailure."""
+        constants = (setting.plain if machine else setting.varied)[0]
+        tables = (constants, np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
+        call = Call(machine or self.sensitive, tables, len(times), np.empty(0))
         call.run_steps(2**62)
         outcome = call.outcome()
         taken = np.nansum(outcome.steps, axis=1)
-        self.steps += int(taken.sum())
+        self.steps += int(taken.sum()) // (QUICKER if machine else 1)
         if np.any(call.status != DONE):
             raise self._failure(setting, outcome, int(np.flatnonzero(call.status != DONE)[0]))
-        self._usual = int(taken.max())
+        self._usual = self._usual if machine else int(taken.max())
         return outcome.state
 
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:

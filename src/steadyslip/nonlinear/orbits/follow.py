@@ -78,7 +78,7 @@ def cycles(
         cycles of twice the period, shared by the doublings: cycles found until then are kept, and ``end`` gives this
         reason; ``not_followed`` lists doublings for which nothing was left.
     rtol : float, optional
-        Error allowed per step of integration; 1e-10, with mass 1e-9, unless given.
+        Error allowed per step of integration; 1e-10, with mass 1e-9, of machines 1e-8, unless given.
     branch : int, optional
         Index of the steady sliding, where there are several. The result stores it, and `rtol`.
     progress : callable, optional

@@ -14,11 +14,13 @@ import numpy as np
 
 from steadyslip.core.results import ReadOnly
 from steadyslip.nonlinear.continuation import Failure, SolutionCurve
-from steadyslip.nonlinear.orbits.flow import FlowRunner
+from steadyslip.nonlinear.orbits.flow import FlowRunner, FlowSetting, passages
 
 Array = np.ndarray
 ONE = np.ones(1)
 ROUNDED = 300.0  # allowed last Newton step, in roundings of the state, where steps no longer shrink,
+FAR = 0.1  # residual of a prediction that is off by more than the equations are straight
+SAME = 1e-8  # difference of unknowns of which sensitivities are the same: the largest last Newton step
 KNOWN = 1e-3  # but at most this share of the cycle's size
 
 
@@ -59,7 +61,8 @@ class Shooting:
         self.scales = flow.scales if scales is None else scales
         self.logarithmic, self.size = logarithmic, size
         self.amplitude = 1.0
-        self._last: tuple[bytes, Array, Array] | None = None
+        self._last: tuple[Array, Array, Array] | None = None
+        self._jacobian: Array | None = None
 
     def curve(self) -> SolutionCurve:
         """Build the continuation curve of these equations.
@@ -70,7 +73,11 @@ class Shooting:
         weights[self.flow.size : -2] = 0.0
         tolerance = max(1e-9, 100 * self.flow.noise / self.amplitude)
         rounding = min(ROUNDED * self.flow.rounding, KNOWN * self.amplitude)
-        return SolutionCurve(self.equations, tolerance, most_turn=0.8, weights=weights, rounding=rounding)
+        return SolutionCurve(
+            self.equations, tolerance, most_turn=0.8, weights=weights, rounding=rounding,
+            residuals=self.residuals if self.flow.costly else None, jacobian=self._jacobian,
+            improved=self.retimed if self.flow.costly else None,
+        )  # fmt: skip
 
     @property
     def segments(self) -> int:
@@ -91,10 +98,7 @@ class Shooting:
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Residuals (K n + 1,) and Jacobian (K n + 1, K n + 2); see `continuation.Equations`."""
         flow, n, count = self.flow, self.flow.size, self.segments
-        if not np.all(np.isfinite(u)) or np.max(np.abs(u[:-1])) > 60 or (self.logarithmic and abs(u[-1]) > 60):
-            raise Failure("out of range")
-        orbit = self.orbit(u)
-        setting = flow.setting(orbit.value)
+        orbit, setting = self._tried(u)
         times = self.fractions * orbit.period
         ends, sensitivity, slopes = flow.run(setting, orbit.states, times, self.amplitude)
         start, gradient, across = flow.field(setting, orbit.states)
@@ -103,22 +107,50 @@ class Shooting:
         )  # where mass is small, less noisy than the rates at the ends
         slip, speed = setting.slip, setting.speed
         to_unknown = (orbit.value if self.logarithmic else self.size) / setting.unit
-        residual = np.empty(count * n + 1)
         jacobian = np.zeros((count * n + 1, count * n + 2))
         stretch = self._stretch(orbit)
         for k in range(count):
             rows, after = slice(k * n, (k + 1) * n), (k + 1) % count
             size = stretch[after]
-            residual[rows] = (ends[k] - orbit.states[after]) / size
             jacobian[rows, rows] += sensitivity[k] * stretch[k] / size[:, None]
             jacobian[rows, after * n : (after + 1) * n] -= np.eye(n)
             jacobian[rows, -2] = rates[k] * times[k] / size
             jacobian[rows, -1] = slopes[k] * to_unknown / size
-        residual[-1] = slip @ start[0] / speed
         jacobian[-1, :n] = slip @ gradient[0] * stretch[0] / speed
         jacobian[-1, -1] = slip @ across[0] * to_unknown / speed
-        self._last = (u.tobytes(), ends, sensitivity)
-        return residual, jacobian
+        self._last, self._jacobian = (u, ends, sensitivity), jacobian
+        return self._residual(orbit, setting, ends, start[0]), jacobian
+
+    def residuals(self, u: Array) -> Array:
+        """Residuals (K n + 1,) alone."""
+        orbit, setting = self._tried(u)
+        ends = self.flow.ends(setting, orbit.states, self.fractions * orbit.period, self.amplitude)
+        return self._residual(orbit, setting, ends, self.flow.field(setting, orbit.states[:1])[0][0])
+
+    def retimed(self, u: Array, reach: float) -> Array:
+        """The unknowns with the period after which the motion from their start is where cycles begin; itself if near.
+
+        Between rests of minutes slip begins in seconds: a period that is wrong by a thousandth ends before or in it.
+        """
+        if self.segments > 1 or np.max(np.abs(self.residuals(u))) < FAR:
+            return u
+        orbit, setting = self._tried(u)
+        outcome = self.flow.watched(setting, orbit.states[0], orbit.period * np.exp(reach), self.amplitude)
+        moved = np.log(np.append(passages(self.flow, setting, outcome.recorded)[0], np.inf) / orbit.period)
+        nearest = float(moved[np.argmin(np.abs(moved))])
+        return np.asarray(u + (nearest if abs(nearest) <= reach else 0.0) * np.eye(len(u))[-2])
+
+    def _tried(self, u: Array) -> tuple[Orbit, FlowSetting]:
+        """Orbit and setting of unknowns; Failure where these are too large."""
+        if not np.all(np.isfinite(u)) or np.max(np.abs(u[:-1])) > 60 or (self.logarithmic and abs(u[-1]) > 60):
+            raise Failure("out of range")
+        orbit = self.orbit(u)
+        return orbit, self.flow.setting(orbit.value)
+
+    def _residual(self, orbit: Orbit, setting: FlowSetting, ends: Array, start: Array) -> Array:
+        """How far the segments' ends are from the next starts, and slip from constant speed at the first (`start`)."""
+        missed = (ends - np.roll(orbit.states, -1, axis=0)) / np.roll(self._stretch(orbit), -1, axis=0)
+        return np.append(missed.ravel(), setting.slip @ start / setting.speed)
 
     def _stretch(self, orbit: Orbit) -> Array:
         """Derivative of state with respect to unknown, (K, n)."""
@@ -139,12 +171,12 @@ class Shooting:
         self._last = None
 
     def _run(self, u: Array) -> tuple[Array, Array]:
-        """EndRules and sensitivities of the segments; those of the latest unknowns are cached."""
-        if self._last is None or self._last[0] != u.tobytes():
+        """Ends and sensitivities of the segments; those of the latest unknowns, a last Newton step away, are kept."""
+        if self._last is None or np.max(np.abs(self._last[0] - u)) > SAME * self.flow.costly:
             orbit = self.orbit(u)
             times = self.fractions * orbit.period
             found = self.flow.run(self.flow.setting(orbit.value), orbit.states, times, self.amplitude)
-            self._last = (u.tobytes(), found[0], found[1])
+            self._last = (u, found[0], found[1])
         return self._last[1:]
 
 

@@ -119,7 +119,7 @@ def _located(
     shooting = now.shooting
     try:
         ends = measure(before.point), measure(now.point)
-        low, high = shooting.curve().located(before.point, now.point, measure, *ends)
+        low, high = shooting.curve().located(before.point, now.point, measure, *ends, 0.1 * shooting.flow.options.rtol)
         cycle = made(shooting, high).cycle
     except Failure:
         return None

@@ -16,7 +16,7 @@ from steadyslip.nonlinear.orbits.cut_segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_data
 from steadyslip.nonlinear.orbits.end_reasons import ENDS, RETRACED, SHRUNK, STANDING, EndRules, retraces, stands, winds
-from steadyslip.nonlinear.orbits.flow import FAR_MORE, MORE, FlowFailure
+from steadyslip.nonlinear.orbits.flow import FAR_MORE, HARDLY_HEARD, MORE, FlowFailure
 from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
@@ -31,6 +31,7 @@ OF_RANGE = 3.0  # scale of a state variable, in units of its range in the cycle,
 UNRESOLVED = 1e-7  # distance from 1 of a small cycle's multiplier below which it does not decide stability
 MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: some seconds
 LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
+LED = 30.0  # times as much of it where the motion leads the steps, still below `IMPRECISE`; then sensitivities do
 HIDDEN = 0.1  # largest share of rounding in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
 USED_UP = "the work was used up"
@@ -317,7 +318,7 @@ class Tracer:
         within a segment that the trivial multiplier is lost, or where they cannot be followed any further. Where steps
         stay small, states are measured by what they go through in a cycle (see `_rescaled`).
         """
-        limit, error, again, idle = MOST_GROWTH, LOST, True, 0
+        limit, error, again, idle = MOST_GROWTH, self._lost, True, 0
         steps: list[float] = []
         while True:
             made: dict[int, BranchPoint] = {}
@@ -419,14 +420,19 @@ class Tracer:
         away = np.abs(orbit.states - self.flow.steady(orbit.value)) / self.flow.scales
         shooting.amplitude = float(min(1.0, away.max()))
         found = cycle_data(shooting, point.u)
-        if self.flow.led and found.cycle.multiplier_error > LOST:  # may be for one trial that the motion leads
-            self.flow.led = False
+        while self.flow.led and found.cycle.multiplier_error > self._lost:
+            self.flow.slack = HARDLY_HEARD if self.flow.costly and self.flow.slack > HARDLY_HEARD else 1.0
             shooting.forget()
             found = cycle_data(shooting, point.u)
         if found.turns > 1:
             raise Failure(f"a shorter cycle, run through {found.turns} times")
         cycle = replace(found.cycle, stable=self._attracts(found.cycle))
         return BranchPoint(point, shooting, cycle, found.half, found.extent, found.begin)
+
+    @property
+    def _lost(self) -> float:
+        """Error of the trivial multiplier beyond which sensitivities are to be computed in another way."""
+        return LOST * (LED if self.flow.slack == HARDLY_HEARD else 1.0)
 
     def _attracts(self, cycle: Cycle) -> bool:
         """True if all multipliers lie inside the unit circle; where that is too close, decided by the kind of onset."""

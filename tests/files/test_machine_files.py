@@ -35,6 +35,14 @@ def test_verdict_is_that_of_the_comment(path):
         assert edge.value == (low if side == "above" else high)
 
 
+@pytest.mark.parametrize("text", [TEXT, AXIS.parents[1].joinpath("inclined-spring.toml").read_text(encoding="utf-8")])
+def test_tables_of_fits_and_maps_are_read_past(text):
+    further = '\n[fit]\nfree = ["x"]\n[record]\ntime = "s"\n[population]\n[map]\n'
+    assert ss.rig_from_text(text + further) == ss.rig_from_text(text)
+    with pytest.raises(ss.SteadyslipError, match=r"no effect here: the table \[fit\] is read by what fits records"):
+        ss.rig_from_text(text + further, changes=["fit.free=y"])
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_examples_keep_to_the_schema_and_come_back_from_their_own_text(path):
     file_schema().validate(tomllib.loads(path.read_text(encoding="utf-8")))

@@ -201,7 +201,8 @@ def test_doubled_cycles_are_followed_through_reversals_of_slip():
     assert closing(machine.with_values({ALONG: last.value}), last) < 1e-5  # deviations grow 18-fold in a period
     follower = tracer_of(branch.onset, 0, None)
     follower.flow.slack = flow_module.UNHEARD  # as after one run that needed it
-    assert follower.resumed(orbit_of(last), 1.0).cycle.multiplier_error < 1e-6
+    assert follower.resumed(orbit_of(last), 1.0).cycle.multiplier_error < tracer.LOST
+    assert not follower.flow.led
 
 
 @pytest.mark.campaign

@@ -54,7 +54,8 @@ UNKNOWN_SCHEMA = {
 TOLD_IN = "# told in: "
 """Beginning of the first line of a stored rig, before the units in which it and its results are told."""
 MAP = "map"
-"""Name of the table of maps, which others ignore."""
+READ_ELSEWHERE = {MAP: "computes maps"} | dict.fromkeys(("record", "fit", "population"), "fits records")
+"""Names of tables that others ignore, and what reads them."""
 
 
 def sections() -> tuple[Section, ...]:

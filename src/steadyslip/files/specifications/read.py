@@ -31,8 +31,8 @@ from steadyslip.files.specifications.bare_speeds import question_speeds
 from steadyslip.files.specifications.changes import apply, full_name, split
 from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, taken_out, wrong_ends
 from steadyslip.files.specifications.layout import (
-    MAP,
     PROTOCOL,
+    READ_ELSEWHERE,
     TOLD_IN,
     UNKNOWN,
     Section,
@@ -262,13 +262,15 @@ def read_tables(
     reader = _ContentsReader(tables)
     names = {section.name: section for section in further}
     every = [changes] if isinstance(changes, str) else list(changes)
-    own = {change: first for change in every if (first := split(change)[0].partition(".")[0]) in {*names, MAP}}
+    apart = {*names, *READ_ELSEWHERE}
+    own = {change: first for change in every if (first := split(change)[0].partition(".")[0]) in apart}
     changed = {name for change in every for name in (split(change)[0], repr_short(change))}
     for change, first in own.items():
         if first in names:
             reader.problems += apply(change, tables, lines, names[first])
         else:
-            reader.problem(split(change)[0], f"has no effect here: the table [{MAP}] is read by what computes maps")
+            reads = READ_ELSEWHERE[first]
+            reader.problem(split(change)[0], f"has no effect here: the table [{first}] is read by what {reads}")
     if complete is not None:
         complete(tables)
     for change in [change for change in every if change not in own]:
@@ -335,7 +337,7 @@ class _ContentsReader(TableReader):
         self.tables = tables
 
     def rig(self, further: Iterable[str]) -> Slider | Machine | None:
-        others = {PROTOCOL.name, MAP, UNKNOWN, *TOLERANCES, *further}
+        others = {PROTOCOL.name, *READ_ELSEWHERE, UNKNOWN, *TOLERANCES, *further}
         for name in list(self.tables):
             self._misspelt(name, others)
         self.sections = self._own_sections()

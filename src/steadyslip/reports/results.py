@@ -33,7 +33,7 @@ from steadyslip.nonlinear.cycle_commands import Thresholds
 from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.protocol import Protocol
-from steadyslip.reports import machine_parts as machine_report, rig as rig_report
+from steadyslip.reports import held, machine_parts as machine_report, rig as rig_report
 from steadyslip.reports.brief import kind_of, result_html, sketch_of, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
@@ -213,7 +213,7 @@ def _hunt(result: Hunt, source: str = "") -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     words = "How far it is from its target, and the force of the drive, over time."
     body = [
-        heading("What was found"), text_html(worded(rig, rest)),
+        *held.recommendation(result), heading("What was found"), text_html(worded(rig, rest)),
         figure(figure_html(lambda: hunting(result), words, 7.0), words),
         *rig_section(rig, source), *references(rig),
     ]  # fmt: skip

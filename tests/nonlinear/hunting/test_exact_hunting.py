@@ -194,3 +194,11 @@ def test_bristles_that_creep_to_the_target_settle():
     late = found.time > 0.5 * found.settled_at
     assert np.abs(found.error[late]).max() < 1e-3 * np.abs(found.error).max()
     assert found.settled_at == found.time[-1] < 60.0
+
+
+def test_bristles_without_an_integral_slide_before_they_rest():
+    """At a step of the target all speeds are zero, which was told as rest: "SETTLES within 1 m after 0 s"."""
+    found = ss.hunt(ss.read_rig(EXAMPLES / "hunting-axis.toml", ["drive.ki=0 N/(m s)"]))
+    assert found.hunts is False
+    assert found.settled_at > 1.0
+    assert max(abs(found.lowest), abs(found.highest)) < 1.5 / 3.0  # what friction at rest holds, over the gain

@@ -52,6 +52,14 @@ class ExactSteps:
         """State at a share of a step."""
         return np.asarray(share ** np.arange(DEGREE + 1) @ coefficients)
 
+    def rate(self, piece: HeldPiece, state: Array) -> Array:
+        """Rates of all variables."""
+        return np.asarray(piece.matrix @ state)
+
+    def fastest(self, piece: HeldPiece, state: Array) -> float:
+        """Largest eigenvalue (1/s) of the motion."""
+        return piece.fastest
+
 
 class BristleSteps:
     """Steps of Rodas5P for contacts with memory; the length of a step is kept for the next piece.
@@ -84,9 +92,9 @@ class BristleSteps:
     def step(self, piece: HeldPiece, state: Array, most: float) -> tuple[float, Array]:
         """Length of a step whose error is allowed, at most `most` (s), and its coefficients (5, width)."""
         np.maximum(self.scale, np.abs(state), out=self.scale)
-        jacobian, rate = self._jacobian(piece, state), self._rate(piece, state)
+        jacobian, rate = self._jacobian(piece, state), self.rate(piece, state)
         if np.isnan(self.length):
-            self.length = 1.0 / float(np.max(np.abs(np.linalg.eigvals(jacobian))))
+            self.length = 1.0 / self.fastest(piece, state)
         length = min(self.length, most)
         while True:
             with np.errstate(
@@ -113,7 +121,7 @@ class BristleSteps:
         """State at a share of a step, by a step to there: dense output is of lower order."""
         if share == 0:
             return state
-        jacobian, rate = self._jacobian(piece, state), self._rate(piece, state)
+        jacobian, rate = self._jacobian(piece, state), self.rate(piece, state)
         found, _ = self._tried(piece, state, share * length, jacobian, rate)
         return np.asarray(found.sum(axis=0))
 
@@ -125,14 +133,15 @@ class BristleSteps:
         stages = np.zeros((self.stages, len(state)))
         for i in range(self.stages):
             if i:
-                rate = self._rate(piece, state + self.arguments[i] @ stages[: len(self.arguments[i])])
+                rate = self.rate(piece, state + self.arguments[i] @ stages[: len(self.arguments[i])])
             right = rate + self.couplings[i] @ stages[: len(self.couplings[i])] / length if i else rate
             stages[i] = inverse @ right
         change = self.arguments[self.stages] @ stages[: len(self.arguments[self.stages])]
         first, second, third = self.dense @ stages
         return np.array([state, change + first, second - first, third - second, -third]), self.error @ stages
 
-    def _rate(self, piece: HeldPiece, state: Array) -> Array:
+    def rate(self, piece: HeldPiece, state: Array) -> Array:
+        """Rates of all variables."""
         found: Array = piece.matrix @ state
         n = self.plant.size
         for slip, own, contact, values, _ in self.bristles:
@@ -143,6 +152,10 @@ class BristleSteps:
             found[n : 2 * n] -= contact.row / self.plant.inertia * friction
             found[own] = rates
         return found
+
+    def fastest(self, piece: HeldPiece, state: Array) -> float:
+        """Largest eigenvalue (1/s) of the motion."""
+        return float(np.max(np.abs(np.linalg.eigvals(self._jacobian(piece, state)))))
 
     def _jacobian(self, piece: HeldPiece, state: Array) -> Array:
         found = piece.matrix.copy()

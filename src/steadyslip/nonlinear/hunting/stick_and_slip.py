@@ -15,6 +15,7 @@ from steadyslip.nonlinear.hunting.steps import NODES, POWERS, BristleSteps, Exac
 from steadyslip.protocol.segments import Segments
 
 BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
+STILL_ERROR = 0.1  # of the error allowed per step, below which the speeds of bristles are noise (by trial)
 STILL = 1e-9  # of the fastest speed so far, below which what is at rest moves no more
 AT_ONCE = 100  # switches without time passing that are no sequence of switches any more
 AWAY = 1e4  # error over what friction, load or target account for, beyond which friction is negligible
@@ -70,6 +71,7 @@ class Motion:
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
         self.acceleration = 0.0
         self.exact = not plant.memory
+        self.still = STILL if self.exact else max(STILL, STILL_ERROR * rtol)
         self.stepper: ExactSteps | BristleSteps = (
             ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant))
         )
@@ -232,16 +234,16 @@ class Motion:
         plant, n = self.plant, self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
             return False
-        pace = STILL * max([self.fastest, *(one.slow for one in plant.contacts)])
+        pace = self.still * max([self.fastest, *(one.slow for one in plant.contacts)])
         if np.any(np.abs(self.state[n : 2 * n]) > pace):
+            return False
+        rates = self.stepper.rate(self._piece(), self.state)
+        moves = any(self.mode.contacts) or not self.exact  # a bristle can bend at any force, so that none is stuck
+        if moves and np.any(np.abs(rates[n : 2 * n]) > pace * self.stepper.fastest(self._piece(), self.state)):
             return False
         if self.sampled is not None:
             return self.sampled.constant and not any(self.mode.contacts)
-        rates = self._piece().matrix @ self.state
-        if not any(self.mode.contacts):
-            return bool(abs(rates[2 * n]) <= (0.0 if self.exact else STILL * self.farthest))
-        creeps = np.any(np.abs(rates[n : 2 * n]) > pace * self._piece().fastest)
-        return not (creeps or abs(rates[2 * n]) > STILL * self.farthest)
+        return bool(abs(rates[2 * n]) <= (self.still * self.farthest if moves else 0.0))
 
 
 def _side(name: str, value: float, bound: float) -> Switch:

@@ -146,13 +146,15 @@ def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
             edgecolor=VERMILION, linewidth=0, alpha=0.5,
         )  # fmt: skip
     unstable.set_label("steady sliding is unstable")
+    fastest = max(float(np.max(np.abs(own))) for own in found.slip_rates.values())
+    speed, speed_unit = display_unit("m/s", fastest or 1.0)
     for (name, own), colour in zip(found.slip_rates.items(), cycle((BLUE, GREEN, ORANGE)), strict=False):
-        axes[1].plot(found.run["t"] / factor, np.abs(own), color=colour, label=name or "slip rate")
+        axes[1].plot(found.run["t"] / factor, np.abs(own) / speed, color=colour, label=name or "slip rate")
     if np.isfinite(found.departure):
         axes[1].axvline(found.departure / factor, color=BLACK, linestyle="--", linewidth=1, label="motion departs")
     axes[1].set_yscale("log")
     axes[0].set_ylabel("growth rate (1/s)")
-    axes[1].set_ylabel("slip rate (m/s)")
+    axes[1].set_ylabel(axis_label("slip rate", speed_unit))
     axes[1].set_xlabel(axis_label("time", unit))
     axes[1].legend(fontsize="small")
     return axes

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, VERMILION
 from steadyslip.figures import regions
 from steadyslip.figures.chart import absence_reasons, draw_edges
@@ -271,6 +271,7 @@ def _mark_own(
         f"{short_name(name)} {format_quantity(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
         for name, value, scale in zip(view.names, nearest, scales, strict=True)
     )
+    words = typeset(words).replace("-", "−")
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
             label=f"nearest edge\n({words})" if with_values else "nearest edge", zorder=5)  # fmt: skip
 

@@ -111,5 +111,6 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
         missing = found.missing[result]
         one.set_title(title + (f"\n(missing at {100 * missing:.3g} % of the points)" if missing else ""),
                       fontsize="medium")  # fmt: skip
-    axes[0].legend(loc="lower right", fontsize="small")
+    shown = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(*shown, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return axes

@@ -14,7 +14,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
 from steadyslip.figures.map_axes import is_geometric
-from steadyslip.figures.style import axes_or_new, axis_label, display_unit, parameter_label
+from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
 from steadyslip.machine.machine import Machine
 
 if TYPE_CHECKING:
@@ -237,7 +237,7 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(axis_label(place, length_unit))
     ax.set_ylabel(axis_label(height, speed_unit))
     columns = 1 if np.any(found.doubt != "") else 2
-    ax.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)  # below: no room inside
+    add_legend_above(ax, columns, 1.0, fontsize="small")
     return ax
 
 

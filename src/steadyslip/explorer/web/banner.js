@@ -117,7 +117,7 @@ export class Banner {
     const [size] = unitFor(one, found.range[1]), scale = ticks(found.range[0] / size, found.range[1] / size, logarithmic, 4).map((v) => v * size).filter((v) => x(v) > 6 && x(v) < 94);
     const marked = [...scale.map((v) => ["tick", x(v), ""]), ["own", x(own), ""], ...ends.map((v) => ["edge", x(v), ""])];
     const begins = new Set(intervals.map(({ low }) => low)), closes = new Set(intervals.map(({ high }) => high)), words = whole ? (gain > 0 ? `gain${own > gain ? " and stiffness" : ""} ` : "stiffness ") : "";
-    const labels = [...ends].sort((a, b) => Math.abs(x(a) - x(own)) - Math.abs(x(b) - x(own))).map((v) => ["", x(v), `${begins.has(v) ? "stable from" : closes.has(v) ? "to" : "from"} ${value(v)}`]);
+    const labels = [...ends].sort((a, b) => Math.abs(x(a) - x(own)) - Math.abs(x(b) - x(own))).map((v) => ["", x(v), `${begins.has(v) ? "stable from" : closes.has(v) ? (intervals.some((one) => one.high === v && ends.includes(one.low)) ? "to" : "stable to") : "from"} ${value(v)}`]);
     if (own > gain && gain > 0 && !ends.length) labels.push(["", x(gain), `the gain alone ${value(gain)}`]);
     placed(this.marks, marked, "i");
     placed(this.labels, [...this.fitted(scale.map((v) => ["tick", x(v), value(v)])), ...this.fitted([["now", x(own), `${words}now ${value(own)}`]]), ...this.fitted(labels)], "span");

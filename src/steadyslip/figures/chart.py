@@ -165,7 +165,9 @@ def draw_contours(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) 
         lines = ax.contour(x.shown(x.at(share)), y.shown(y.at(share)), inverse, levels=shown, **CONTOURS)
         pieces = [list(map(np.asarray, path.to_polygons(closed_only=False))) for path in lines.get_paths()]
         longest = [max(several, key=len) for several in pieces if several]
-        places = [_apart(ax, one, [other for other in longest if other is not one]) for one in longest]
+        own = [(axis, rig.value(axis.name)) for axis in (x, y)]
+        marked = [np.array([[axis.shown(value) for axis, value in own]])] if None not in dict(own).values() else []
+        places = [_apart(ax, one, [*marked, *(other for other in longest if other is not one)]) for one in longest]
         ax.clabel(lines, fontsize="small", fmt=lambda level: f"{1 / level:g}", manual=places)
         ax.plot([], [], color=CONTOURS["colors"], linewidth=CONTOURS["linewidths"], label="k/k$_{cr}$")
 

@@ -130,7 +130,7 @@ def test_a_held_axis_has_a_report_on_its_hunting():
     assert ss.hunt(ss.read_rig(path)).sentence.capitalize() in text
     assert "There is no explorer at the end: the drive holds a place" in text
     assert "does it hunt" in text
-    assert "Best of them: dead band of 127.8 mm of the integral (2 amplitudes)" in text
+    assert "the best is a dead band of 127.8 mm of the integral (2 amplitudes)" in text
     assert "no integral (drive integral gain k_i = 0) Settles within 337.9 mm of the target" in text
     assert "Canudas de Wit" in text
     assert "[protocol]" not in text or "[protocol]" in path.read_text()

@@ -47,9 +47,9 @@ def machine_verdict(found: Analysis) -> np.ndarray:
     width = rcParams["figure.figsize"][0]
     bars = 1.2 + 0.28 * len(found.mode.amplitudes)  # inches for the mode and its energies
     if not is_narrow():
-        size = 1.5 * width, max(1.6 + 0.34 * rows, 2.4 + bars)
+        size = 1.5 * width, max(1.6 + 0.34 * rows, 3.0 + bars)
         layout: Any = [["ranges", "mode"], ["ranges", "plane"]]
-        shares: Any = {"width_ratios": (1.5, 1), "height_ratios": (1.3, 1)}
+        shares: Any = {"width_ratios": (1.5, 1), "height_ratios": (bars, 2.0)}
     else:
         heights = (0.6 + 0.2 * rows, 0.7 * bars, 1.7)
         size, layout, shares = (width, sum(heights)), [["ranges"], ["mode"], ["plane"]], {"height_ratios": heights}

@@ -37,10 +37,8 @@ def recommendation(result: Hunt) -> Iterator[str]:
         found = [(what, hunt(rig, result.protocol)) for what, rig in _changed(result)]
         good = [(what, one) for what, one in found if np.isfinite(one.settled_at)]
         good.sort(key=lambda pair: max(abs(pair[1].lowest), abs(pair[1].highest)))
-        tried = "Of the changes that were tried, each alone:"
-        yield paragraph(
-            f"Best of them: {good[0][0]}. {tried}" if good else f"No change that was tried ends it. {tried}"
-        )
+        best = f"the best is {good[0][0]}" if good else "none of them ends it"
+        yield paragraph(f"Each change below was tried alone; {best}.")
         why = "What ends hunting: the integral winds up while friction at rest, larger than in sliding, holds the axis."
         yield table([(what, one.sentence.capitalize()) for what, one in found], ("change", "then"), caption=why)
     yield heading("Assumptions")
@@ -53,7 +51,7 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any]]:
     known = rig.parameters()
     band = BAND * max(abs(result.lowest), abs(result.highest))
     with suppress(ParameterError, NotAvailable, TypeError):  # a drive without these keys
-        words = f"dead band of {format_quantity(band, result.unit)} of the integral ({BAND:g} amplitudes)"
+        words = f"a dead band of {format_quantity(band, result.unit)} of the integral ({BAND:g} amplitudes)"
         yield words, replace(rig, drive=replace(rig.drive, dead_band=band, dead_band_of="integral"))
     for name, one in known.items():
         if name.startswith("drive.") and one.role.adds_state and one.value:

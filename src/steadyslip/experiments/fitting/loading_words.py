@@ -19,7 +19,7 @@ from steadyslip.protocol.protocol import LOAD_POINT
 _RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a thousandth of its stretch: of no account
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
 CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
-SMALL_CHANGE, LISTED = 1.5, 4  # ratio of rates up to which a change may be waviness of a sensor; changes listed
+LISTED = 4  # changes listed in a warning
 
 
 def loading_warnings(fit: FitNumbers) -> list[str]:
@@ -101,8 +101,7 @@ def _small_changes(fit: FitNumbers) -> list[str]:
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         changes = () if loading.load is None else loading.load.changes
-        small = [one for one in changes if one.before > 0 < one.after
-                 and max(one.before, one.after) < SMALL_CHANGE * min(one.before, one.after)]  # fmt: skip
+        small = [one for one in changes if one.slight]
         if small:
             sizes = [f"{format_percent(one.after / one.before - 1)} at {one.time:.5g} s" for one in small[:LISTED]]
             more = [f"{len(small) - LISTED} more"] if len(small) > LISTED else []

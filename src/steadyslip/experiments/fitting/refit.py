@@ -74,7 +74,7 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
 
 def may_be_ramp(channel: str, change: Change) -> bool:
     """True if a change is taken as a step although a ramp would fit the displacement as well."""
-    return channel == "load" and change.free and change.duration == 0 and change.longest > 0
+    return channel == "load" and change.free and change.duration == 0 and change.longest > 0 and not change.slight
 
 
 def with_ramps(

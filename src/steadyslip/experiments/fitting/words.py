@@ -164,24 +164,22 @@ def _possible_ramps(fit: FitNumbers) -> list[str]:
                 "displacement as well"
             )
     if found and fit.as_ramps:
+        moved = [abs(one.values[n] - fit.values[n]) > fit.errors[n] for one in _alike(fit, fit.as_ramps)
+                 for n in _steep_names(fit.rig(0)) if n in one.values and n in fit.values]  # fmt: skip
+        if not any(moved):  # by more than its error
+            return []
         found[-1] += f"; {_ramp_effect(fit, fit.as_ramps)}"
     return found
 
 
 def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
     """Text on whether friction distinguishes ramps from steps, and on how ramps change the parameters."""
-    worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
-    best = min(tried, key=lambda one: one.ssq)
-    alike = [one for one in tried if one.ssq < best.ssq * (1 + SIGNIFICANT_GAIN / worth)]
-    lengths = {one.share: _lengths(fit, one) for one in tried}
-    if alike == [tried[0]]:
-        first = lengths[tried[1].share]
-        return f"friction tells: ramps of {first} make the sum of squares {_relative_change(fit, tried[1])}"
+    alike, best = _alike(fit, tried), min(tried, key=lambda one: one.ssq)
     longest = alike[-1] if tried[0] in alike else best
     changes = ", ".join(f"{_symbol(n)} {longest.values[n] / fit.values[n] - 1:+.1%}" for n in _steep_names(fit.rig(0))
                         if n in longest.values and fit.values.get(n))  # fmt: skip
     verdict = "friction does not tell either" if tried[0] in alike else "friction is better fitted so"
-    return f"{verdict}: with {lengths[longest.share]} the sum of squares is {_relative_change(fit, longest)}; {changes}"
+    return f"{verdict}: with {_lengths(fit, longest)} the sum of squares is {_relative_change(fit, longest)}; {changes}"
 
 
 def _structure(fit: FitNumbers) -> list[str]:
@@ -264,6 +262,13 @@ def _drained_at_once(fit: FitNumbers) -> list[str]:
         f"the pore pressure changes in {enumerated(changing)}, and acts at once in this contact, which has no pores; "
         "where drainage takes time, fit its rate (lab_rig(pores=True), or no table [contact] in the file)"
     ]
+
+
+def _alike(fit: FitNumbers, tried: tuple[RampFit, ...]) -> list[RampFit]:
+    """Those that fit nearly as well as the best."""
+    worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
+    least = min(one.ssq for one in tried)
+    return [one for one in tried if one.ssq < least * (1 + SIGNIFICANT_GAIN / worth)]
 
 
 def _lengths(fit: FitNumbers, ramped: RampFit) -> str:

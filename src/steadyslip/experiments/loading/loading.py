@@ -18,6 +18,7 @@ from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.loading.servo import ramps
 
 LoadCurve = Callable[[Array], Array]
+SLIGHT = 1.5  # ratio of rates up to which a change may be waviness of a sensor: commanded ones are larger
 FELT = 1e-6  # error of a level, relative to the highest, below which it has no effect on a fit
 
 
@@ -62,6 +63,11 @@ class Change:
     def free(self) -> bool:
         """True if the column does not determine when it begins."""
         return self.latest > self.earliest
+
+    @property
+    def slight(self) -> bool:
+        """True for a change of rate so small that it may be none but waviness of the sensor."""
+        return self.before > 0 < self.after and max(self.before, self.after) < SLIGHT * min(self.before, self.after)
 
     @property
     def stretches(self) -> bool:

@@ -393,3 +393,15 @@ def test_a_hold_of_few_samples_between_long_slides_is_one_and_a_slip_of_the_sens
         course = load_course(time, slipped + sensor)
         assert not course.changes
         assert course.slips > 0
+
+
+def test_a_brief_hold_is_no_response_of_a_servo():
+    """Among averages far from the other changes it was one outlier, so that a servo without it seemed to fit better."""
+    ends = [0, 19.483, 20.44, 39.924, 49.262, 68.747, 161.396, 181]
+    time, chance, memory = np.linspace(0, 180.9, 10_000), np.random.default_rng(5), 0.85
+    moves = 1e-5 * np.interp(time, ends, np.cumsum(np.diff(ends, prepend=0) * [0, 1, 0, 1, 0, 1, 0, 1]))
+    white, pushes = chance.standard_normal((2, len(time)))
+    slow = lfilter([np.sqrt(1 - memory**2)], [1, -memory], pushes)
+    course = load_course(time, moves + 1e-8 * white + 1.2e-8 * slow)
+    assert [change.time for change in course.changes] == pytest.approx(ends[1:-1], abs=0.02)
+    assert not any(change.lag for change in course.changes)

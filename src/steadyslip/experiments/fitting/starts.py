@@ -119,7 +119,8 @@ def _step_response(record: Record, moved: Array, step: LoadStep) -> tuple[float,
     time, mu = record.time, record.friction
     fold = float(np.log(step.after / step.before))
     others = [s.time for s in record.steps if s.time > step.time + step.duration]
-    end = min(others, default=float(time[-1]))
+    first = min(int(np.searchsorted(time, step.time)), len(time) - 1)  # another change may follow before it
+    end = max(min(others, default=float(time[-1])), float(time[first]))
     earlier = [s.time + s.duration for s in record.steps if s.time < step.time]
     begin = max(earlier, default=float(time[0]))
     before = (time < step.time) & (time > step.time - 0.5 * (step.time - begin))

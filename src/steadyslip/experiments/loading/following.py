@@ -80,7 +80,8 @@ def followed(time: Array, values: Array, noise: float, ways: Iterator[Kinks]) ->
         servo = fit_servo(samples, steps, 0.1 * spacing, kinks.longest, GAIN)
         if servo is None:
             break
-        if not all(map(_is_noise, _off(servo, time, values, noise, spacing))):
+        everywhere = np.append(servo.times, lines.meets)
+        if not all(map(_is_noise, _off(servo, everywhere, time, values, noise, spacing))):
             continue
         inflation = inflation or _inflation(servo, time, values)
         spared = len(lines.levels) - len(levels) + 2 * (len(lines.meets) - len(kinks.meets))
@@ -92,10 +93,10 @@ def followed(time: Array, values: Array, noise: float, ways: Iterator[Kinks]) ->
     return best
 
 
-def _off(found: JointFit, time: Array, values: Array, noise: float, spacing: float) -> list[Array]:
-    """Deviations of the samples around each change of a servo, in standard deviations of the noise."""
+def _off(found: JointFit, at: Array, time: Array, values: Array, noise: float, spacing: float) -> list[Array]:
+    """Deviations from a servo of the samples around each of the times `at` (s), in standard deviations of the noise."""
     length = AROUND * (settling(found.lag, found.damping) + spacing)
-    around = [slice(*np.searchsorted(time, [at - length, at + length])) for at in found.times]
+    around = [slice(*np.searchsorted(time, [one - length, one + length])) for one in at]
     return [(values[rows] - found.predicted(time[rows])) / noise for rows in around]
 
 

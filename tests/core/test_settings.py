@@ -221,3 +221,13 @@ def test_whatever_a_record_is_read_with_may_stand_in_a_file():
 def test_a_record_is_per_unit_area_whatever_the_area_of_the_rig():
     spec = spec_from_text("[friction]\n[slider]\narea = '2 m^2'\n[record]\nnormal_stress = 3e6\n")
     assert spec.record.normal_stress == 3e6
+
+
+def test_a_key_in_another_table_is_told_where_it_belongs():
+    with pytest.raises(ss.RigFileError) as caught:
+        spec_from_text("[friction]\ntrend = 1\n[fit]\nbetween = [1, 2]\n")
+    found = {p.name: p.message for p in caught.value.problems}
+    assert found == {
+        "friction.trend": "unknown key 'trend' here; it is a key of [fit]",
+        "fit.between": "unknown key 'between' here; it is a key of [record]",
+    }

@@ -336,11 +336,11 @@ class _ContentsReader(TableReader):
         super().__init__()
         self.tables = tables
 
-    def rig(self, further: Iterable[str]) -> Slider | Machine | None:
+    def rig(self, further: Mapping[str, Section]) -> Slider | Machine | None:
         others = {PROTOCOL.name, *READ_ELSEWHERE, UNKNOWN, *TOLERANCES, *further}
         for name in list(self.tables):
             self._misspelt(name, others)
-        self.sections = self._own_sections()
+        self.sections = (*self._own_sections(), *further.values())
         known = others.union(section.name for section in self.sections)
         for name in self.tables:
             if name not in known:

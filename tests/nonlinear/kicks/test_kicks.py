@@ -256,6 +256,21 @@ def test_doubt_is_said_on_maps(monkeypatch):
     assert limit.flags[int(measured["threshold_limit"][0])] == why
 
 
+def test_an_edge_is_a_threshold_though_motions_next_to_it_return_too_slowly(monkeypatch):
+    a_rig = tilted(-0.5, 1.15)
+    edge = ss.threshold(a_rig, "normal-stress", precision=1e-3)
+    share = edge.amount / edge.size
+
+    def slow(runs, threads=None, advanced=None):
+        size = runs.rest.pressure / share / edge.size
+        return np.where(size > 1, BLOW_UP, np.where(size > 1 - 2e-6, LATE, RETURNS))
+
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", slow)
+    found = ss.threshold(a_rig, "normal-stress")
+    assert (found.edge, found.decided, found.outcome) == (True, True, "blow-up")
+    assert 0 < 1 - found.bracket[0] / found.bracket[1] <= 1e-5
+
+
 def test_below_an_edge_that_is_not_certain_the_certain_end_is_said(monkeypatch):
     """Undecided up to the edge of the new steady sliding: the edge itself is no kick that is survived."""
     a_rig = tilted(-0.5, 1.15)

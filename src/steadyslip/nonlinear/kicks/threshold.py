@@ -37,6 +37,7 @@ COARSE = 192  # sizes in the first scan of a single rig
 BLOCK = 48  # sizes simulated at a time
 FINE = 47  # sizes between the ends of a bracket in each round of narrowing
 STEPS = 1e9  # integration steps for all motions of one threshold
+AT_EDGE = 1e-5  # relative width of a bracket that ends at an edge: motions return ever more slowly towards it
 BEYOND = 1.01  # factor on the size of an edge at which the outcome beyond is simulated
 
 
@@ -202,7 +203,8 @@ def threshold(
         Largest size that is searched, without unit like `Threshold.size`. Unless given it is 1e4 times the velocity
         (of the drive, or of the body that gets the blow), 1e5 natural lengths, or 10 times the normal force or stress.
     precision : float, optional
-        Relative width of the bracket.
+        Relative width of the bracket; 1e-5 is enough at the edge of stability of what a kick leads to, near which
+        motions return ever more slowly.
     rtol : float, optional
         Error allowed per step of integration; 1e-10, with mass or bristles 1e-8, unless given.
     branch : int, optional
@@ -284,7 +286,7 @@ class _Search:
         self.edge = self.high = float(edges(self.kicked, np.zeros(1, dtype=int), sizes)[0])
         self._scan(sizes[sizes < self.edge])
         least = precision * self.kicked.kick.low  # smaller kicks, where even they fail, are none
-        while np.isfinite(self.high) and self.high - self.low > max(precision * self.high, least):
+        while np.isfinite(self.high) and self.high - self.low > max(self._enough(precision), least):
             width = self.high - self.low
             self._narrow(self.low + width * np.arange(1, FINE + 1) / (FINE + 1), PATIENCE)
             if self.high - self.low > 0.5 * width:
@@ -295,6 +297,10 @@ class _Search:
             if found == INTERRUPTED:
                 raise KeyboardInterrupt
             self.outcome = LATE if found == RETURNS else found  # neutral sliding is no return there
+
+    def _enough(self, precision: float) -> float:
+        """Width of the bracket at which it is narrow enough."""
+        return self.high * (max(precision, AT_EDGE) if self.at_edge else precision)
 
     @property
     def at_edge(self) -> bool:
@@ -344,7 +350,7 @@ class _Search:
     def result(self, rig: Slider | Machine, precision: float) -> Threshold:
         """Build the `Threshold` from the present bracket."""
         kicked, low, high = self.kicked, self.low, self.high
-        decided = bool(high - low <= precision * high) if np.isfinite(high) else self.outcome == RETURNS
+        decided = bool(high - low <= self._enough(precision)) if np.isfinite(high) else self.outcome == RETURNS
         size = high if self.at_edge else 0.5 * (low + high)
         if np.isinf(high):
             size = np.inf if self.outcome == RETURNS and not self.interrupted else np.nan

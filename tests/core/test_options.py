@@ -1,6 +1,7 @@
 """Numeric options of Python calls: whatever is given, an answer or one message of ours, and soon."""
 
 import inspect
+import re
 from itertools import count
 
 import numpy as np
@@ -214,3 +215,32 @@ def test_a_tolerance_has_one_range_wherever_it_is_given(value):
         (problem,) = caught.value.problems
         said.add(problem.message.partition("allowed: ")[2].partition(",")[0].partition(" in ")[0])
     assert len({text for text in said if text.startswith("a number from 1e-14 to 0.1")}) == len(said)
+
+
+def test_text_with_a_unit_is_read_wherever_a_number_is():
+    """The same answers as those of SI numbers; what is no quantity of that dimension is named with its place."""
+    kicked = {"v": 1.5e-6}
+    run = ss.simulate(STIFF, until=0.2, initial=kicked, times=[0.05, 0.2])
+    told = ss.simulate(STIFF, until="200 ms", initial={"v": "1.5 um/s"}, times=["50 ms", 0.2])
+    np.testing.assert_array_equal(run["v"], told["v"])
+    assert ss.frozen_verdicts(STIFF, STEP, until="200 ms").run.end == 0.2
+    stiff, texts = [20e9, 30e9], ["20 GPa/m", "30 GPa/m"]
+    for given in (texts, tuple(texts), np.array(texts), [texts[0], 30e9]):
+        np.testing.assert_array_equal(
+            ss.growth_rate(STIFF, {"stiffness": given}), ss.growth_rate(STIFF, {"stiffness": stiff})
+        )
+        ensemble = ss.simulate_many(STIFF, {"stiffness": given}, until="0.1 s", initial={"v": ["1.5 um/s", "2 um/s"]})
+        same = ss.simulate_many(STIFF, {"stiffness": stiff}, until=0.1, initial={"v": [1.5e-6, 2e-6]})
+        np.testing.assert_array_equal(ensemble.final["v"], same.final["v"])
+    gains = [ss.response(STIFF, periods=one).gain for one in (["1 s", "1 min"], [1.0, 60.0])]
+    np.testing.assert_array_equal(*gains)
+    for ask, words in (
+        (lambda: ss.simulate(STIFF, until="10 m"), "until: '10 m' has the wrong dimension"),
+        (lambda: ss.simulate(STIFF, until="-1 s"), "until: got -1.0; allowed: a finite number above 0 in s, or text"),
+        (lambda: ss.simulate(STIFF, until=1, times=["1 ms", "x"]), "times: value 2: 'x' is not a quantity in s"),
+        (lambda: ss.simulate(STIFF, until=1, initial={"v": "1 um"}), "initial.v: '1 um' has the wrong dimension"),
+        (lambda: ss.simulate_many(STIFF, {"stiffness": ["1 GPa"]}, until=1), "slider.stiffness: '1 GPa' has the wrong"),
+        (lambda: ss.growth_rate(STIFF, {"stiffness": [1e9, "1 GPa"]}), "slider.stiffness: '1 GPa' has the wrong"),
+    ):  # fmt: skip
+        with pytest.raises(ss.ParameterError, match=re.escape(words)):
+            ask()

@@ -14,7 +14,8 @@ import numpy as np
 
 from steadyslip.core.domains import Domain, below_one, steps, tolerance
 from steadyslip.core.entries import Names, Option, Text, Whole
-from steadyslip.core.errors import ParameterError, Problem, one
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, one
+from steadyslip.core.quantities import example, in_si
 from steadyslip.core.roles import Role, fault
 from steadyslip.core.written import in_written_units
 
@@ -40,19 +41,36 @@ class Tested(Role):
         return self.words
 
 
+@dataclass(frozen=True)
+class Measured(Tested):
+    """Role of numbers, or texts with a unit, that are converted to SI numbers before they are tested."""
+
+    unit: str
+
+    def checked(self, value: Any) -> Any:
+        try:
+            return super().checked(in_si(value, self.unit))
+        except QuantityError as error:
+            raise fault(str(error)) from error
+
+    def allowed(self) -> str:
+        return f"{self.words} in {self.unit}, or text such as {example(self.unit)}"
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
-def finite(above: float, most: float = math.inf, *, closed: bool = False) -> Role:
-    """Role of finite numbers above a bound (from it on if `closed`) and up to `most`."""
+def finite(above: float, most: float = math.inf, *, closed: bool = False, unit: str = "") -> Role:
+    """Role of finite numbers above a bound (from it on if `closed`) and up to `most`; with a unit also of texts."""
 
     def passes(value: Any) -> bool:
         above_low = _is_number(value) and (above < value or (closed and value == above))
         return above_low and bool(value <= min(most, LARGEST))
 
     least = "" if math.isinf(above) else f" {'from' if closed else 'above'} {above:g}"
-    return Tested(f"a finite number{least}" + (f", up to {most:g}" if math.isfinite(most) else ""), passes)
+    words = f"a finite number{least}" + (f", up to {most:g}" if math.isfinite(most) else "")
+    return Measured(words, passes, unit) if unit else Tested(words, passes)
 
 
 def within(domain: Domain) -> Role:
@@ -131,6 +149,7 @@ def whole(least: int, most: int = 2**31) -> Whole:
 BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000), whole(0, 2**63)
 NAME, NAMES, SIGN = Text(""), Names(""), Option((1, -1), "")
 NUMBERS = Tested(f"numbers, up to {MOST:g} in size", _all_numbers)
+DURATION, TIMES = finite(0, unit="s"), Measured(NUMBERS.words, NUMBERS.passes, "s")
 LOW_AND_HIGH = Tested("two values, low and high", lambda v: isinstance(v, (tuple, list, np.ndarray)) and len(v) == 2)
 BY_NAME = Tested("a mapping of names to values", lambda value: isinstance(value, Mapping))
 SEVERAL = Tested("a list", lambda value: isinstance(value, (list, tuple)))
@@ -183,6 +202,7 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
     def decorate(asked: Callable[P, R]) -> Callable[P, R]:
         function = in_written_units(asked)
+        call: Callable[..., R] = function
         parameters = inspect.signature(function).parameters
         defaults = {name: item.default for name, item in parameters.items()}
         known = {
@@ -197,19 +217,22 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
         @functools.wraps(function)
         def called(*args: P.args, **kwargs: P.kwargs) -> R:
             problems = []
-            given = [(name, name, value) for name, value in zip(single, args[:count], strict=False)]
-            given += [(several or "", f"argument {i}", value) for i, value in enumerate(args[count:], count + 1)]
-            for name, shown, value in (*given, *((name, name, value) for name, value in kwargs.items())):
-                if name not in known or value is (default := defaults[name]):
+            values: dict[Any, Any] = dict(enumerate(args)) | kwargs
+            given = [(i, name, name) for i, name in enumerate(single[: min(count, len(args))])]
+            given += [(i, several or "", f"argument {i + 1}") for i in range(count, len(args))]
+            for key, name, shown in (*given, *((name, name, name) for name in kwargs)):
+                if name not in known or values[key] is (default := defaults[name]):
                     continue
                 try:
-                    known[name].checked(value)
+                    found = known[name].checked(values[key])
+                    values[key] = found if isinstance(known[name], Measured) else values[key]
                 except ParameterError as error:
                     other = ", or None" if default is None else ""
                     problems += [Problem(shown, fault.message + other) for fault in error.problems]
             if problems:
                 raise ParameterError(problems)
-            return function(*args, **kwargs)
+            positional = [values.pop(i) for i in range(len(args))]
+            return call(*positional, **values)
 
         return called
 

@@ -121,6 +121,21 @@ def _scaled(digits: str, factor: float) -> float:
         return math.copysign(math.inf, plain)
 
 
+def in_si(value: Any, expected: str) -> Any:
+    """Convert text with a unit, or a column in which there is some, to SI numbers; other values are returned unchanged.
+
+    Raises
+    ------
+    QuantityError
+        If text is no quantity of the dimension of `expected`, an SI unit.
+    """
+    if isinstance(value, str):
+        return parse(value, expected)
+    items = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
+    has_text = isinstance(items, (list, tuple)) and any(isinstance(item, str) for item in items)
+    return np.array(numbers(items, expected)) if has_text else value
+
+
 def numbers(values: Any, expected: str, read: Callable[[str, str], float] = parse) -> tuple[float, ...]:
     """Convert a column of quantities to SI values.
 

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
+import numpy as np
+
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
 from steadyslip.core.quantities import units_in
@@ -166,14 +168,18 @@ class Rig(FrozenRecord, Keeper):
         return resolve(name, self.parameters())
 
     def read(self, name: str, value: Any) -> Any:
-        """Convert a value of a parameter to SI units; text may give a total of a contact with an area, and the speed
-        of the body by which that of the drive is `told`.
+        """Convert a value of a parameter, or a list of them, to SI units.
+
+        Text may give a total of a contact with an area, and the speed of the body by which that of the drive is `told`.
 
         Raises
         ------
         ParameterError
             If text is not a quantity of the parameter's dimension.
         """
+        items = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
+        if isinstance(items, (list, tuple)) and any(isinstance(item, str) for item in items):
+            return [self.read(name, item) for item in items]
         if not isinstance(value, str):
             return value
         factor, unit = self.told(name, 1.0)

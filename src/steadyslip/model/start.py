@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import InternalError, ParameterError, Problem, repr_short, unknown_name
+from steadyslip.core.errors import InternalError, ParameterError, Problem, QuantityError, repr_short, unknown_name
 from steadyslip.core.expressions import ArrayFunction, derivative
+from steadyslip.core.quantities import in_si
 from steadyslip.core.questions import question
 from steadyslip.model.equations import HELD, Model
 from steadyslip.model.point import OperatingPoint
@@ -172,17 +173,21 @@ def _initial_values(
 
 
 def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.ndarray]:
-    moving = [item.name for item in model.variables if item.kind in ("slip", "velocity")]
+    moving = {item.name: item.unit for item in model.variables if item.kind in ("slip", "velocity")}
     if model.is_single:  # without inertia a memory variable is adjusted to a given velocity
-        moving = [moving[0], f"{moving[0].removesuffix('x')}v"]
-    known = [*moving, *(item.name for item in (*model.memory, *model.states, *model.integrals))]
+        slip, unit = next(iter(moving.items()))
+        moving = {slip: unit, f"{slip.removesuffix('x')}v": f"{unit}/s"}
+    known = moving | {item.name: item.unit for item in (*model.memory, *model.states, *model.integrals)}
     problems, found = [], {}
     for name, value in given.items():
         if name not in known:
             problems.append(Problem(f"initial.{name}", unknown_name("variable", name, known)))
             continue
         try:
-            array = np.asarray(value, dtype=float)
+            array = np.asarray(in_si(value, known[name]), dtype=float)
+        except QuantityError as error:
+            problems.append(Problem(f"initial.{name}", str(error)))
+            continue
         except (TypeError, ValueError, OverflowError):
             array = np.array(np.nan)
         if not array.size or not np.all(np.isfinite(array)) or np.asarray(value).dtype == bool:

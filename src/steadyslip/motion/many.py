@@ -13,7 +13,7 @@ import numpy as np
 from steadyslip.core.arrays import BroadcastArrays, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
-from steadyslip.core.options import NUMBERS, checked, finite
+from steadyslip.core.options import DURATION, TIMES, checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters
 from steadyslip.core.results import ReadOnly, read_only
@@ -165,13 +165,13 @@ class Ensemble(ReadOnly):
         return xr.Dataset(variables, coords=coords, attrs={"steadyslip": version()})
 
 
-@checked(until=finite(0), times=NUMBERS)
+@checked(until=DURATION, times=TIMES)
 def simulate_many(
     rig: Slider | Machine,
     vary: Mapping[str, Any],
     protocol: Any = None,
     *,
-    until: float | None = None,
+    until: float | str | None = None,
     initial: Mapping[str, Any] | None = None,
     times: Any = None,
     observables: Sequence[str] | None = None,
@@ -257,9 +257,13 @@ def broadcast_arrays(
     problems, named = [], {}
     for name, value in vary.items():
         try:
-            named[resolve(name, known)] = value
+            full = resolve(name, known)
+            own = full in rig.parameters() and not isinstance(value, str)
+            named[full] = rig.read(full, value) if own else value
         except UnknownNameError as error:
             problems.append(Problem(name, str(error)))
+        except ParameterError as error:
+            problems += error.problems
     named |= {f"initial.{name}": value for name, value in initial.items()}
     try:
         together = broadcast(named)

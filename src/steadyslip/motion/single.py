@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.options import NUMBERS, checked, finite
+from steadyslip.core.options import DURATION, TIMES, checked
 from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
@@ -35,12 +35,12 @@ OWN_STEPS = 500_000
 """Most steps of a run that records them all: a point takes some hundred bytes, and order 8 records four per step."""
 
 
-@checked(until=finite(0), times=NUMBERS)
+@checked(until=DURATION, times=TIMES)
 def simulate(
     rig: Slider | Machine,
     protocol: Any = None,
     *,
-    until: float | None = None,
+    until: float | str | None = None,
     initial: Mapping[str, float] | None = None,
     times: Any = None,
     events: bool = True,
@@ -58,11 +58,11 @@ def simulate(
     rig : Slider or Machine
     protocol : Protocol, Piece or sequence of Piece, optional
         Motion of load point, normal stress and disturbance; by default steady motion of the drive.
-    until : float, optional
-        End, s; by default the protocol's own.
-    initial : mapping of str to float, optional
-        Starting values that differ from steady sliding, in SI units: ``x``, ``v`` and the memory variables of
-        the friction law (names as in ``build_model(rig)``). Without mass, velocity follows from the memory:
+    until : float or str, optional
+        End, s, or text such as ``"200 s"``; by default the protocol's own.
+    initial : mapping of str to float or str, optional
+        Starting values that differ from steady sliding, in SI units or as text: ``x``, ``v`` and the memory variables
+        of the friction law (names as in ``build_model(rig)``). Without mass, velocity follows from the memory:
         give one of the two (a given ``v`` adjusts the first memory variable that is not given).
     times : array_like, optional
         Rising times at which to report, s; by default the solver's own steps, with three points within each step of

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.options import FLAG, NAME, NUMBERS, Tested, checked
+from steadyslip.core.options import FLAG, NAME, NUMBERS, Measured, Tested, checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters
 from steadyslip.linear.frequency import resonances, transfer
@@ -52,8 +52,8 @@ MOST_SHARE = 0.99  # largest amplitude tried for limits, in steady values: just 
 DECADES = 3  # of amplitude searched below that, and once more where needed
 STEPS = 12  # amplitudes tried upwards over that range, each 1.8 times the one before: a narrower window may be missed
 HALVINGS = 4  # bisections of the logarithm of amplitude within such a step: limits are right to 4 %
-RISING = Tested(
-    "numbers > 0 that rise, in s", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0))
+RISING = Measured(
+    "numbers > 0 that rise", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0)), "s"
 )
 SIZES = Tested("numbers > 0, in SI units", lambda given: np.size(given) == 0 or _positive(given))
 COMPARED = 5  # last periods that are compared: repetition up to every 4th is found

@@ -14,7 +14,7 @@ import sympy as sp
 from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
-from steadyslip.core.options import checked, finite
+from steadyslip.core.options import DURATION, checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import parameters, replaced
 from steadyslip.core.results import ReadOnly
@@ -178,12 +178,12 @@ def _plain(values: Array) -> list[float | None]:
     return [float(one) if np.isfinite(one) else None for one in values]
 
 
-@checked(until=finite(0))
+@checked(until=DURATION)
 def frozen_verdicts(
     rig: Slider | Machine,
     protocol: Any,
     *,
-    until: float | None = None,
+    until: float | str | None = None,
     rtol: float = 1e-7,
     progress: Callable[[float], None] | None = None,
 ) -> FrozenVerdicts:
@@ -199,7 +199,7 @@ def frozen_verdicts(
         Contacts that are pressed or injected at have a load of their own, `preload` as a rule.
     protocol : Protocol, Piece or sequence of Piece
         Changes of the drive's velocity, of normal stresses and of injected pressures.
-    until : float, optional
+    until : float or str, optional
         End, s; the protocol's own unless given.
     rtol : float, optional
         Relative tolerance of the motion.

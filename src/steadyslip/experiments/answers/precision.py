@@ -12,7 +12,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
-from steadyslip.core.options import NAMES, checked, finite, whole
+from steadyslip.core.options import DURATION, NAMES, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.estimates import Combination, combinations
@@ -78,7 +78,7 @@ class Precision(ReadOnly):
         return "\n".join(lines)
 
 
-@checked(free=NAMES, fixed=NAMES, noise=finite(0, 1e100), until=finite(0), samples=whole(2, 10**7), trend=whole(0, 20))
+@checked(free=NAMES, fixed=NAMES, noise=finite(0, 1e100), until=DURATION, samples=whole(2, 10**7), trend=whole(0, 20))
 def precision(
     rig: Slider, protocol: Any, *, free: Sequence[str] | None = None, fixed: Sequence[str] = (), noise: float = 2e-4,
     until: float | None = None, samples: int = SAMPLES, trend: int = 0,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import checked
+from steadyslip.core.options import DURATION, checked
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
@@ -27,12 +27,12 @@ CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually t
 SHRINKING = 0.9  # ratio of later to earlier strokes below which they are told to shrink; chosen by trial
 
 
-@checked()
+@checked(until=DURATION)
 def hunt(
     rig: Slider | Machine,
     protocol: Any = None,
     *,
-    until: float | None = None,
+    until: float | str | None = None,
     rtol: float = 1e-8,
     progress: Callable[[float, int], None] | None = None,
 ) -> Hunt:
@@ -48,7 +48,7 @@ def hunt(
         With a controller at velocity 0.
     protocol : Protocol, piece or list of pieces, optional
         What moves the target. Without one it steps by twice the error that friction at rest can hold.
-    until : float, optional
+    until : float or str, optional
         End of the motion (s). Without it, it ends where it rests, or a cycle repeats itself.
     rtol : float
         Error per step allowed with bristles.

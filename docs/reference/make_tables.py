@@ -41,8 +41,9 @@ table `[protocol]` may say what is done to the rig in an experiment. A whole one
 
 - A number without quotes is in the SI unit of the table below. Text such as `"9 GPa/m"` or `"-45 deg"` carries its
   unit and is checked for the right dimension; anything that can be written so may be.
-  Verdicts, figures and texts in Python are in the units of the file, and in those that `--set` brings. A torque may be
-  in `Nm`, a gear ratio `"1/360"`.
+  Verdicts, figures and texts in Python are in the units of the file, and in those that `--set` brings; a rig that
+  `with_values` changes keeps them, one that `dataclasses.replace` makes is told in SI units until
+  `.told_in(rig.written_in)`. A torque may be in `Nm`, a gear ratio `"1/360"`.
 - Everything is per unit contact area. With `area` in `[slider]`, a quantity that has two units below is the total for
   the whole contact, in the second one; text may then be in either.
 - A key has a dotted name, `contact.angle`, the same in Python and with `--set`. Members of a list count from 1:
@@ -294,8 +295,9 @@ until = "500 s"
 
 `over` and `samples` may both be there; one of them must be. The dimensions of the map are the parameters of `over`,
 in order, then `sample`. With `area` in `[slider]`, values are for the whole contact here too (N, N/m, ...); text may
-give either. Arrays of the map are per unit area. This page is written by `make_tables.py` from the declarations in
-the source.
+give either. Arrays of the map are per unit area. With `velocity_of`, text such as `"500 mm/min"` is the velocity of the
+body that it names, a number without unit that of the drive, in rad/s of a motor. This page is written by
+`make_tables.py` from the declarations in the source.
 """
 MAP_TAIL = """An installed package may offer further results, as [laws](../how-to/add-a-friction-law.md): a class
 derived from `steadyslip.maps.Measure`, named in the entry-point group `steadyslip.laws`.

@@ -60,3 +60,11 @@ def test_the_speed_of_a_turning_drive_is_asked_for_in_rpm_and_that_of_the_table_
     with pytest.warns(UnitWarning, match=r"velocity = 0.3 has no unit and is read as 0.3 m/s; other") as caught:
         ss.rig_from_text(bare)
     assert len(caught) == 1
+
+
+def test_friction_that_is_smaller_at_rest_is_asked_about():
+    text = SLIDER.format(velocity='"1 mm/s"', v_stribeck='"2 mm/s"').replace("mu_static = 0.2", "mu_static = 0.05")
+    words = r"friction.mu_static = 0.05 is smaller than mu_coulomb = 0.1: friction rises"
+    with pytest.warns(UnitWarning, match=words) as caught:
+        ss.rig_from_text(text)
+    assert len(caught) == 1

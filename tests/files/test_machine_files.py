@@ -5,6 +5,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import steadyslip as ss
@@ -321,6 +322,47 @@ def test_the_feed_of_any_body_is_the_velocity_of_its_drive(tmp_path):
     (file := tmp_path / "axis.toml").write_text(FEED)
     assert ss.read_rig(file, ["drive.velocity=250 mm/min"]).speeds()["table"] == pytest.approx(0.25 / 60)
     assert ss.rig_from_text(ss.rig_to_text(fed)) == fed
+
+
+def test_protocols_move_the_body_whose_feed_was_given():
+    """In the file, in words and in texts of Python, columns too; numbers without a unit in Python are the drive's."""
+    pieces = """
+[[protocol.pieces]]
+kind = "velocity-step"
+at = "1 s"
+to = "600 mm/min"
+[[protocol.pieces]]
+kind = "load-point-table"
+time = [2, 3]
+displacement = ["0 mm", "5 mm"]
+"""
+    fed = ss.rig_from_text(FEED)
+    step = ss.piece_from_text("velocity-step at=1s to='600 mm/min'", machine=fed)
+    read, column = ss.protocol_from_text(FEED + pieces).pieces
+    assert read == step
+    assert step.to == pytest.approx(1.2 * fed.drive.velocity)
+    assert column.displacement == pytest.approx([0.0, np.pi])
+    given, own = (ss.protocol.VelocityStep(at=0.1, to=one) for one in ("600 mm/min", step.to))
+    one, other = (ss.simulate(fed, piece, until=0.2, times=[0.15, 0.2])["table.v"] for piece in (given, own))
+    np.testing.assert_allclose(one, other, rtol=1e-9)
+    assert not np.allclose(one, fed.speeds()["table"], rtol=1e-2)
+    with pytest.raises(ss.ParameterError, match=r"got 6.28319 rad/s; allowed here: a number in m/s"):
+        ss.simulate(fed, ss.protocol.VelocityStep(at=0.1, to="60 rpm"), until=0.2)
+
+
+def test_hunting_is_told_of_the_body_whose_feed_was_given():
+    dry = 'law = "coulomb"\nmu_coulomb = 0.1\nmu_static = 0.15\n[contacts.guide.contact]'
+    held = re.sub(r'law = "lugre".*?\[contacts\.guide\.contact\]', dry, FEED, flags=re.S).replace(
+        "500 mm/min", "0 mm/min"
+    )
+    fed = ss.hunt(ss.rig_from_text(held), ss.protocol.DisplacementStep(at=0, by="1 mm"), until=0.5)
+    turned = ss.rig_from_text(held.replace('velocity_of = "table"', "").replace("0 mm/min", "0 rpm"))
+    own = ss.hunt(turned, ss.protocol.DisplacementStep(at=0, by="36 deg"), until=0.5)
+    ratio = 0.01 / (2 * np.pi)
+    assert (fed.unit, own.unit) == ("m", "rad")
+    np.testing.assert_allclose(fed.error, ratio * own.error, rtol=1e-9, atol=1e-12)
+    assert fed.highest == pytest.approx(ratio * own.highest)
+    assert [one.ends for one in fed.strokes] == pytest.approx([ratio * one.ends for one in own.strokes])
 
 
 def test_a_verdict_tells_the_speed_of_the_body_whose_feed_was_given():

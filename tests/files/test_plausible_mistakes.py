@@ -18,6 +18,7 @@ MISTAKES = {
     "no load named": ('"125000 ± 20 % 1/m"', '"400 N/um"', "name the load that it is of: '400 N/um at 3.2 kN'"),
     "no contact area": ('area = "200 cm^2"\n', "", "add the contact's area"),
     "a unit on a pure number": ("0.8", '"0.8 mm"', "expected a number without unit"),
+    "a ratio that may be read both ways": ("0.8", '"1:100"', 'write "1/100" or "100/1"'),
     "a full stop behind a unit": ('"0.5 mm/min"', '"0.5 mm/min."', "'mm/min.' is not a unit"),
     "a letter for a key": ("mu_static =", "mu_s =", "unknown key 'mu_s'; did you mean 'mu_static'"),
     "a unit without quotes": ('"0.5 mm/min"', "0.5 mm/min", "'velocity = 0.5 mm/min'; a number with a unit stands in"),

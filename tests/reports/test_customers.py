@@ -96,6 +96,20 @@ def test_a_stable_rig_is_told_what_to_hold():
     assert "preload σ₀, now 25 MPa: keep it below" in words("".join(recommendation(found, ("contact.preload",))))
 
 
+def test_a_stable_rig_is_kept_only_where_it_is_surely_stable():
+    """A cylinder that is stable in six of ten rigs within its tolerances was to be kept as it is."""
+    rig = ss.read_rig("examples/double-direct-shear.toml")
+    found = ss.analyze(rig)
+    for width, kept in (("5 %", True), ("70 %", False)):
+        within = ss.tolerate(rig, {"friction.states.1.b": width})
+        assert (within.share == 1.0) == kept
+        text = words("".join(recommendation(found, (), within)))
+        assert ("Keep it as it is" in text) == kept
+        assert (within.headline() in text) != kept
+        assert "steadyslip cure --sure '95 %'" in text or kept
+        assert "keep it below 0.009113" in text
+
+
 def test_a_motion_says_how_it_ends():
     """A slip event before a run-away does not hide that; a stable rig comes back."""
     assert "slips" in (text := words("".join(motion(ss.analyze(ss.read_rig("examples/triaxial.toml"))))))

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -11,8 +12,11 @@ from command import run
 from dimensionless import unit_rig
 from machines import block
 from rigs_of_theory import CONTACTS, rate_state, rig
+from steadyslip.core.written import display_units
 from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.verdict import Adjustment
+from steadyslip.verdict.chances import chances_of
+from steadyslip.verdict.cures import Window
 from toleranced import AXIS
 
 BESIDE = 1e-6  # relative distance from an edge at which both sides are judged
@@ -142,3 +146,38 @@ def test_the_least_damping_cures_an_undamped_machine():
     assert text.startswith("To be stable (now undamped)\ncheapest single change: links.")
     assert ".damping from 0 N s/m to anything above 0, cost 1\n" in text
     assert "e-" not in text
+
+
+def test_both_ends_of_a_window_are_in_one_unit():
+    window = Window("drive.kp", "N m/rad", 23.0, ((0.0559, 1.3155),), (0.01, 100.0), 1.0)
+    with display_units(["Nm/deg"]):
+        assert str(window) == "0.0009756 to 0.02296 Nm/deg"
+
+
+def test_growth_rates_are_not_told_in_the_unit_of_a_gain():
+    axis = ss.read_rig("examples/machines/feed-axis.toml", ["drive.kv=1.8 m/min/mm", "links.screw.stiffness=8 N/um"])
+    text = str(ss.tolerate(axis, {"drive.kv": "5 %"}))
+    assert "drive.kv                  1.71 to 1.89 m/min/mm alone" in text
+    assert re.search(r"growth rate +[-.0-9]+ to [-.0-9]+ 1/s\n", text)
+    assert re.search(r"growth rate [-.0-9]+ to [-.0-9]+ 1/s$", text, re.M)
+
+
+def test_a_damper_that_a_machine_does_not_have_is_a_cure():
+    """Of any size that `boundary` finds, where it was looked for up to 1 N m s/rad."""
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.36, mu_static=0.47, v_stribeck=1.2, stribeck_exponent=0.8)
+    pads = ss.machine.Surface(body="disc", radius=0.12, friction=law, contact=ss.laws.ConstantNormalStress(preload=3e3))
+    brake = ss.Machine(
+        bodies={"disc": ss.machine.RotatingBody(inertia=0.12)},
+        links={"shaft": ss.machine.Shaft(between=("drive", "disc"), stiffness=8e3)},
+        contacts={"pads": pads}, drive=ss.machine.RotaryPull(velocity="30 rpm"),
+    )  # fmt: skip
+    (edge,) = ss.boundary(brake, "links.shaft.damping")
+    assert edge.value > 1.0
+    window = next(one for one in ss.cure(brake).windows if one.parameter == "links.shaft.damping")
+    assert window.nearest == pytest.approx(edge.value, rel=1e-5)
+
+
+def test_rigs_with_a_delay_are_drawn_less_often():
+    """Each takes some hundredths of a second: of 4 096 an analysis took minutes, a cure hours."""
+    axis = ss.read_rig("examples/machines/feed-axis.toml", ["drive.delay=0.4 ms"])
+    assert chances_of(axis, {"drive.kp": "5 %"}).sizes == (4, 1, 0)

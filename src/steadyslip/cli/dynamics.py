@@ -150,6 +150,7 @@ def hunt(
         str | None, typer.Option(help="end, such as '200 s'; where it rests or a cycle repeats itself unless given")
     ] = None,
     pieces: Pieces = None,
+    output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
     rtol: Annotated[float, typer.Option(help="error of the motion allowed per step, with bristles")] = 1e-8,
     require_settled: Annotated[
         bool, typer.Option("--require-settled", help="exit with status 1 unless it settles")
@@ -157,10 +158,12 @@ def hunt(
     as_json: AsJson = False,
 ) -> None:
     """Does an axis that is held (velocity = 0) hunt about its target, how far and how often, or settle?"""
-    from steadyslip.nonlinear.cycle_commands import hunt_of_file
+    from steadyslip.files.output import check_output
+    from steadyslip.nonlinear.cycle_commands import ANSWERED, hunt_of_file, write_answers
 
+    check_output(output or (), ANSWERED)
     found = hunt_of_file(rig, changes or (), pieces or (), until, rtol)
-    output_result(found, (), as_json, lambda result, path: None)
+    output_result(found, output or (), as_json, partial(write_answers, title="Hunting", source=rig))
     if require_settled and found.hunts is not False:
         raise typer.Exit(1)
 

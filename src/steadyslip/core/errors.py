@@ -146,7 +146,7 @@ class UndecidedWarning(UserWarning):
 
 
 class UnitWarning(UserWarning):
-    """A number in a rig file may have been meant in another unit."""
+    """A number in a rig file may have been meant in another unit, or for another key."""
 
 
 class NotKeptWarning(UserWarning):

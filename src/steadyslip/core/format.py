@@ -123,6 +123,15 @@ def format_range(low: float, high: float, si_unit: str, area: float | None = Non
     return f"{_few(low * float(number) / high, 4)} to {number} {name}".rstrip()
 
 
+def format_growth(low: float, high: float | None = None) -> str:
+    """Format a growth rate or a range of them in 1/s, also where gains such as Kv have a unit of that dimension.
+
+    >>> format_growth(112.43), format_growth(-3.2, 0.5)
+    ('112.4 1/s', '-3.2 to 0.5 1/s')
+    """
+    return " to ".join(_few(one, 4) for one in (low, high) if one is not None) + " 1/s"
+
+
 def format_percent(share: float) -> str:
     """Format a fraction as percent with three digits, or more if it would otherwise read as 0 or 100 %.
 

@@ -29,6 +29,7 @@ PER_LOAD = ("1", "1/m", "s/m")
 """Units of friction per load, which machine people know as forces: a coefficient, bristles, viscous friction."""
 _COMMA = re.compile(r",(\d+)", re.A)
 _QUOTIENT = re.compile(r"/\s*(\d+\.?\d*)", re.A)
+_RATIO = re.compile(r":\s*(\d+\.?\d*)", re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
@@ -63,6 +64,9 @@ def parse(text: str, expected: str) -> float:
     divisor = _QUOTIENT.fullmatch(name)
     if divisor and wanted == Dimension() and float(divisor[1]) > 0:  # a gear ratio, 1/360
         return _scaled(digits, 1 / float(divisor[1]))
+    if ratio := _RATIO.fullmatch(name) if wanted == Dimension() else None:
+        message = f'{text!r} may be read both ways; write "{digits}/{ratio[1]}" or "{ratio[1]}/{digits}"'
+        raise QuantityError(message)
     if not name:
         if wanted != Dimension():
             raise QuantityError(f"{text!r} has no unit; write for example {example(expected)}")

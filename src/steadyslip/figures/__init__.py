@@ -23,6 +23,7 @@ from steadyslip.figures.experiments.machine_fits import machine_fit
 from steadyslip.figures.experiments.populations import population
 from steadyslip.figures.experiments.records import record
 from steadyslip.figures.forced import frequency_response, frozen_verdicts
+from steadyslip.figures.hunting import hunting
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.machine_verdict import eigenvalue_plane, machine_verdict, mode_shape, stable_ranges
 from steadyslip.figures.machines import machine_sketch
@@ -37,7 +38,7 @@ from steadyslip.linear import ModeChart, Modes
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
-from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, FrozenVerdicts, HopfCurve
+from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, FrozenVerdicts, HopfCurve, Hunt
 from steadyslip.verdict import Analysis, Tolerated
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "frozen_verdicts",
     "history",
     "hopf_curve",
+    "hunting",
     "journal",
     "kicks",
     "machine_fit",
@@ -102,6 +104,7 @@ register_figures(HopfCurve, curve=hopf_curve)
 register_figures(Basin, basin=basin)
 register_figures(FrequencyResponse, response=frequency_response)
 register_figures(FrozenVerdicts, verdicts=frozen_verdicts)
+register_figures(Hunt, hunting=hunting)
 register_figures(Record, record=record)
 register_figures(Fit, fit=fit, steps=steps, corner=corner)
 register_figures(MachineFit, fit=machine_fit)

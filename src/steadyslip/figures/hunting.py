@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from steadyslip.core.palette import BLUE, GREY
-from steadyslip.figures.style import axis_label, display_unit, new_panels
+from steadyslip.figures.style import axis_label, display_unit, given_panels, new_panels
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 
 
-def hunting(result: Hunt) -> np.ndarray:
-    """Plot error and force of the drive over time in two panels; grey: the target."""
-    panels = new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0]
+def hunting(result: Hunt, ax: Any = None) -> Any:
+    """Plot error and force of the drive over time in two panels; grey: the target.
+
+    Parameters
+    ----------
+    result : Hunt
+    ax : sequence of matplotlib.axes.Axes, optional
+        Two, for error and force.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    panels = given_panels(new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0] if ax is None else ax, (2,), "two Axes")
     across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)
     series = (("target less place", result.error, result.unit), ("force of the drive", result.force, result.force_unit))
     for axes, (name, values, si) in zip(panels, series, strict=True):

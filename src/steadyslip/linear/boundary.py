@@ -114,20 +114,27 @@ def boundary(
     full = rig.resolve(name)
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, [rig.read(full, one) for one in between])
-    if by_matrices(rig):
-        search: Search | MatrixSearch | MeasuredSearch = _matrix_search(rig, full)
-    else:
+    if not by_matrices(rig):
         _require_answers(rig, branch)
         if limits is not None:
             operating_point(
                 rig, {full: np.asarray(limits)}, rig.kept_zeros(full), branch
             )  # refuses what breaks a condition
-        search = search_for(rig, full, rig.kept_zeros(full), branch)
+    search = _search(rig, full, rig.kept_zeros(full), branch)
     found = search.boundaries(limits)
     if unknown := _unknown(rig, search, *(limits or search.searched)):
         why = _ERRORS if isinstance(search, MeasuredSearch) else _TOO_MANY
         warnings.warn(f"edges of {unknown} are not decided: {why}", UndecidedWarning, stacklevel=3)
     return found
+
+
+def searched(rig: Rig, name: str) -> tuple[float, float]:
+    """Range of a parameter in which `boundary` searches unless another is given, SI units."""
+    return _search(rig, name, rig.kept_zeros(name), 0).searched
+
+
+def _search(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Search | MatrixSearch | MeasuredSearch:
+    return _matrix_search(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
 
 
 def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:
@@ -200,7 +207,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
         missing, share = [], left // len(asked)
         for name, address in asked:
             with at_most(share) as allowance:
-                search = _matrix_search(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
+                search = _search(rig, name, present, branch)
                 edges = search.boundaries(None)
             left -= share - allowance.left
             if allowance.spent or search.hides:

@@ -22,14 +22,17 @@ def in_units_of(rig: Rig, plan: Protocol) -> Protocol:
         If a unit does not fit the body or contact that the piece acts on.
     """
     problems, changes = [], {}
+    ratio, turns = rig.feed()
     for name, address in parameters(plan, "protocol.").items():
         if not isinstance(address.value, InUnit):
             continue
         _, _, number, _ = name.split(".", 3)
         piece, given = plan.pieces[int(number) - 1], address.value
-        wanted = rig.protocol_unit(piece, address.role.unit)
+        declared = address.role.unit
+        moved = declared in TURNING  # a motion of the target or load point, told of the body whose feed is given
+        wanted = TURNING[declared] if moved and turns else declared if moved else rig.protocol_unit(piece, declared)
         if given.unit == wanted:
-            changes[name] = float(given)
+            changes[name] = float(given) / ratio if moved else float(given)
         elif rig.area is not None and given.unit == total_unit(wanted):
             changes[name] = float(given) / rig.area
         else:

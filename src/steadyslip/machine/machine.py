@@ -93,11 +93,17 @@ class Machine(Rig):
         object.__setattr__(made, "fed", self.fed)
         return made
 
+    def feed(self) -> tuple[float, bool]:
+        if self.fed is None:
+            return super().feed()
+        pace = 1.0 if self.holds else float(self.drive.velocity)
+        return float(self._speeds()[0][self.fed]) / pace, bool(self._turns(self.fed))
+
     def told(self, name: str, value: float) -> tuple[float, str]:
-        if name != "drive.velocity" or self.fed is None or self.holds:
+        if name != "drive.velocity" or self.fed is None:
             return super().told(name, value)
-        speed = float(self._speeds()[0][self.fed])
-        return value / float(self.drive.velocity) * speed, "rad/s" if self.bodies[self.fed].turns else "m/s"
+        ratio, turns = self.feed()
+        return value * ratio, "rad/s" if turns else "m/s"
 
     def inconsistencies(self) -> Iterator[Problem]:
         faults = [*self._name_problems(), *self._end_problems()]

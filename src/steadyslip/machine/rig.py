@@ -141,6 +141,11 @@ class Rig(FrozenRecord, Keeper):
         """Value of a parameter and its unit, as people are told it: the speed of the body whose speed they gave."""
         return value, self.parameters()[name].role.unit
 
+    def feed(self) -> tuple[float, bool]:
+        """Motion that people give and are told for one of the drive: its own, or of the body that they named; whether
+        that body turns."""
+        return 1.0, bool(self.drive.turns)
+
     def gain_name(self) -> str | None:
         """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
         return None

@@ -219,7 +219,7 @@ def _quantity(option: str, text: str, unit: str) -> float:
         raise ParameterError([Problem(option, str(error))]) from error
 
 
-def write_answers(found: FrequencyResponse | FrozenVerdicts, path: Path, title: str, source: Path) -> None:
+def write_answers(found: FrequencyResponse | FrozenVerdicts | Hunt, path: Path, title: str, source: Path) -> None:
     """Write columns, a document with the hash of its `source`, or a figure, by the ending of the name.
 
     Raises

@@ -26,7 +26,7 @@ def verdict_parts(
     machine = analysis.rig
     speed = told(machine, "drive.velocity", float(machine.drive.velocity))
     body = [
-        *recommendation(analysis, tuple(order.adjustable)),
+        *recommendation(analysis, tuple(order.adjustable), tolerated),
         *assumptions(machine, analysis.warnings, rig_report.VALIDITY),
         heading("The machine"), sketch_of(machine),
         rig_report.input_table(machine, tolerances_of(tolerated), notes_of(order.source)),

@@ -67,7 +67,7 @@ def verdict_parts(
     rig = analysis.rig
     speed = format_quantity(rig.drive.velocity, "m/s")
     body = [
-        *recommendation(analysis, tuple(order.adjustable)), *assumptions(rig, analysis.warnings, VALIDITY),
+        *recommendation(analysis, tuple(order.adjustable), tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
         heading("The rig"), figure(sketch(rig)), input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), table(facts(analysis)),
         *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # the motion is below

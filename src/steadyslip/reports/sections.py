@@ -37,18 +37,26 @@ from steadyslip.verdict.judder import STEP, motion_after
 from steadyslip.verdict.words import told
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
+SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
 _ROWS = 4  # changes that are recommended, nearest first
 
 
-def recommendation(analysis: Analysis, adjustable: Sequence[str] = ()) -> Iterator[str]:
+def recommendation(
+    analysis: Analysis, adjustable: Sequence[str] = (), tolerated: Tolerated | None = None
+) -> Iterator[str]:
     """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
 
     `adjustable` names what can be changed; otherwise all that the rig has but parameters of friction, and these if
-    nothing else helps.
+    nothing else helps. With tolerances it is kept only where it is stable with a chance of `SURE`.
     """
     yield heading("The recommendation")
+    if tolerated is not None and tolerated.share < SURE:
+        asked = f"steadyslip cure --sure '{100 * SURE:g} %' gives changes that make it so sure"
+        yield paragraph(f"{tolerated.headline()}: {asked}. What follows is of the values themselves.")
+    elif analysis.stable:
+        yield paragraph("Keep it as it is.")
     if analysis.stable:
-        yield paragraph(f"Keep it as it is. {_what_to_hold(analysis, adjustable)}")
+        yield paragraph(_what_to_hold(analysis, adjustable))
         return
     curing = [one for one in analysis.margins if _cures(one)]
     chosen = [one for one in curing if one.parameter in adjustable] if adjustable else []

@@ -13,10 +13,9 @@ from steadyslip.files.specifications.tolerance_tables import Tolerances
 from steadyslip.linear.status import STABLE, status
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.build import model_of
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
-from steadyslip.verdict.tolerances import LOG2_CLOSED, LOG2_OTHERS, chance_of
+from steadyslip.verdict.tolerances import LOG2_CLOSED, LOG2_OTHERS, chance_of, log2_of
 
 AT_ONCE = 2**20  # rigs judged together; bounds memory
 LOG2_FEW, LOG2_FEWEST = 7, 4  # rigs of one group in searches: of one parameter, of two; fewer without closed form
@@ -106,6 +105,7 @@ class Chances:
 
 def chances_of(rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances) -> Chances:
     """Chances of a rig within tolerances; certain ones where these are empty."""
-    closed = model_of(rig, ()).has_closed_form
-    sizes = (LOG2_CLOSED, LOG2_FEW, LOG2_FEWEST) if closed else (LOG2_OTHERS, LOG2_FEW - 1, LOG2_FEWEST - 2)
+    whole = log2_of(rig)
+    few = {LOG2_CLOSED: (LOG2_FEW, LOG2_FEWEST), LOG2_OTHERS: (LOG2_FEW - 1, LOG2_FEWEST - 2)}.get(whole, (1, 0))
+    sizes = (whole, *few)
     return Chances(rig, spreads_of(rig, tolerances) if tolerances else None, sizes)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.core.format import format_growth, format_percent, format_quantity
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.records import FrozenRecord
@@ -313,7 +313,7 @@ def _ratio(one: Findings) -> str:
 
 
 def _growth(one: Findings) -> str:
-    return "" if one.growth_rate is None else format_quantity(one.growth_rate, "1/s")
+    return "" if one.growth_rate is None else format_growth(one.growth_rate)
 
 
 def _period(one: Findings) -> str:

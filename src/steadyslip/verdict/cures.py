@@ -12,12 +12,12 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.core.format import format_percent, format_quantity, format_range
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
-from steadyslip.linear.boundary import REMOTE, boundary, margins
+from steadyslip.linear.boundary import REMOTE, boundary, searched
 from steadyslip.linear.status import stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -90,9 +90,8 @@ class Window(Displayed):
         return None
 
     def __str__(self) -> str:
-        low, high = (self.written(end) for end in self.limits)
         if not self.windows:
-            return f"not reached from {low} to {high}"
+            return "not reached from {} to {}".format(*map(self.written, self.limits))
         return "; ".join(self._window(*one) for one in self.windows)
 
     def _window(self, low: float, high: float) -> str:
@@ -104,7 +103,10 @@ class Window(Displayed):
             )
         if high == self.limits[1]:
             return f"from {self.written(low)} up"
-        return f"{self.written(low)} to {self.written(high)}"
+        factor, unit = self.told or (1.0, self.unit)
+        if not self.limits[0]:  # of what was zero the low end may be, too
+            return f"{self.written(low)} to {self.written(high)}"
+        return format_range(low * factor, high * factor, unit, area=self.area)
 
     def written(self, value: float) -> str:
         """Format a value of the parameter."""
@@ -296,8 +298,7 @@ def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]
     value, domain = chances.own(name), chances.rig.parameters()[name].role.domain
     ends = sorted((value * 10.0**-DECADES, value * 10.0**DECADES))
     if not value:
-        searched = next((m.searched for m in margins(chances.rig) if m.parameter == name), (0.0, 1.0))
-        ends = [0.0, searched[1]]
+        ends = [0.0, searched(chances.rig, name)[1]]
     low = max(ends[0] if one.low is None else one.low, domain.low)
     high = min(ends[1] if one.high is None else one.high, domain.high)
     if domain.high == high and not domain.high_allowed:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_growth, format_quantity
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
@@ -44,7 +44,7 @@ def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[st
     )]  # fmt: skip
     root, error = found.root() if growing == 2 else (None, 0.0)
     if root is not None and error > _TOLD * root.real:
-        rows += [("its growth rate", f"{format_quantity(root.real, '1/s')} ± {format_quantity(error, '1/s')}")]
+        rows += [("its growth rate", f"{format_growth(root.real)} ± {format_growth(error)}")]
     if not np.any(own.deviation):
         return [*rows, ("its errors", "not told, neither by coherence nor by repeats: taken as none")]
     wide = [one.edge for one in margins if one.edge and np.ptp(one.edge.bracket) > _TOLD * abs(one.edge.value)]

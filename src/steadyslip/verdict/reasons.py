@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 # further in a parameter of weak effect, so this is wider than rounding; chosen by trial, wider would merge two edges.
 NEXT_TO_IT = 1e-6
 
-ON_EDGE = "neither verdict should be relied on: the least change of a number decides"
+ON_EDGE = "neither verdict should be relied on: the least change of a number decides; give it a damping if it has none"
 """Reason given for a slider or machine on an edge of stability."""
 
 UNDAMPED = (
-    "nothing damps it, so no disturbance dies out; the least damping decides, and may move the edges of growth far"
+    "nothing damps it, so no disturbance dies out: give it a damping; the least one decides, and may move the edges of "
+    "growth far"
 )
 """Reason given for a machine without damping of which no root grows."""
 

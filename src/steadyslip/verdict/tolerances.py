@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array, valid_together
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_percent, format_range
+from steadyslip.core.format import format_growth, format_percent, format_range
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -28,7 +28,7 @@ from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
 from steadyslip.verdict.words import told, told_range
 
 # Numbers of rigs, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
-LOG2_CLOSED, LOG2_OTHERS = 12, 8  # rigs of one group: 2**12 where the verdict has a closed form, else 2**8
+LOG2_CLOSED, LOG2_OTHERS, LOG2_LATE = 12, 8, 4  # rigs of one group: with a closed form, others, those with a delay
 VALUES_ALONE = 65  # values of a parameter that is varied alone, both ends included
 VALUES_SOUGHT = 17  # of each parameter in turn, in the search for a rig judged otherwise
 REACHES = (1.0, 0.1, 0.01, 0.001)  # shares of the range looked at in rounds of that search
@@ -130,15 +130,16 @@ class Tolerated(ReadOnly):
         )
         ranges = [(edge, self.edge, self.unit), (over, self.safety, "1")] if self.along else []
         if not self.along or not np.any(np.isfinite(self.edge)):
-            ranges.append(("growth rate", self.growth, "1/s"))
+            ranges.append(("growth rate", self.growth, ""))
         for label, values, unit in ranges:
             if (span := _finite_range(values)) is not None:
-                lines.append(f"{label:<{wide}}{format_range(*span, unit, self.area)}")
+                text = format_range(*span, unit, self.area) if unit else format_growth(*span)
+                lines.append(f"{label:<{wide}}{text}")
         for one in self.alone:
             if not np.isnan(one.safety[0]):
                 beside = f", {one.safety[0]:.4g} to {one.safety[1]:.4g} times {'critical' if own else 'its edge'}"
             else:
-                beside = f", growth rate {format_range(*one.growth, '1/s')}" if not self.along else ""
+                beside = f", growth rate {format_growth(*one.growth)}" if not self.along else ""
             word = {True: "stable", False: "unstable", None: "stable in a part of it"}[one.stable]
             ends = told_range(self.rig, one.parameter, one.low, one.high)
             lines.append(f"{one.parameter:<{wide}}{ends} alone: {word}{beside}")
@@ -237,7 +238,7 @@ def tolerate(
     """
     name = name_along(rig, along) if along or rig.default_along else ""
     spreads = spreads_of(rig, tolerances)
-    drawn = spreads.drawn(LOG2_CLOSED if model_of(rig, ()).has_closed_form else LOG2_OTHERS)
+    drawn = spreads.drawn(log2_of(rig))
     possible = np.broadcast_to(spreads.possible(drawn), next(iter(drawn.values())).shape)
     if not np.all(np.any(possible, axis=1)):
         raise ParameterError([Problem("tolerances", "contradict each other: hardly any rig within them can exist")])
@@ -330,6 +331,12 @@ def _share_of_variance(values: Array, target: Array) -> float:
     bins = np.array_split(target[np.argsort(values)], BINS)
     between = sum(len(one) * (np.mean(one) - np.mean(target)) ** 2 for one in bins) / (count * np.var(target))
     return float(max(0.0, 1 - (1 - between) * (count - 1) / (count - BINS)))
+
+
+def log2_of(rig: Slider | Machine) -> int:
+    """Base-2 logarithm of the number of rigs in one group."""
+    model = model_of(rig, ())
+    return LOG2_CLOSED if model.has_closed_form else LOG2_LATE if model.delays else LOG2_OTHERS
 
 
 def _finite_range(values: Array) -> tuple[float, float] | None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from command import run as command
 from hunting_by_scipy import axis, by_hand, compared, lugre_starts
 from steadyslip.protocol import DisplacementStep
 
@@ -202,3 +203,19 @@ def test_bristles_without_an_integral_slide_before_they_rest():
     assert found.hunts is False
     assert found.settled_at > 1.0
     assert max(abs(found.lowest), abs(found.highest)) < 1.5 / 3.0  # what friction at rest holds, over the gain
+
+
+def test_the_motion_is_written_as_columns_document_and_figure(tmp_path):
+    held = EXAMPLES / "hunting-axis.toml"
+    names = [tmp_path / f"hunt{ending}" for ending in (".csv", ".html", ".svg")]
+    told = command("hunt", held, "--until", "9 s", *(word for name in names for word in ("-o", name)))
+    assert told.stdout.splitlines()[-3:] == [f"wrote {name}" for name in names]
+    found = ss.hunt(ss.read_rig(held), until=9.0)
+    first, *_ = names[0].read_text().splitlines()
+    assert first == "time (s),target less place (m),speed (m/s),force of the drive (N)"
+    columns = np.loadtxt(names[0], delimiter=",", skiprows=1).T
+    for written, own in zip(columns, (found.time, found.error, found.velocity, found.force), strict=True):
+        np.testing.assert_allclose(written, own, rtol=1e-11, atol=1e-11)
+    assert "does it hunt" in names[1].read_text()
+    upper, lower = found.plot()
+    assert [upper.get_ylabel(), lower.get_ylabel()] == ["target less place (m)", "force of the drive (N)"]

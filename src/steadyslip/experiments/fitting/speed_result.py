@@ -102,6 +102,13 @@ def _axis(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -
     ]  # fmt: skip
 
 
+_RADIUS = {
+    False: "so that m/s are rad/s, and N are N m: the table's torques, whatever the real radius",
+    True: "CHANGE: at a radius of 0.1 m a tenth of v_stribeck and ten times viscous and bristles belong to it",
+}
+"""Comments on the radius of a table of torques, and of one of coefficients."""
+
+
 def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
     one, where = found.main, "contacts.bearing"
     slowest = one.speed.min() / unit(found.table.speed_unit)[0]
@@ -117,7 +124,7 @@ def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) 
         "[bodies.joint]", 'motion = "rotation"', f'inertia = "{INERTIA:g} kg m^2"  # {CHANGE}', "",
         "[links.shaft]", 'kind = "shaft"', 'between = ["drive", "joint"]', f'stiffness = "{SHAFT}"  # {CHANGE}', "",
         *(drag if damping else []), f"[{where}]", 'body = "joint"',
-        'radius = "1 m"  # so that m/s are rad/s, and N are N m', "",
+        f'radius = "1 m"  # {_RADIUS[found.table.is_coefficient]}', "",
         *_friction(found, ranges, f"{where}.friction"), "",
         f"[{where}.contact]", 'law = "constant"', _preload(found), "", "[drive]",
         'control = "rotary-steady"',

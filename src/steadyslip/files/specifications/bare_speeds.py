@@ -1,4 +1,4 @@
-"""Questions about speeds without a unit, asked once where a rig file is read."""
+"""Questions about speeds without a unit and values that a law doubts, asked once where a rig file is read."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than 
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
 
-def question_speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
+def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
     """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
+
+    Also of values that a friction law doubts.
 
     Parameters
     ----------
@@ -28,7 +30,8 @@ def question_speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
     read : mapping of str to (object, str)
         Names of the values read, each as it was written and with its SI unit.
     """
-    for text in _questions(rig, read):
+    doubts = (text for one in rig.laws_by_contact().values() for text in one.friction.doubts(one.prefix))
+    for text in (*_questions(rig, read), *doubts):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 

@@ -35,8 +35,8 @@ class TableReader:
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.area: float | None = None
-        self.turning = False
-        """True if the load point turns, so that its displacements are angles."""
+        self.feed = 1.0, False
+        """Motion that is given for one of the drive, and True if what moves so turns: its displacements are angles."""
         self.in_totals = False
         self.acted_on: Rig | None = None
         self.sections: tuple[Section, ...] = ()
@@ -92,11 +92,11 @@ class TableReader:
     @contextmanager
     def of_rig(self, rig: Rig | None) -> Iterator[None]:
         """Context for what acts on a rig: on a machine in forces, and in angles where its load point turns."""
-        outer = self.in_totals, self.turning, self.acted_on
+        outer = self.in_totals, self.feed, self.acted_on
         if rig is not None:
-            self.in_totals, self.turning, self.acted_on = rig.in_forces, rig.drive.turns, rig
+            self.in_totals, self.feed, self.acted_on = rig.in_forces, rig.feed(), rig
         yield
-        self.in_totals, self.turning, self.acted_on = outer
+        self.in_totals, self.feed, self.acted_on = outer
 
     def _twists(self, law: type[FrozenRecord], table: Table) -> bool:
         """True if a piece of a protocol acts on something that turns."""
@@ -216,6 +216,7 @@ class TableReader:
             return self._part(role, raw, name)
         if isinstance(role, Named):
             return self._named(role, raw, name)
+        ratio = self.feed[0] if getattr(role, "unit", "") in TURNING else 1.0
         if isinstance(role, Parameter):
             role = self.in_file_unit(role)
         try:
@@ -225,14 +226,16 @@ class TableReader:
             return None
         if isinstance(role, Parameter) and role.unit in SPEEDS:
             self.speeds.setdefault(name, (raw, role.unit))
-        return value
+        if ratio == 1.0 or value is None:
+            return value
+        return tuple(one / ratio for one in value) if isinstance(value, tuple) else value / ratio
 
     def in_file_unit(self, role: Parameter) -> Parameter:
         """Parameter in the unit that this file uses for it."""
         if self.in_totals and self.area is None and is_per_area(role.unit):
             unit = "N m" if self.twisted else total_unit(role.unit)  # without area: forces
             return replace(role, unit=unit)
-        return replace(role, unit=TURNING[role.unit]) if self.turning and role.unit in TURNING else role
+        return replace(role, unit=TURNING[role.unit]) if self.feed[1] and role.unit in TURNING else role
 
     def worded(self, role: Declared) -> Declared:
         """Parameter as worded for people: totals where there is an area, and the words force or torque."""

@@ -79,6 +79,14 @@ class StribeckCurve(FrictionLaw):
         letter="delta_S",
     )
 
+    def doubts(self, prefix: str = "") -> Iterator[str]:
+        if self.mu_static < self.mu_coulomb:
+            rest = f"{prefix}friction.mu_static = {self.mu_static:.4g}"
+            yield (
+                f"{rest} is smaller than mu_coulomb = {self.mu_coulomb:.4g}: friction rises with velocity; it is "
+                "usually larger at rest: exchange the two if that is meant"
+            )
+
     def _curve(self, v: Expression) -> Expression:
         """Stribeck curve g(v): friction coefficient without the viscous part."""
         fast = (v / self.v_stribeck) ** 2

@@ -29,6 +29,10 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     decided_by_stress: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     decided_besides: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
+    def doubts(self, prefix: str = "") -> Iterator[str]:
+        """Yield what is unusual about allowed values, in a sentence each; `prefix` is put before ``friction.``."""
+        yield from ()
+
     def memory(self) -> tuple[str, ...]:
         """Names of the memory variables, in the order of all other methods; empty if there are none."""
         return ()

@@ -32,7 +32,7 @@ class Hunting(Measure, name="hunt"):
     rtol: float = parameter("1", tolerance, "error allowed per step, with bristles", default=1e-6)
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        unit = "rad" if rig.drive.turns else "m"
+        unit = "rad" if rig.feed()[1] else "m"
         words = ("settles", "hunts", "runs away", "not decided")
         return (
             Output("hunts", "1", "whether it hunts", words),

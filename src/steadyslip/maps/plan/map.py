@@ -349,9 +349,10 @@ def _unfit(one: AnyMeasure, rig: Rig) -> list[Problem]:
 
 
 def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:
-    """Parameters of a protocol by dotted name, in the units used for this rig."""
+    """Parameters of a protocol by dotted name, in the units used for this rig; motions are the drive's."""
     reader = TableReader()
     with reader.of_rig(rig):
+        reader.feed = 1.0, rig.drive.turns
         return {
             name: replace(one, role=reader.in_file_unit(one.role))
             for name, one in parameters(protocol, "protocol.").items()

@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.core.format import format_percent, format_quantity, format_range
+from steadyslip.core.format import format_growth, format_percent, format_quantity, format_range
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -213,6 +213,7 @@ class MapResult(Displayed):
             elif "low" in found:
                 low, high, unit, area = found["low"], found["high"], self.unit(name), self.area(name)
                 text = format_range(low, high, unit, area) if low < high else format_quantity(low, unit, area=area)
+                text = format_growth(low, high if low < high else None) if unit == "1/s" else text
                 text += "" if found["share"] == 1 else f", for {format_percent(found['share'])} of the points"
             else:
                 text = "nowhere"

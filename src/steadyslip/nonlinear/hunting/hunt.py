@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import DURATION, checked
+from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
@@ -81,7 +83,7 @@ def hunt(
     if not rig.holds:
         message = f"got {rig.drive.velocity:g}; hunting is of a drive that holds a place: a controller at velocity = 0"
         raise ParameterError([Problem("drive.velocity", message)])
-    given = _target(Protocol.of(protocol), rig)
+    given = _target(in_units_of(rig, Protocol.of(protocol)))
     plant = plant_of(rig)
     if plant.delay and plant.limits.sample_time is None:
         raise NotAvailable("drive.delay: hunting takes a dead time only together with a sample_time")
@@ -108,7 +110,7 @@ def hunt(
     return _result(rig, given, motion, at_rest, (close, rtol), last_change)
 
 
-def _target(protocol: Protocol, rig: Slider | Machine) -> Protocol:
+def _target(protocol: Protocol) -> Protocol:
     """The protocol, if it acts on the target alone, without waves."""
     problems = []
     for number, piece in enumerate(protocol.pieces, start=1):
@@ -179,14 +181,21 @@ def _result(
             period = _average_period(recent)
     else:
         seen = -table[-1:, 1] if len(table) else np.zeros(1)
-    turns = rig.drive.turns
-    force = "N m" if turns else rig.result_unit("Pa")
+    ratio, turns = rig.feed()
+    force = "N m" if rig.drive.turns else rig.result_unit("Pa")
     return Hunt(
-        rig=rig, protocol=protocol, hunts=hunts, lowest=float(seen.min()), highest=float(seen.max()),
-        period=float(period), repeats=bool(count), runs_away=motion.runs_away, strokes=tuple(strokes), time=table[:, 0],
-        error=table[:, 1], velocity=table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol,
-        settled_at=float(settled), unit="rad" if turns else "m", force_unit=force, version=__version__,
+        rig=rig, protocol=protocol, hunts=hunts, lowest=ratio * float(seen.min()), highest=ratio * float(seen.max()),
+        period=float(period), repeats=bool(count), runs_away=motion.runs_away,
+        strokes=tuple(_told(one, ratio) for one in strokes), time=table[:, 0], error=ratio * table[:, 1],
+        velocity=ratio * table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol, settled_at=float(settled),
+        unit="rad" if turns else "m", force_unit=force, version=__version__,
     )  # fmt: skip
+
+
+def _told(stroke: Stroke, ratio: float) -> Stroke:
+    """Stroke of the body by which the axis is told, which moves `ratio` times as far as the drive."""
+    ways = ("begins", "ends", "fastest", "lowest", "highest")
+    return stroke if ratio == 1.0 else replace(stroke, **{name: ratio * getattr(stroke, name) for name in ways})
 
 
 def _trend(strokes: Sequence[Stroke]) -> bool | None:

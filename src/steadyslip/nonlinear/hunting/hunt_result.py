@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside
 from steadyslip.core.format import format_quantity
+from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
+from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.plant import Array
@@ -32,7 +36,8 @@ class Hunt(ReadOnly):
     runs_away : bool
         True if it goes ever farther from its target: the controller is unstable in sliding, or too weak for a load.
     lowest, highest : float
-        Extremes of the measured place over the target (m or rad), in the last cycle, or from the last rest on.
+        Extremes of the measured place over the target (m or rad), in the last cycle, or from the last rest on; of a
+        machine of the drive, or of the body whose feed is given (`velocity_of`), as steady motion converts them.
     period : float
         Duration of the cycle (s), with strokes to and fro; NaN if it does not repeat.
     repeats : bool
@@ -142,6 +147,27 @@ class Hunt(ReadOnly):
             "unit": self.unit,
             "strokes": [{k: _finite(v) for k, v in asdict(one).items()} for one in self.strokes],
         }
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the motion, one row for each moment: time, error, speed and force of the drive; of an area in N.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        factor, force = outside(self.force_unit, self.rig.area)
+        columns = {
+            "time (s)": self.time,
+            f"target less place ({self.unit})": self.error,
+            f"speed ({self.unit}/s)": self.velocity,
+            f"force of the drive ({force})": factor * self.force,
+        }
+        write_columns(path, columns, "%.12g")
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw error and force of the drive over time; see `steadyslip.figures.hunting`."""
+        return draw(self, ax=ax)
 
 
 def _finite(value: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -204,6 +205,17 @@ def test_noise_does_not_make_an_axis_logarithmic():
             displacement=moved + noise * rng.standard_normal(2001),
         )  # fmt: skip
         assert ss.figures.record(record, Figure().subplots(3, 1))[1].get_yscale() == scale
+
+
+def test_a_corner_of_many_parameters_takes_two_columns_of_a_journal(fit):
+    """In one no name would fit below its panel; numbers and names stay inside their panels' width."""
+    with ss.figures.journal():
+        panels = fit.plot("corner")
+    figure = panels[0, 0].get_figure()
+    assert figure.get_figwidth() == pytest.approx(180 / 25.4)
+    figure.draw_without_rendering()
+    boxes = [panel.xaxis.label.get_window_extent() for panel in panels[-1]]
+    assert not any(one.x1 > other.x0 for one, other in pairwise(boxes))
 
 
 def test_no_axis_of_a_corner_hides_part_of_its_numbers(fit):

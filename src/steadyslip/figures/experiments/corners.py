@@ -14,7 +14,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.palette import BLACK, BLUE, SKY, VERMILION
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import axis_label, display_unit
+from steadyslip.figures.style import axis_label, display_unit, is_narrow
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
@@ -23,13 +23,16 @@ LEVELS = (0.68, 0.95)  # shares of the draws inside the contours, as of one and 
 STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
 PILE_UP_SHARE = 0.02  # share of draws exactly at one end above which that end is a bound of the search (by trial)
 BINS = 48  # along each axis of the density of draws, finer than its smoothing (by trial)
+MOST_IN_COLUMN = 4  # parameters beside each other in 85 mm: names and three numbers of 7 points take some 18 mm
+TWO_COLUMNS = 180 / 25.4  # inches, two columns of a journal with the gap between them
 MAX_DOTS = 4000  # draws plotted as dots; more only darken the panel (by trial)
 
 
 def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     """Plot determined parameters against each other, with regions of 68 and 95 % probability.
 
-    For a fit they are those of its normal distribution, for draws those of their smoothed density.
+    For a fit they are those of its normal distribution, for draws those of their smoothed density. In a journal
+    more than four parameters take the width of two columns.
 
     Parameters
     ----------
@@ -54,6 +57,8 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
         raise NotAvailable("no parameter is determined; there is nothing to draw")
     size = max(3.0, 1.5 * len(names) + 0.8)
     panels = panel_grid(ax, len(names), len(names), (size, size))
+    if ax is None and is_narrow() and len(names) > MOST_IN_COLUMN:
+        panels[0, 0].figure.set_size_inches(TWO_COLUMNS, TWO_COLUMNS)
     scales = [_Scale(source[name]) for name in names]
     for i, row in enumerate(names):
         for k, column in enumerate(names):

@@ -30,7 +30,7 @@ if os.environ.get("CI"):
     settings.load_profile("ci")
 
 SLOW = Path(__file__).with_name("slow.txt")
-QUICK, LONG = 0.3, 1.0
+QUICK, LONG = 0.3, 0.7
 """CPU seconds that a test, with all of its parameters, may take before the rest of them is slow, and of campaigns: so
 the quick tests take half a minute on two cores, and the whole four."""
 

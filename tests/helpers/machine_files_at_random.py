@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import steadyslip as ss
+from steadyslip.core.errors import UnitWarning
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
 NAMES = [
@@ -282,6 +283,7 @@ def answer(text: str) -> str:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", UnitWarning)  # a question about an allowed value
         try:
             machine = ss.rig_from_text(text)
         except ss.RigFileError as error:

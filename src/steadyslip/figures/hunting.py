@@ -23,6 +23,11 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
     Returns
     -------
     ndarray of matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> axes = ss.figures.hunting(ss.hunt(ss.read_rig("examples/hunting-axis.toml")))
+    >>> axes[0].figure.savefig("hunting.svg")
     """
     panels = given_panels(new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0] if ax is None else ax, (2,), "two Axes")
     across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)

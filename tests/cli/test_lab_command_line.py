@@ -177,3 +177,13 @@ def test_options_are_used_or_refused(fitted):
     assert "--branch" in done.stderr
     done = run("analyze", "examples/double-direct-shear.toml", "--fit", folder / "fit.nc", "--formula")
     assert "Critical stiffness\n  k_cr = " in done.stdout
+
+
+def test_a_table_of_speeds_without_its_law_is_named(tmp_path):
+    """Five rows are no record: the message was of a time column, or of a file without numbers."""
+    table = tmp_path / "guide.csv"
+    table.write_text("speed [mm/s];force [N]\n0.1;610\n0.5;500\n1;450\n5;400\n20;357\n")
+    assert "is a table of speeds and friction" in (said := run("fit", table).stderr)
+    assert "--law lugre" in said
+    assert "-o: a rig as .toml" in run("fit", table, "-o", tmp_path / "guide.toml").stderr
+    assert "law: unknown friction law 'foo'" in run("fit", table, "--law", "foo").stderr

@@ -182,3 +182,11 @@ def test_two_rigs_are_told_beside_each_other():
     assert "Inputs of old" in text
     assert "Inputs of new" in text
     assert all(found.part_in_words(one).replace("x ", "× ") in text for one in found.differences)
+
+
+def test_the_first_chart_has_what_is_recommended_first():
+    """Charts were of friction alone, whose values nobody buys."""
+    for name, first in (("inclined-spring", "preload"), ("lead-screw", "drive velocity")):
+        html = ss.report(ss.read_rig(f"examples/{name}.toml")).html
+        assert f"Change {first}" in html
+        assert f"Where sliding is stable over {first}" in html[: html.index("the dot is this rig")]

@@ -60,6 +60,9 @@ def fit(
     from steadyslip.experiments.machine_spec import MachineSpec
     from steadyslip.files.output import check_output
 
+    if any(path.suffix.lower() == ".toml" for path in output or ()):
+        message = "a rig as .toml is written from a table of speeds; say which law with --law, such as --law lugre"
+        raise ParameterError([Problem("-o", message)])
     check_output(output or (), ENDINGS)
     listed = [path for path in output or () if path.suffix.lower() in TABLES]
     others = [path for path in output or () if path not in listed]

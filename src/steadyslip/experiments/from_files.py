@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, SteadyslipError
 from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_text
 from steadyslip.experiments.answers.laws import LawComparison
@@ -18,6 +18,7 @@ from steadyslip.experiments.fitting.result import Fit, load_friction_fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.settings import PopulationSettings
 from steadyslip.experiments.machine_spec import MachineSpec
+from steadyslip.experiments.measured.speeds import read_speed_table
 from steadyslip.experiments.spec import Spec, spec_from_text
 from steadyslip.files.sealed import holds
 from steadyslip.files.specifications.read import text_of
@@ -164,12 +165,26 @@ def _read(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> list[
         try:
             records.append(plan.read(path, skip_bad_lines))
         except (ParameterError, NotAvailable) as error:
-            faults.append(error)
+            faults.append(_of_speeds(path, error) or error)
     if len(faults) == 1:
         raise faults[0]
     if faults:
         raise NotAvailable("\n".join(map(str, faults)))
     return records
+
+
+def _of_speeds(path: str | PathLike[str], error: ParameterError | NotAvailable) -> NotAvailable | None:
+    """Error that says how to fit a table of speeds, where a file without times is one; else None."""
+    if isinstance(error, ParameterError) and all(problem.name != "time" for problem in error.problems):
+        return None
+    try:
+        read_speed_table(path)
+    except SteadyslipError:
+        return None
+    return NotAvailable(
+        f"{str(path)!r} is a table of speeds and friction, no record in time; say which law to fit with --law, such as "
+        "--law lugre, or call experiments.fit_friction_table in Python"
+    )
 
 
 def _progress_reporter(said: Callable[[str], None], of: str = "") -> Progress:

@@ -97,7 +97,7 @@ def fit_friction_table(
         read = table_from_arrays({**table, **pressed})
     else:
         read = read_speed_table(table, load=load, **columns)
-    kind: Any = find_law(FrictionLaw, law)
+    kind = _law(law)
     held = _held(kind, hold or {})
     sides = {
         side: fit_direction(read, kind, side, held, errors == "relative")
@@ -111,6 +111,14 @@ def fit_friction_table(
             raise ParameterError([Problem("loop", "turns where the table slides, or the other way round")])
         bristles = fit_loop(measured)
     return SpeedFit(read, law, sides.get(True), sides.get(False), bristles, errors == "relative")
+
+
+def _law(name: str) -> Any:
+    """Friction law by registered name; ParameterError naming the argument if there is none."""
+    try:
+        return find_law(FrictionLaw, name)
+    except ParameterError as error:
+        raise ParameterError([Problem("law", problem.message) for problem in error.problems]) from error
 
 
 def _held(law: Any, given: Mapping[str, Any]) -> dict[str, float]:
@@ -152,7 +160,7 @@ def fit_speed_files(files: Sequence[Path], law: str, changes: Sequence[str]) -> 
         raise NotAvailable(message)
     options: dict[str, Any] = {}
     hold: dict[str, Any] = {}
-    names = {item.name for item in fields(find_law(FrictionLaw, law))}  # type: ignore[arg-type]
+    names = {item.name for item in fields(_law(law))}
     for name, value in map(named_value, changes):
         own = name.removeprefix("friction.")
         (hold if own in names else options)[own] = value

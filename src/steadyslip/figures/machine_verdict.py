@@ -184,7 +184,7 @@ def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
         else "no oscillation"
     )
     title = f"mode {mode.number}" if isinstance(found, Modes) and mode.number else "leading mode"
-    ax.set_xlabel(typeset(f"amplitude, share of energy\n{title}\n{does}, {kind}"), fontsize="small")
+    ax.set_xlabel(typeset(f"amplitude,\nshare of energy\n{title}\n{does}, {kind}"), fontsize="small")
     ax.tick_params(axis="x", labelsize="small")
     return ax
 

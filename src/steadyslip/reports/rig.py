@@ -30,6 +30,7 @@ from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import equation as equation_html, figure, heading, inline_math, paragraph, table, why
 from steadyslip.reports.sections import (
     assumptions,
+    changeable,
     input_letter,
     letters,
     motion,
@@ -136,8 +137,8 @@ def checks_line(analysis: Analysis) -> Iterator[str]:
 
 def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
-    near = [one.parameter for one in analysis.margins if one.edge is not None and one.parameter != stiffness]
-    near = [name for name in near if name in order.adjustable] or near
+    told = [*changeable(analysis, tuple(order.adjustable)), *(one for one in analysis.margins if one.edge is not None)]
+    near = [name for name in dict.fromkeys(one.parameter for one in told) if name != stiffness]
     for x, y in order.charts or [(name, stiffness) for name in near[:2]]:
         over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
         words = f"Where sliding is stable over {over}; the dot is this rig."

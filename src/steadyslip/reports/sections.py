@@ -58,11 +58,7 @@ def recommendation(
     if analysis.stable:
         yield paragraph(_what_to_hold(analysis, adjustable))
         return
-    curing = [one for one in analysis.margins if _cures(one)]
-    chosen = [one for one in curing if one.parameter in adjustable] if adjustable else []
-    present = [one for one in curing if one.value]  # from zero it is no change, but a part to be added
-    chosen = chosen or [one for one in present if "friction." not in one.parameter] or present
-    rows = [row for one in chosen if (row := _change(analysis, one))][:_ROWS]
+    rows = [row for one in changeable(analysis, adjustable) if (row := _change(analysis, one))][:_ROWS]
     if not rows:
         yield paragraph("No single change within range makes it stable; change several, as steadyslip cure proposes.")
         return
@@ -71,6 +67,17 @@ def recommendation(
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
     yield table(rows, head, caption="Changes that make it stable.")
+
+
+def changeable(analysis: Analysis, adjustable: Sequence[str] = ()) -> list[Margin]:
+    """Margins that a document speaks of, nearest first: of what would make the rig stable, or keep it so.
+
+    Of what is named in `adjustable`; else of all that the rig has but friction, and of that if there is nothing else.
+    """
+    edged = [one for one in analysis.margins if one.edge is not None and (analysis.stable or _cures(one))]
+    chosen = [one for one in edged if one.parameter in adjustable]
+    present = [one for one in edged if one.value]  # from zero it is no change, but a part to be added
+    return chosen or [one for one in present if "friction." not in one.parameter] or present
 
 
 def _what_to_hold(analysis: Analysis, adjustable: Sequence[str]) -> str:

@@ -101,6 +101,17 @@ def test_a_step_that_friction_holds_makes_no_stroke():
     assert found.highest == pytest.approx(-0.49)
 
 
+@pytest.mark.parametrize("bristles", [False, True])
+def test_a_force_limit_below_friction_at_rest_leaves_the_axis_where_it_is(bristles):
+    """The integral winds up without end behind the limit; the axis never starts, and just above the limit it hunts."""
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml") if bristles else axis(**THEORY)
+    found = ss.hunt(held.with_values({"drive.force_limit": 1.2}))
+    assert found.hunts is False
+    assert found.highest == pytest.approx(found.lowest)
+    assert abs(found.lowest) > 0.9
+    assert ss.hunt(held.with_values({"drive.force_limit": 1.6})).hunts
+
+
 def test_friction_as_large_at_rest_does_not_hunt():
     found = ss.hunt(axis(**THEORY | {"rest": 1.0}), until=600.0)
     assert found.hunts is False

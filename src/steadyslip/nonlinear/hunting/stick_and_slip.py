@@ -226,7 +226,7 @@ class Motion:
 
     @property
     def at_rest(self) -> bool:
-        """True if nothing moves any more and the controller's integral is constant.
+        """True if nothing moves any more and the controller's integral is constant, or winds up behind a force limit.
 
         Sliding, or bristles, that ever slower approach the target count as at rest where the error is `STILL` of the
         largest.
@@ -243,7 +243,8 @@ class Motion:
             return False
         if self.sampled is not None:
             return self.sampled.constant and not any(self.mode.contacts)
-        return bool(abs(rates[2 * n]) <= (self.still * self.farthest if moves else 0.0))
+        winds_up = self.mode.limit * float(self._piece().wanted @ rates) > 0  # the force stays at its limit
+        return winds_up or bool(abs(rates[2 * n]) <= (self.still * self.farthest if moves else 0.0))
 
 
 def _side(name: str, value: float, bound: float) -> Switch:

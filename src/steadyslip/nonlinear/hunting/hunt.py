@@ -15,7 +15,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.nonlinear.hunting.plant import Plant, plant_of
-from steadyslip.nonlinear.hunting.stick_and_slip import Motion, Stroke, friction_at_rest
+from steadyslip.nonlinear.hunting.stick_and_slip import Motion, Stroke, friction_at_rest, swings
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.pieces import DisplacementStep
 from steadyslip.protocol.protocol import LOAD_POINT
@@ -105,7 +105,7 @@ def hunt(
             break
         if end is None and done is not None:
             own = [one for one in motion.trace.strokes if one.start > last_change]
-            if len(own) >= MOST_STROKES or cycle_length(own, close):
+            if len(own) >= MOST_STROKES or cycle_length(swings(own), close):
                 break
     return _result(rig, given, motion, at_rest, (close, rtol), last_change)
 
@@ -163,7 +163,7 @@ def _result(
 
     close, rtol = errors
     table, strokes = motion.trace.table(), motion.trace.strokes
-    own = [one for one in strokes if one.start >= since and np.isfinite(one.end)]
+    own = swings(one for one in strokes if one.start >= since)
     count = 0 if at_rest or motion.runs_away else cycle_length(own, close)
     period = own[-1].start - own[-1 - count].start if count else np.nan
     hunts: bool | None = False if at_rest else True if count or motion.runs_away else _trend(own)

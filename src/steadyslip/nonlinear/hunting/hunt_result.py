@@ -16,7 +16,7 @@ from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.plant import Array
-from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke
+from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke, swings
 from steadyslip.protocol import Protocol
 
 SYMMETRIC = 1e-3  # relative difference of the two sides up to which they are written as one: four digits are printed
@@ -77,14 +77,18 @@ class Hunt(ReadOnly):
     version: str
 
     @property
+    def _swings(self) -> list[Stroke]:
+        return swings(self.strokes)
+
+    @property
     def fastest(self) -> float:
         """Largest speed of the measured place in the last two strokes (m/s or rad/s); 0 without strokes."""
-        return max((one.fastest for one in self.strokes[-2:]), default=0.0)
+        return max((one.fastest for one in self._swings[-2:]), default=0.0)
 
     @property
     def every(self) -> float:
-        """Time from the start of the last but one stroke to that of the last (s); NaN without two."""
-        return self.strokes[-1].start - self.strokes[-2].start if len(self.strokes) > 1 else np.nan
+        """Time from the start of the last but one stroke to that of the last (s), to and fro; NaN without two."""
+        return self._swings[-1].start - self._swings[-2].start if len(self._swings) > 1 else np.nan
 
     @property
     def sentence(self) -> str:
@@ -116,11 +120,12 @@ class Hunt(ReadOnly):
 
     def __str__(self) -> str:
         lines = [self.sentence]
-        if self.strokes:
-            last = self.strokes[-1]
-            again = f", {format_quantity(self.every, 's')} after the one before" if len(self.strokes) > 1 else ""
+        if own := self._swings:
+            last = own[-1]
+            again = f", {format_quantity(self.every, 's')} after the one before" if len(own) > 1 else ""
+            rests = f", with brief rests in {len(self.strokes)} parts" if len(self.strokes) > len(own) + 1 else ""
             lines.append(
-                f"strokes         {len(self.strokes)}; the last: starts{again}, fastest "
+                f"strokes         {len(own)}{rests}; the last: starts{again}, fastest "
                 f"{format_quantity(last.fastest, f'{self.unit}/s')}"
             )
         if len(self.force):

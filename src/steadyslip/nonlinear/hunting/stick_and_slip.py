@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +22,9 @@ AWAY = 1e4  # error over what friction, load or target account for, beyond which
 KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
 
 
+RINGING = 0.1  # of the longest stroke of the later half: what sheds less is no event of a simulation either
+
+
 @dataclass
 class Stroke:
     """Motion between two rests: when (s), from where to where (error, m or rad), and its extremes."""
@@ -33,6 +36,28 @@ class Stroke:
     fastest: float = 0.0
     lowest: float = np.inf
     highest: float = -np.inf
+
+
+def swings(strokes: Iterable[Stroke]) -> list[Stroke]:
+    """Complete strokes to and fro: those in one direction are joined, and those shorter than `RINGING` left out.
+
+    Where a drive rings, it rests for moments on its way, and its bristles spring back a little.
+    """
+    done = [one for one in strokes if np.isfinite(one.end)]
+    longest = max((abs(one.ends - one.begins) for one in done[len(done) // 2 :]), default=0.0)
+    found: list[Stroke] = []
+    for one in done:
+        if abs(one.ends - one.begins) < RINGING * longest:
+            continue
+        last = found[-1] if found else None
+        if last is None or (one.ends - one.begins) * (last.ends - last.begins) < 0:
+            found.append(one)
+            continue
+        found[-1] = Stroke(
+            last.start, last.begins, one.end, one.ends, max(last.fastest, one.fastest), min(last.lowest, one.lowest),
+            max(last.highest, one.highest),
+        )  # fmt: skip
+    return found
 
 
 @dataclass

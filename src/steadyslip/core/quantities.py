@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -135,9 +135,15 @@ def in_si(value: Any, expected: str) -> Any:
     """
     if isinstance(value, str):
         return parse(value, expected)
+    items = column_with_text(value)
+    return value if items is None else np.array(numbers(items, expected))
+
+
+def column_with_text(value: Any) -> Sequence[Any] | None:
+    """Items of a list, tuple or array in which some are text; None for anything else."""
     items = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
     has_text = isinstance(items, (list, tuple)) and any(isinstance(item, str) for item in items)
-    return np.array(numbers(items, expected)) if has_text else value
+    return items if has_text else None
 
 
 def numbers(values: Any, expected: str, read: Callable[[str, str], float] = parse) -> tuple[float, ...]:

@@ -6,11 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
-import numpy as np
-
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
-from steadyslip.core.quantities import units_in
+from steadyslip.core.quantities import column_with_text, units_in
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
 from steadyslip.laws.contact import ContactLaw
@@ -182,8 +180,7 @@ class Rig(FrozenRecord, Keeper):
         ParameterError
             If text is not a quantity of the parameter's dimension.
         """
-        items = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
-        if isinstance(items, (list, tuple)) and any(isinstance(item, str) for item in items):
+        if (items := column_with_text(value)) is not None:
             return [self.read(name, item) for item in items]
         if not isinstance(value, str):
             return value

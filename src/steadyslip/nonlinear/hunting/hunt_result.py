@@ -122,10 +122,10 @@ class Hunt(ReadOnly):
         lines = [self.sentence]
         if own := self._swings:
             last = own[-1]
-            again = f", {format_quantity(self.every, 's')} after the one before" if len(own) > 1 else ""
+            again = f" starts {format_quantity(self.every, 's')} after the one before," if len(own) > 1 else ":"
             rests = f", with brief rests in {len(self.strokes)} parts" if len(self.strokes) > len(own) + 1 else ""
             lines.append(
-                f"strokes         {len(own)}{rests}; the last: starts{again}, fastest "
+                f"strokes         {len(own)}{rests}; the last{again} fastest "
                 f"{format_quantity(last.fastest, f'{self.unit}/s')}"
             )
         if len(self.force):

@@ -74,7 +74,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
             "the page judges by a polynomial, and the characteristic equation of a rig with delay is none; "
             "steadyslip analyze and boundary take it, and stable_values in Python"
         )
-    if isinstance(rig, Machine) and is_undamped(operating_point(rig)):
+    if is_undamped(operating_point(rig)):
         raise NotAvailable(
             "the page tells growth from decay, and nothing damps this machine, so that none of its oscillations dies "
             "out; steadyslip analyze and boundary tell where two couple and one grows; for a page give it a damping"

@@ -75,7 +75,7 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
     if not np.all(well_posed(point)):
         raise NotAvailable(f"the motion of the {what} is ill-posed")
     eliminate = eliminable(point)
-    named = isinstance(rig, Machine)
+    named = bool(rig.contact_names)
     reduction = reduce_model(point.model, eliminate, *(((EVERYWHERE,), (EVERYWHERE,)) if named else ()))
     kernel = Kernel(reduction, Choice(automatic_method(reduction, OPTIONS.rtol), "constant", 0, 1, True))
     kernel_text = javascript.machine(kernel.programs, kernel.layout)

@@ -15,7 +15,6 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
 from steadyslip.figures.map_axes import is_geometric
 from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
-from steadyslip.machine.machine import Machine
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
@@ -229,8 +228,8 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
         words = "every starting point in this picture returns to steady sliding"
         ax.text(0.5, 0.04, fill(words, LEGEND_WIDTH), transform=ax.transAxes, ha="center", va="bottom")
     place, height = "slip ahead of the load point", "velocity"
-    if isinstance(found.rig, Machine):
-        body, (kind, name) = found.names[0].rpartition(".")[0], found.names[1].rsplit(".", 1)
+    if body := found.names[0].rpartition(".")[0]:
+        kind, name = found.names[1].rsplit(".", 1)
         place, height = f"{body} ahead of where it slides steadily", f"velocity of {body}"
         if name != "v":
             height = f"memory {name} of {kind}"

@@ -15,7 +15,6 @@ from steadyslip.linear.roots import Array
 from steadyslip.linear.search import SPLIT, Boundary, Search
 from steadyslip.linear.status import ABSENT, UNKNOWN, status
 from steadyslip.linear.undamped import grows, is_undamped, squares
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.model.point import OperatingPoint
 
@@ -93,8 +92,6 @@ class UndampedSearch(Search):
 def search_for(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Search:
     """Scan of one parameter for edges of stability, or of growth where a machine is undamped at all its values."""
     found = Search(rig, name, present, branch)
-    if not isinstance(rig, Machine):
-        return found  # one body in one direction couples with nothing
     with np.errstate(all="ignore"):
         if not np.all(is_undamped(found.own)):
             return found

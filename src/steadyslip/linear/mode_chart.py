@@ -19,7 +19,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.files.output import write_columns
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.mode_origin import Origin
-from steadyslip.linear.mode_table import MOST, growth_origin
+from steadyslip.linear.mode_table import MOST, growth_origin, with_modes
 from steadyslip.linear.roots import ComplexArray
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import stability
@@ -194,8 +194,7 @@ def mode_chart(rig: Slider | Machine, name: str, between: Sequence[Any] | None =
     links.caliper.stiffness = 11.0483 N/um: oscillatory, period 1.374 ms, stable above
     >>> found.plot()[0].figure.savefig("modes.svg")
     """
-    if isinstance(rig, Slider):
-        raise NotAvailable("a slider is one body, which has no modes beside its eigenvalues; see analyze")
+    rig = with_modes(rig)
     full = rig.resolve(name)
     low, high = _range(rig, full, between)
     edges = boundary(rig, full, (low, high))

@@ -186,8 +186,7 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     >>> found.changes[0].name
     'contacts.disc.friction.mu_ref'
     """
-    if isinstance(rig, Slider):
-        raise NotAvailable("a slider is one body, which has no modes beside its eigenvalues; see analyze")
+    rig = with_modes(rig)
     if by_matrices(rig):
         steady_machine(rig)  # raises, and says which contact locks or lifts
         own = machine_point(rig)
@@ -210,6 +209,13 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     numeric = _numeric_point(rig)
     changes = () if numeric is None else changes_of(numeric, chosen.eigenvalue)
     return Modes(rig, found, chosen, growth_origin(rig, chosen.eigenvalue, chosen.number), changes)
+
+
+def with_modes(rig: Slider | Machine) -> Machine:
+    """The rig, which must be a machine; raises NotAvailable for a slider."""
+    if isinstance(rig, Slider):
+        raise NotAvailable("a slider is one body, which has no modes beside its eigenvalues; see analyze")
+    return rig
 
 
 def growth_origin(rig: Machine, s: complex, number: int) -> Origin | None:

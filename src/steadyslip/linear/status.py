@@ -89,7 +89,7 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
     """Status of rigs (...): one of the codes of `WORDS`; UNSTABLE also ill-posed, UNDAMPED of machines alone."""
     with np.errstate(all="ignore"):
         found = _status(point, is_stable(point))
-        if point.model.is_single or not np.any(undamped := (found == UNSTABLE) & is_undamped(point)):
+        if not np.any(undamped := (found == UNSTABLE) & is_undamped(point)):
             return found
         return np.where(undamped & ~grows(point), UNDAMPED, found)
 

@@ -12,8 +12,11 @@ from steadyslip.model.range import characteristic
 
 
 def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the characteristic polynomial has even powers of s only, one beside the constant at least, (...)."""
-    if point.model.delays or not is_written_out(point.model):
+    """True where a characteristic polynomial has even powers of s only, one beside the constant at least, (...).
+
+    Not of a slider: one body in one direction couples with nothing.
+    """
+    if point.model.is_single or point.model.delays or not is_written_out(point.model):
         return np.zeros(point.shape, dtype=bool)
     c = characteristic(point)
     return np.asarray(np.all(c[..., 1::2] == 0, axis=-1) & np.any(c[..., 2::2] != 0, axis=-1))

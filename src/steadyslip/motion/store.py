@@ -81,7 +81,7 @@ def _extremes(velocities: dict[str, tuple[float, float]]) -> tuple[float, float]
 
 
 def _event_units(rig: Slider | Machine) -> dict[str, str]:
-    return _CONTACT_UNITS if isinstance(rig, Machine) else _EVENT_UNITS
+    return _CONTACT_UNITS if rig.in_forces else _EVENT_UNITS
 
 
 def save(history: HistoryData, path: str | PathLike[str]) -> None:

@@ -115,7 +115,7 @@ def _by_equations(rig: Any, branch: int, steady: Any) -> _Linear:
         point,
         numbers,
         edged,
-        rig.in_forces and bool(is_undamped(point)),
+        bool(is_undamped(point)),
         verdict_checks(rig, point, numbers["stable"], edged, steady if rig.in_forces else None),
         lambda: edge_checks(rig, *margins_and_missing(rig, branch), branch),
         lambda eigenvalue: mode_of(rig, point, eigenvalue),

@@ -85,7 +85,7 @@ OF_MACHINES = {
 
 def kicks_of(rig: Slider | Machine) -> dict[str, Kick]:
     """Kinds of kick that a rig can get."""
-    return KICKS if isinstance(rig, Slider) else OF_MACHINES
+    return OF_MACHINES if rig.in_forces else KICKS
 
 
 def kick_problems(rig: Slider | Machine, kick: str, at: str | None = None) -> list[Problem]:

@@ -129,8 +129,6 @@ class EndRules:
 
 def is_damped(rig: Slider | Machine) -> bool:
     """True if the rig has damping that limits the velocity of a massless block."""
-    if isinstance(rig, Slider):
-        return bool(rig.radiation_damping)
     return any(bool(np.any(one.damping)) for one in rig.mechanism().elements)
 
 

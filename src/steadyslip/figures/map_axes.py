@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from steadyslip.core.areas import stress_name
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent
 from steadyslip.core.palette import (
@@ -30,7 +31,6 @@ from steadyslip.figures.style import add_legend_above, axis_label, display_unit,
 from steadyslip.maps.view.cut import FAILING, View
 from steadyslip.maps.view.map_result import MapResult
 
-Array = np.ndarray
 LOG_RATIO = 100.0  # highest over lowest value from which on a scale is logarithmic: two decades
 WORD_COLOURS = {
     "stable": STABLE, "settles": STABLE, "unstable": UNSTABLE, "hunts": UNSTABLE, "blow-up": BLOW_UP,

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.palette import BLACK, BLUE, CURVES, GREY, ORANGE, VERMILION
 from steadyslip.figures.map_axes import (
@@ -22,8 +23,6 @@ from steadyslip.linear.status import ABSENT, STABLE, UNDAMPED, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
-
-Array = np.ndarray
 
 
 def draw_curve(ax: Axes, found: MapResult, view: View, show: str | None) -> None:

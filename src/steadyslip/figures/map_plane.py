@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, VERMILION
@@ -39,8 +40,6 @@ from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
-
-Array = np.ndarray
 
 
 def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:

@@ -15,7 +15,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-Array = np.ndarray
+from steadyslip.core.arrays import Array
+
 T = TypeVar("T")
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12  # tags of lists in the header of netCDF classic
 _TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}  # numbers of types there

@@ -22,7 +22,6 @@ from steadyslip.files.netcdf import File, FileVariable, FormatError, read
 from steadyslip.files.output import check_output
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
-Array = np.ndarray
 _SIZES = "sizes"  # attribute with all dimensions: the format has no empty ones, so variables along them are left out
 _PART = re.compile(r"part([1-9][0-9]{0,4})\.(.+)", re.DOTALL)  # name in the table of a name in one of its parts
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
+from steadyslip.core.arrays import Array
 
 GROUP = 8
 """Number of lanes computed as one vector; the lanes of a kernel are a multiple of it, or one."""
@@ -272,7 +272,6 @@ def make_layout(
     )  # fmt: skip
 
 
-Array = np.ndarray
 Routine = Callable[[Array, float, Array], None]
 
 

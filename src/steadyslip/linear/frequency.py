@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.linear.state_space import state_matrices
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-Array = np.ndarray
 # Chosen by trial: computing time against missed resonances.
 PLACES = 200  # periods, evenly spaced in their logarithm, at which the gain is computed
 PROMINENCE = 0.01  # least rise of ln(gain) above the dips on both sides of a resonance

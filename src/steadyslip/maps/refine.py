@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import SEVERAL, checked, finite, whole
@@ -32,7 +33,6 @@ from steadyslip.maps.plan.measures import Measure
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.maps.work.run import run_map
 
-Array = np.ndarray
 MOST_ROUNDS = 12  # halvings: 4096 points between two of the map; chosen by trial
 MOST_AXES = 3  # the number of cells along an edge grows as size^(axes - 1)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
@@ -18,7 +19,6 @@ from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Samples
 from steadyslip.maps.plan.map import Map, evaluate
 
-Array = np.ndarray
 POINTS = 4096  # default number of sets of points: chosen by trial against time
 RESAMPLES = 200  # of the bootstrap; chosen by trial against time
 BLOCK = 32  # sets of points evaluated together, between checks for Ctrl-C; chosen by trial

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
@@ -19,7 +20,6 @@ from steadyslip.motion.targets import Targets
 from steadyslip.protocol import creep, protocol as channels
 from steadyslip.protocol.inputs import inputs_at, rates_at
 
-Array = np.ndarray
 Tables = tuple[np.ndarray, ...]
 OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity",
             "load_displacement")  # fmt: skip

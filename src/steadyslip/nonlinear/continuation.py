@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from steadyslip.core.arrays import Array
+
 Equations = Callable[[Array], tuple[Array, Array]]
 """u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
 MOST_ITERATIONS = 10  # of Newton's method for one point

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.options import FLAG, NAME, NUMBERS, Measured, Tested, checked
 from steadyslip.core.progress import progress_bar
@@ -21,8 +22,6 @@ from steadyslip.motion import simulate
 from steadyslip.nonlinear.frequency_response import IRREGULAR, NOT_SETTLED, PERIODIC, TOO_MANY_STEPS, FrequencyResponse
 from steadyslip.protocol import DisturbanceHarmonic, InjectionHarmonic, NormalStressHarmonic, VelocityHarmonic
 from steadyslip.protocol.pieces import Harmonic
-
-Array = np.ndarray
 
 
 class SwingingInput(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import outside
+from steadyslip.core.arrays import Array
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
@@ -18,7 +19,6 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.status import remedy
 
-Array = np.ndarray
 PERIODIC, NOT_SETTLED, IRREGULAR = "periodic", "not settled", "irregular"
 TOO_MANY_STEPS = "too many steps"  # says nothing of the motion
 EXPLAINED = {

@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.areas import outside
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import DURATION, checked
@@ -32,7 +33,6 @@ from steadyslip.protocol.inputs import inputs_at, segment_of
 from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import pack
 
-Array = np.ndarray
 MOMENTS = 1000  # times of evaluation, besides those at jumps
 REFINED = 100  # times of evaluation between two successive ones with different verdicts
 DEPARTED = 2.0  # ratio of slip rate to that asked for above which motion counts as departed, as for a slip event

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.places import guess_at, scale_at
-from steadyslip.kernels.layout import Array, Layout, Routines, call
+from steadyslip.kernels.layout import Layout, Routines, call
 
 FIRST_REACH = 0.01  # first step of a bracket over the natural size of w; by trial: larger ones may skip a root
 ROUNDS = 300  # sweeps over coupled balances before giving up; chosen by trial

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.interpolate import state_at_fraction, state_now
 from steadyslip.kernels.driver.places import (
     event_functions_at,
@@ -14,7 +15,7 @@ from steadyslip.kernels.driver.places import (
     velocity_at,
 )
 from steadyslip.kernels.driver.slip import mark_fast, record_event, track_slowest
-from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
+from steadyslip.kernels.layout import SLIP_EVENT, EventPlace, Kind, Layout, Out, Routines, Row
 
 MOST_BISECTIONS = 100  # of regula falsi, which needs about ten; halving alone would need 44
 LOCATED = 1e-13  # share of a step to which an event is located, some hundred roundings

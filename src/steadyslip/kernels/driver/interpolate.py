@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.places import guess_at, unknown_at
-from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
+from steadyslip.kernels.layout import Layout, Routines, Row, call
 
 
 def copy_state(R: Array, layout: Layout, y: Array) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.crossings import events_of_jump, process_events, save_before_jump
 from steadyslip.kernels.driver.interpolate import state_now
 from steadyslip.kernels.driver.places import (
@@ -19,18 +20,7 @@ from steadyslip.kernels.driver.places import (
 from steadyslip.kernels.driver.samples import record_now, record_step, schedule_sample, take_samples
 from steadyslip.kernels.driver.segments import clock, enter_segment
 from steadyslip.kernels.driver.slip import record_event
-from steadyslip.kernels.layout import (
-    MOST_FAILURES,
-    Array,
-    Cursor,
-    Final,
-    Kind,
-    Layout,
-    Routines,
-    Row,
-    Setting,
-    Status,
-)
+from steadyslip.kernels.layout import MOST_FAILURES, Cursor, Final, Kind, Layout, Routines, Row, Setting, Status
 
 RUNAWAY = 1e9
 """Velocity over that of the drive above which a massless block whose steps fail counts as blown up. Contacts that a

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.jobs import serve_lane
 from steadyslip.kernels.driver.places import output_size
 from steadyslip.kernels.driver.samples import BETWEEN
-from steadyslip.kernels.layout import GROUP, Array, Cursor, Layout, Routines, Row, Setting, call
+from steadyslip.kernels.layout import GROUP, Cursor, Layout, Routines, Row, Setting, call
 
 LOGGED_AT_ONCE = 20  # rows of the log per lane and contact that one service may need: two for each kind of event
 

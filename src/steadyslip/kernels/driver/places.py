@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from steadyslip.kernels.layout import TALLIED, Array, EventPlace, Layout, Out, Row, Sampled
+from steadyslip.core.arrays import Array
+from steadyslip.kernels.layout import TALLIED, EventPlace, Layout, Out, Row, Sampled
 
 
 def outputs_at(layout: Layout, contact: int) -> int:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.interpolate import copy_state, interpolate_state
 from steadyslip.kernels.driver.places import point_at, unknown_at
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import Array, Cursor, Layout, Recorded, Routines, Row, Sampled
+from steadyslip.kernels.layout import Cursor, Layout, Recorded, Routines, Row, Sampled
 
 BETWEEN = 3  # extra points recorded within each step of a method of high order, whose steps are long; chosen by trial
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.balance import solve_balances
-from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
+from steadyslip.kernels.layout import Layout, Routines, Row, call
 
 
 def clock(R: Array, tau: float) -> float:

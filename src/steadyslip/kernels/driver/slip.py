@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.places import events_per_contact, outputs_at, tally_at
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import EVENT_SHARE, NUMBER, SLIP_EVENT, Array, Cursor, Kind, Layout, Out, Row
+from steadyslip.kernels.layout import EVENT_SHARE, NUMBER, SLIP_EVENT, Cursor, Kind, Layout, Out, Row
 
 
 def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y: Array) -> None:

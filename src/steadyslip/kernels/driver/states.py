@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.balance import solve_balances
 from steadyslip.kernels.driver.places import (
     earlier_at,
@@ -19,7 +20,7 @@ from steadyslip.kernels.driver.places import (
     unknown_at,
 )
 from steadyslip.kernels.driver.segments import begin_segment, set_inputs
-from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Sampled, Setting, call
+from steadyslip.kernels.layout import Layout, Out, Routines, Row, Sampled, Setting, call
 
 
 def set_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:

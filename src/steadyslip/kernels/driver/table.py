@@ -11,9 +11,10 @@ import math
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
-from steadyslip.kernels.layout import Array, Layout, Routines, Row, Status, call
+from steadyslip.kernels.layout import Layout, Routines, Row, Status, call
 
 INSTANT = 1e-14  # share of a row's length: a motion that needs shorter steps runs away; about 50 roundings of time
 

@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.arrays import checked_array
+from steadyslip.core.arrays import Array, checked_array
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
 from steadyslip.core.roles import Parameter
 
-Array = np.ndarray
 SPACINGS = ("linear", "log")
 SAMPLERS = ("sobol", "latin-hypercube")
 SAMPLE = "sample"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import (
     NotAvailable,
     ParameterError,
@@ -24,7 +25,6 @@ from steadyslip.linear.status import STABLE
 from steadyslip.maps.plan.axes import SAMPLE
 from steadyslip.maps.view.map_result import MapResult
 
-Array = np.ndarray
 MOST = 500  # points along an axis: more than a figure resolves
 MOST_IN_ALL = 2 * 10**7  # values read, samples included: 160 MB
 MOST_SCATTERED = 5000  # points of a scatter plot; chosen by trial, as more overlap

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, NUMBERS, THREADS, checked, finite
 from steadyslip.core.pictures import draw
@@ -39,7 +40,6 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.follow import cycles
 
-Array = np.ndarray
 POINTS = 81  # along each axis: an edge is placed within 1.2 % of the picture
 STEPS = 2e9  # integration steps for all motions of a basin
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, checked, finite
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.version import version
@@ -28,7 +29,6 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
-Array = np.ndarray
 COARSE = 48  # sizes in the first scan of each rig
 WIDE = 0.1  # relative width above which the middle of an undecided bracket is no threshold
 BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding",

@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.spans import MotionBatch, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
-Array = np.ndarray
 BESIDE = 1e-4  # distance of neighbouring runs for differences, natural sizes
 ROUNDS = 8  # Newton iterations
 CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes,

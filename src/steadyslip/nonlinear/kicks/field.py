@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model.point import OperatingPoint
@@ -13,7 +14,6 @@ from steadyslip.model.scales import natural_scales
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
-Array = np.ndarray
 ROUNDING = 1e-14  # relative rounding error of stresses, in units of the normal stress
 BALANCED = 12  # largest number of Newton iterations for the balance of forces
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.kicks.field import field_of
 from steadyslip.nonlinear.kicks.rest import Rest
 
-Array = np.ndarray
 REACH = 60.0  # range of ln(velocity/drive), to both sides, in which a fold is searched for,
 COUNT = 2401  # at this many velocities first
 BISECTIONS = 60  # halve 2 REACH/COUNT down to rounding

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -29,7 +30,6 @@ from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
 
-Array = np.ndarray
 PATIENCE = 5.0  # factor of time, against that in a scan, for which single motions are followed
 
 

@@ -24,11 +24,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.kicks.field import motion_at
 from steadyslip.nonlinear.kicks.quartic import REACH, Rays, terms
 from steadyslip.nonlinear.kicks.rest import Rest
 
-Array = np.ndarray
 LARGEST, SMALLEST = 4.0, 1e-12  # radius, in natural sizes of the weakest mode
 SHRINK = 0.6  # factor between successive trial radii
 LONG = 30.0  # ratio of slip to all else, in natural sizes, above which a mode is scaled by all else

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.runner import STATUSES, TALLY
 from steadyslip.motion.jobs import automatic_method
 from steadyslip.motion.status import BLOWN_UP, LOST, ending_contact
@@ -40,7 +41,6 @@ from steadyslip.nonlinear.kicks.spans import (
     advanced_runs,
 )
 
-Array = np.ndarray
 MOST_STEPS = 2_000_000  # integration steps, times the effort, after which a motion is undecided
 EARLY, HALFWAY = (
     0.05,

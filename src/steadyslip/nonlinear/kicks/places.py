@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, Problem
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
@@ -18,8 +19,6 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.jobs import Jobs
 from steadyslip.nonlinear.kicks.rest import Rest
-
-Array = np.ndarray
 
 
 def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Problem]:

@@ -17,10 +17,10 @@ from math import factorial
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.kicks.field import slopes_at, solved_at
 from steadyslip.nonlinear.kicks.rest import Rest
 
-Array = np.ndarray
 STEP = 6e-3  # of differences, in natural sizes: the formulas' error, its fourth power, is near that of rounding
 PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # in steps, and the weights of the first and second derivative
 FIRST = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales
 
-Array = np.ndarray
 NEUTRAL = 1e-8  # growth per radian below which small motions count as neither growing nor decaying
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
@@ -23,7 +24,6 @@ from steadyslip.motion.jobs import Jobs
 from steadyslip.nonlinear.kicks.field import normal_stresses, slopes_at, solved_at
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
-Array = np.ndarray
 S = inner_symbol("s", positive=True)
 """The normal stress sought, apart from the rig's own steady one."""
 STEPS = 8  # from the rig's own inputs to the new ones, where the normal stress has no closed form

@@ -18,12 +18,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.neighbourhood import LARGEST
 from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, MotionBatch, advanced_runs
 
-Array = np.ndarray
 DONE = STATUSES.index("done")
 COUNT = 32  # shells, from the ball of `neighbourhood` to a few natural sizes,
 FINE = 24  # shells between the last that falls and the first that rises,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.layout import Final
 from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.model.point import OperatingPoint
@@ -18,7 +19,6 @@ from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.protocol.segments import Segments
 
-Array = np.ndarray
 DOUBTS = (
     "neither near steady sliding nor on a cycle that was found when its longest time was over",
     "the steps of integration allowed for one motion are used up, as where something rings on almost undamped",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import total
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
@@ -32,7 +33,6 @@ from steadyslip.nonlinear.kicks.spans import (
 )
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
 
-Array = np.ndarray
 COARSE = 192  # sizes in the first scan of a single rig
 BLOCK = 48  # sizes simulated at a time
 FINE = 47  # sizes between the ends of a bracket in each round of narrowing

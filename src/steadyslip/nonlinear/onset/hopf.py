@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.checks import Check, check, in_words
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
@@ -36,7 +37,6 @@ from steadyslip.model.range import quasipolynomial, require_range
 from steadyslip.nonlinear.onset.coefficient import Cubic, coefficients
 from steadyslip.nonlinear.onset.high_precision import coefficient as in_digits
 
-Array = np.ndarray
 TRUSTED = 1e-6
 """Error of c1, as a share of it, above which it is computed once more with more digits."""
 WEAK = 1e-9

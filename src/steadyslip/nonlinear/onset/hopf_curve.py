@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.arrays import checked_array
+from steadyslip.core.arrays import Array, checked_array
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.options import checked, finite
@@ -30,7 +30,6 @@ from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve, tur
 from steadyslip.nonlinear.onset.coefficient import coefficients
 from steadyslip.nonlinear.onset.hopf import onsets
 
-Array = np.ndarray
 DECADES = 6.0  # default range of a parameter to each side
 SMALLEST_FREQUENCY = 1e-4  # ratio to the frequency at the start below which the edge counts as one of divergence
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.checks import in_words
 from steadyslip.core.format import format_quantity
 from steadyslip.nonlinear.continuation import Failure
@@ -19,7 +20,6 @@ from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 
-Array = np.ndarray
 MOST_STEPS_BETWEEN = 40  # continuation steps between two neighbours on a branch
 ASIDE = 1e-2  # distance, in unknowns, from an unstable cycle at which a motion begins
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import outside, stress_name, total, totals
+from steadyslip.core.arrays import Array
 from steadyslip.core.checks import Check, as_data, in_words
 from steadyslip.core.errors import SteadyslipError, unknown_name
 from steadyslip.core.format import format_quantity
@@ -28,7 +29,6 @@ from steadyslip.nonlinear.orbits.at_value import CyclesAt, cycles_at, simulation
 from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
 from steadyslip.nonlinear.orbits.ranges import Stretch, checks_of, neighbours, stretches_of
 
-Array = np.ndarray
 PERIODS = 4  # a recurrence is known from the third slip event on, which begins two periods after the start
 
 

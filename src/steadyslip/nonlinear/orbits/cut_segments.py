@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.layout import Recorded
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
-Array = np.ndarray
 NODES = 48  # candidate places of a cut
 MOST_GROWTH = 1e3  # largest growth of deviations within a segment
 QUICK = 30.0  # speed, in units of the mean along the cycle, above which no cut is made

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.format import format_quantity
 from steadyslip.kernels.layout import NUMBER, Recorded, Sampled
 from steadyslip.kernels.runner import LOG_KINDS
@@ -21,7 +22,6 @@ from steadyslip.nonlinear.orbits.cycle import IMPRECISE, RETURNED, Cycle, CycleR
 from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowRunner, FlowSetting, passages, states_between
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
-Array = np.ndarray
 PRIMES = np.array(
     [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31]
 )  # how often a cycle may be counted round; others are products

@@ -15,7 +15,6 @@ from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.special import BranchPoint, lies_between
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, USED_UP, Tracer, orbit_of
 
-Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a piece broke off to the end of the range
 AHEAD = 2.0  # initial displacement of a motion beside steady sliding, natural sizes of slip
 PATIENCE = 12  # stretches of motion within which it has to reach a cycle

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
@@ -30,7 +31,6 @@ from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.protocol.segments import Segments
 
-Array = np.ndarray
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
 STIFF = "rodas5p"  # Rosenbrock method of order 5, as tolerances are tight

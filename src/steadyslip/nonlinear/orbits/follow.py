@@ -30,7 +30,6 @@ from steadyslip.nonlinear.orbits.ranges import is_open, is_undecided
 from steadyslip.nonlinear.orbits.special import MET, SMALL, log_features
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, Tracer, orbit_of
 
-Array = np.ndarray
 SMALLEST = 1e-12  # smallest amplitude of ln v: some thousand roundings of the velocity
 FINER, FINEST = 1e-2, 1e-13  # factor of rtol for recomputed cycles, and the smallest rtol above rounding
 MOST_REPEATED = 20  # largest number of recomputed cycles: where more fail, the user should ask for a smaller rtol

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
@@ -22,7 +23,6 @@ from steadyslip.motion.status import remedy
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.flow import FlowRunner, FlowSetting
 
-Array = np.ndarray
 DIFFERENCE = 1e-5  # relative step of the parameter for central differences of the constants
 
 

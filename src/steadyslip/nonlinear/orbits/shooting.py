@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly
 from steadyslip.nonlinear.continuation import Failure, SolutionCurve
 from steadyslip.nonlinear.orbits.flow import FlowRunner, FlowSetting, passages
 
-Array = np.ndarray
 ONE = np.ones(1)
 ROUNDED = 300.0  # allowed last Newton step, in roundings of the state, where steps no longer shrink,
 FAR = 0.1  # residual of a prediction that is off by more than the equations are straight

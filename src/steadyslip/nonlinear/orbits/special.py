@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.continuation import Failure, Point
 from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
-Array = np.ndarray
 NOISE = 3e-9  # relative difference of parameter values below which they agree within rounding, near the onset
 MET = 2e-3  # difference of the logarithms of period and velocities below which cycles are the same
 BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the parameter; chosen by trial

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.onset.hopf import Onset
@@ -21,7 +22,6 @@ from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
-Array = np.ndarray
 LARGEST_STEP = 0.5  # largest step of arclength; unknowns are logarithms, so about a factor 1.6 of a state
 HALVINGS = 3  # halvings of a step in which a test function may vanish twice: down to 1/8, 1/16 of a natural size
 SMALLEST_STEP = 1e-9  # smallest step of arclength, the order of the Newton tolerance

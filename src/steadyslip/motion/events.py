@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class Event(Displayed):
     shear_stress: float
     spring_stress: float
     slip: float
+    contact: ClassVar[str] = ""  # the only one
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class SlipEvent(Displayed):
     recurrence: float
     rings: int
     ring_frequency: float
+    contact: ClassVar[str] = ""  # the only one
 
 
 @dataclass(frozen=True)
@@ -192,11 +195,9 @@ def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> 
 
 def slip_events(events: Sequence[AnyEvent]) -> tuple[AnySlip, ...]:
     """Complete slip events of a run, without one that is still going on at the end."""
-    contacts = list(dict.fromkeys(event.contact if isinstance(event, ContactEvent) else "" for event in events))
     found: list[AnySlip] = []
-    for name in contacts:
-        own = [one for one in events if not isinstance(one, ContactEvent) or one.contact == name]
-        found += _slips(own)
+    for name in dict.fromkeys(event.contact for event in events):
+        found += _slips([one for one in events if one.contact == name])
     return tuple(sorted(found, key=lambda one: one.end))
 
 

@@ -18,7 +18,7 @@ from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
-from steadyslip.motion.events import AnySlip, ContactEvent, ContactSlip, Event, SlipEvent, slip_events
+from steadyslip.motion.events import AnySlip, ContactSlip, Event, SlipEvent, slip_events
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.sentence import sentences
 from steadyslip.motion.status import remedy
@@ -47,7 +47,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def contact(self) -> str:
         """Contact of a machine at which a run ended early (lost, or the fastest in a blow-up); else empty."""
         last = next((e for e in reversed(self.events) if e.kind == self.status), None)
-        return last.contact if isinstance(last, ContactEvent) else ""
+        return last.contact if last else ""
 
     @cached_property
     def slip_events(self) -> tuple[AnySlip, ...]:

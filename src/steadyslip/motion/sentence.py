@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from steadyslip.core.format import format_quantity
-from steadyslip.motion.events import AnyEvent, AnySlip, ContactEvent, ContactSlip
+from steadyslip.motion.events import AnyEvent, AnySlip, ContactSlip
 
 JUDDERS = {
     "again": "judders: every {every} it {waits}, then slips {slip} within {within}, a drop of {drop}",
@@ -56,14 +56,10 @@ def sentence(events: Sequence[AnyEvent], slips: Sequence[AnySlip], area: float |
 def sentences(events: Sequence[AnyEvent], slips: Sequence[AnySlip], area: float | None = None) -> dict[str, str]:
     """Sentence of each contact that slips, by name ("" for a slider's)."""
     found = {}
-    for name in dict.fromkeys(_contact(one) for one in slips):
-        own = [one for one in events if _contact(one) == name], [one for one in slips if _contact(one) == name]
+    for name in dict.fromkeys(one.contact for one in slips):
+        own = [one for one in events if one.contact == name], [one for one in slips if one.contact == name]
         found[name] = sentence(*own, area)
     return found
-
-
-def _contact(one: AnyEvent | AnySlip) -> str:
-    return one.contact if isinstance(one, ContactEvent | ContactSlip) else ""
 
 
 def _stuck(events: Sequence[AnyEvent], last: AnySlip) -> bool:

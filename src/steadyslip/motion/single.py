@@ -23,7 +23,7 @@ from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
-from steadyslip.motion.events import AnyEvent, ContactEvent, event_of, events_of
+from steadyslip.motion.events import AnyEvent, event_of, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.result import History
@@ -219,7 +219,7 @@ def _velocities(
         first, samples = i * len(TALLY), found[f"{name}.slip_rate" if name else "v"]
         known = [float(outcome.tally[0, first + TALLY.index(of)]) for of in ("lowest_velocity", "peak_velocity")]
         known += [float(samples.min()), float(samples.max())] if len(samples) else []
-        known += [e.velocity for e in events if not isinstance(e, ContactEvent) or e.contact == name]
+        known += [e.velocity for e in events if e.contact == name]
         finite = [v for v in known if math.isfinite(v)]
         each[name] = (min(finite), max(finite)) if finite else (math.nan, math.nan)
     return each if contacts[0] else each[""]

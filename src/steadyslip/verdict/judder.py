@@ -10,7 +10,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
-from steadyslip.motion.events import AnyEvent, AnySlip, ContactEvent, ContactSlip
+from steadyslip.motion.events import AnySlip
 from steadyslip.motion.sentence import DIGITS
 from steadyslip.protocol import VelocityStep
 
@@ -59,9 +59,9 @@ def repeats(run: History) -> bool:
     visible it would grow by more than `ALIKE`.
     """
     half = 0.5 * float(run["t"][-1])
-    names = {_contact(one) for one in run.slip_events if one.slip > 0}
+    names = {one.contact for one in run.slip_events if one.slip > 0}
     late = [one for one in run.slip_events if one.slip > 0 and one.begin > half]
-    return bool(names) and all(_alike([one for one in late if _contact(one) == name]) for name in names)
+    return bool(names) and all(_alike([one for one in late if one.contact == name]) for name in names)
 
 
 def swings(run: History, rate: float) -> dict[str, tuple[float, float, float]]:
@@ -76,8 +76,8 @@ def swings(run: History, rate: float) -> dict[str, tuple[float, float, float]]:
     if run.slip_events or rate * half < math.log(2):
         return {}
     found = {}
-    for name in dict.fromkeys(_contact(one) for one in run.events):
-        late = [one for one in run.events if _contact(one) == name and one.time > half]
+    for name in dict.fromkeys(one.contact for one in run.events):
+        late = [one for one in run.events if one.contact == name and one.time > half]
         peaks, troughs = ([one for one in late if one.kind == f"velocity {kind}"] for kind in ("peak", "trough"))
         sizes = [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
         if len(sizes) > 1 and max(sizes) < BEATS * min(sizes):
@@ -91,10 +91,6 @@ def _alike(events: list[AnySlip]) -> bool:
         math.isclose(getattr(one, what), getattr(events[-1], what), rel_tol=ALIKE)
         for one in events for what in ("slip", "recurrence")
     )  # fmt: skip
-
-
-def _contact(one: AnyEvent | AnySlip) -> str:
-    return one.contact if isinstance(one, ContactEvent | ContactSlip) else ""
 
 
 def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0) -> str:

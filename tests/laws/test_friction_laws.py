@@ -16,6 +16,12 @@ def test_contract(law, check):
     check(law, WEAKENING if isinstance(law, StribeckCurve) else Conditions())
 
 
+def test_contract_reaches_every_friction_law():
+    assert {type(law) for law in LAWS} == {
+        law for law in ss.laws.FrictionLaw.registry.values() if law.__module__.startswith("steadyslip.")
+    }
+
+
 @pytest.mark.parametrize(
     ("arguments", "name", "words"),
     [

@@ -126,7 +126,7 @@ def check_room(path: Path) -> Path:
         If it is a folder.
     """
     if path.is_dir():
-        raise UnreadableFile(str(path), "it is a folder, where a file belongs; remove it")
+        raise UnreadableFile(str(path), "it is a folder, not a file; give another name, or move the folder")
     return path
 
 

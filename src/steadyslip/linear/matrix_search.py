@@ -24,14 +24,14 @@ from steadyslip.model.numeric.pencil import ILL_POSED, UNDECIDED, StatePencil
 
 _SHARE = 4  # samples are fewer than those of a small machine by this factor: 10 per decade
 _BRACKET = 1e-9  # relative width to which a bracket is narrowed by counting; then Newton's method
-_NEAR = 1e-3  # from which Newton's method mostly gets there too
-_BESIDE = 1e-3  # share of a bracket from the end of steady sliding at which stability there is asked
+_NEAR = 1e-3  # relative width of a bracket from which Newton's method mostly converges
+_BESIDE = 1e-3  # stability at the end of steady sliding is asked this share of the bracket inside it
 _FAR = 1e12  # ratio of two values beyond which the lower is a zero that rounding hides
 _PARTS = 32  # of a bracket of a small machine, counted together
 _HALVINGS = 60  # of a bracket at most: to neighbouring numbers
 _SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of a response
 _TOGETHER = 2**20  # numbers of matrices that are treated together, 8 MiB
-_NEWTON = 12  # steps from there, quadratic
+_NEWTON = 12  # steps of Newton's method at most; its convergence is quadratic
 _LIKELY = 3  # eigenvalues nearest to the axis, by either measure, that are tried as the one that crosses
 _REACH = 4.0  # widths of the bracket that Newton's method may go
 _LAST = 4 * np.finfo(float).eps  # relative step at which Newton's method has ended

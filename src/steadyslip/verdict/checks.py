@@ -220,13 +220,15 @@ def edge_checks(
     shares, touching = np.full(len(edges), np.inf), np.full(len(edges), np.inf)
     with at_most(_TERMS):
         posed = np.array([edge.kind != "ill-posed" for _, edge in edges])
-        several = len(operating_point(rig, branch=branch).model.delays) > 1  # too many roots close to ill-posed ones
+        # with several delays too many roots lie near an ill-posed edge to be counted: its sides are not asked
+        several = len(operating_point(rig, branch=branch).model.delays) > 1
         _find_sides(rig, edges, shares, SIDE_OFFSETS, branch, posed | (not several))
         lost = np.flatnonzero(np.isinf(shares) & posed)
         touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
         alone = [_room(*one) > max(FURTHER_OFFSETS) for one in edges]
         slow = ~posed | ((touching <= AXIS_TOLERANCE) & alone)
-        for some in np.eye(len(edges), dtype=bool)[slow] if several else (slow,):  # as many roots as may be counted
+        # with several delays one edge at a time, so that the work stays within `at_most`
+        for some in np.eye(len(edges), dtype=bool)[slow] if several else (slow,):
             _find_sides(rig, edges, shares, FURTHER_OFFSETS[::-1] if several else FURTHER_OFFSETS, branch, some)
     lost = np.flatnonzero(np.isinf(shares))
     for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
-    """Rows (label, text) on steady sliding, and on what T, the force that presses a contact, contains."""
+    """Rows (label, text) on steady sliding, and on the links whose pull T sets a normal force."""
     pulls = [row for name in analysis.rig.contacts for row in _pull(analysis.rig, name)]
     return [("steady sliding", _sliding(analysis.steady)), *pulls]
 
@@ -37,7 +37,7 @@ def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
-    """Row (label, text) on what T, the force that presses a contact, contains; none if one link alone."""
+    """Row (label, text) naming the links whose pull T sets a contact's normal force; none where there is one link."""
     surface = machine.contacts[name]
     at = [link for link, one in machine.links.items() if surface.held in one.between and "x" in one.directions()]
     controlled = machine.drive.driven() == surface.held

@@ -166,7 +166,7 @@ def threshold_words(kick: Threshold) -> str:
     reason = f" ({kick.doubt})" if kick.doubt else ""
     why = "stopped, not known" if kick.interrupted else "undecided"
     if math.isnan(kick.size) and kick.bracket[0] == 0:
-        return f"{why} from the smallest {name}{at} on{reason}"
+        return f"{why} for every {name}{at}, even the smallest tried{reason}"
     if math.isnan(kick.size):
         most = format_quantity(kick.survived, kick.unit, area=kick.area)
         return f"survives {what.format(at=at)} {most} and all smaller that were tried; {why} beyond{reason}"

@@ -228,7 +228,7 @@ MIN_HOLD, MAX_HOLD = 1e-3, 1e5  # bounds of the rest before a record that begins
 
 
 def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool) -> list[Unknown]:
-    """Unknown lag, s, of friction behind its loading; unknown duration, s, of the rest before a record at rest."""
+    """Unknowns of a record's start: lag (s) of friction behind the loading, hold (s) before one that begins at rest."""
     label = "" if record is None else f"@{record + 1}"
     found = []
     if lag:

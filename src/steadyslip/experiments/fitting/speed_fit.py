@@ -298,10 +298,10 @@ def fit_loop(loop: PreslidingLoop) -> BristleStiffness:
         If the loop has too few rows, or its force does not follow the displacement.
     """
     x, f = loop.displacement, loop.force
-    if len(x) < FEWEST_ROWS or not np.ptp(x) > 0 or not np.ptp(f) > 0:
-        raise NotAvailable(
-            f"{loop.source!r} has {len(x)} rows of displacement and force; a loop has {FEWEST_ROWS} at least, and moves"
-        )
+    if len(x) < FEWEST_ROWS:
+        raise NotAvailable(f"{loop.source!r} has {len(x)} rows of a loop; allowed: {FEWEST_ROWS} or more")
+    if still := [name for name, column in (("displacement", x), ("force", f)) if not np.ptp(column) > 0]:
+        raise NotAvailable(f"{loop.source!r}: its {still[0]} is the same in all rows; a loop goes forward and back")
     steps = np.diff(x)
     large = np.abs(steps) > LEAST_RISE * np.abs(steps).max()
     steep = float(np.median(np.diff(f)[large] / steps[large]))

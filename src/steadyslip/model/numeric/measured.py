@@ -107,8 +107,8 @@ def _steady_stresses(site: Site) -> tuple[float, float]:
     found = site.laws.steady(site.own, site.velocity, 1.0, 0.0, 0.0, 0.0, site.stiffness)
     if found.by_spring or found.by_friction or found.by_distance:
         raise NotAvailable(
-            f"contacts.{site.name}: a measured response does not tell the normal force of steady sliding; give it, "
-            "steady_normal_stress of the law 'compliant', or a constant one"
+            f"contacts.{site.name}: a measured response does not tell the normal force of steady sliding; "
+            "give steady_normal_stress in the law 'compliant', or use a law with constant normal force"
         )
     sigma = float(found.pressed)
     steady = site.laws.steady(site.own, site.velocity, sigma, 0.0, 0.0, 0.0, site.stiffness)

@@ -119,7 +119,7 @@ class Threshold(Displayed):
         if np.isnan(self.size):
             beyond = "stopped there" if self.interrupted else f"undecided beyond ({self.doubt})"
             if low == 0 and not self.interrupted:
-                return f"{what}: undecided from the smallest that was tried on ({self.doubt})"
+                return f"{what}: undecided for every size, even the smallest tried ({self.doubt})"
             most = format_quantity(self.survived, self.unit, 4, self.area)
             return f"{what}: all that were tried are survived up to {most} (size {low:.4g}); {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""

@@ -66,10 +66,13 @@ def test_cycles_follow_the_drive_or_link_nearest_to_an_edge(monkeypatch, tmp_pat
     asked = []
     branch = SimpleNamespace(at_rig=())
     monkeypatch.setattr(commands, "cycles", lambda rig, along, **_: asked.append(along) or branch)
-    commands.cycles_of_file(path, (), None, None, 1)
-    commands.cycles_of_file(path, (), "drive.kd", None, 1)
-    commands.cycles_of_file("examples/stick-slip.toml", (), None, None, 1)
+    monkeypatch.setattr(commands, "own_motion", lambda rig, along: f"of {along}")
+    said = []
+    commands.cycles_of_file(path, (), None, None, 1, said.append)
+    commands.cycles_of_file(path, (), "drive.kd", None, 1, said.append)
+    commands.cycles_of_file("examples/stick-slip.toml", (), None, None, 1, said.append)
     assert asked == ["drive.kp", "drive.kd", "stiffness"]
+    assert said == ["of drive.velocity", "of drive.kd", "of drive.velocity"]
 
 
 def test_what_turns_is_in_angles():

@@ -68,7 +68,7 @@ def cycles(
     from steadyslip.nonlinear.cycle_commands import ENDINGS, cycles_of_file, write_branch
 
     check_output(output or (), ENDINGS)
-    branch = cycles_of_file(rig, changes or (), along, between, doublings)
+    branch = cycles_of_file(rig, changes or (), along, between, doublings, partial(typer.secho, err=True))
     output_result(branch, output or (), as_json, partial(write_branch, source=rig))
 
 

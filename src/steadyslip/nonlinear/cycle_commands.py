@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +33,7 @@ from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.kicks import kick_problems, kicks_of
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
+from steadyslip.nonlinear.orbits.at_value import own_motion
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.follow import cycles
@@ -44,14 +45,19 @@ ANSWERED = (".csv", ".html", *FIGURES)
 
 def cycles_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], along: str | None, between: Sequence[str] | None,
-    doublings: int,
+    doublings: int, say: Callable[[str], None],
 ) -> CycleBranch:  # fmt: skip
     """`steadyslip.cycles` for the rig of a file; shows progress on a terminal.
 
     Unless a parameter is given along the stiffness of a slider, of a machine along the parameter of a link or of the
-    drive whose edge of oscillation is the nearest.
+    drive whose edge of oscillation is the nearest. What the rig does as it is takes a second and is passed to `say`
+    before the branch, which may take many, is followed.
     """
     rig = read_rig(path, changes)
+    with progress_text("the motion of the rig itself"):
+        own = own_motion(rig, along or "drive.velocity")
+    if own:
+        say(own)
     along = along or rig.default_along or _nearest_oscillation(rig)
     with progress_text("following cycles; Ctrl-C keeps what there is") as said:
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -10,17 +11,22 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.checks import in_words
+from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.format import format_quantity
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.motion import simulate
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import motion_from
 from steadyslip.nonlinear.orbits.cycle_search import AHEAD, PATIENCE
 from steadyslip.nonlinear.orbits.parameter_flow import Flow
-from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of
+from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of, is_open
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 
 MOST_STEPS_BETWEEN = 40  # continuation steps between two neighbours on a branch
+PERIODS = 4  # a recurrence is known from the third slip event on, which begins two periods after the start
 ASIDE = 1e-2  # distance, in unknowns, from an unstable cycle at which a motion begins
 
 
@@ -138,6 +144,30 @@ def _row(cycle: Cycle, multiple: int) -> tuple[str, str]:
     return name, f"period {format_quantity(cycle.period, 's')}{of}, velocity {low} to {high}"
 
 
+def slip_sentence(rig: Slider | Machine, cycle: Cycle, steady: int = 0) -> str:
+    """Sentence on the slip events of a cycle of the rig itself, from `PERIODS` periods; empty if there are none."""
+    with suppress(SteadyslipError):
+        return simulate(rig, until=PERIODS * cycle.period, initial=cycle.start, branch=steady).sentence
+    return ""
+
+
+def own_motion(rig: Slider | Machine, along: str) -> str:
+    """Sentence on what a rig does as it is, beside steady sliding: the cycle that it comes to, with its slip events.
+
+    Empty where its motion cannot be computed. `along` is the name of a parameter that the rig has.
+    """
+    with suppress(SteadyslipError, Failure, np.linalg.LinAlgError):
+        name = rig.parameter_along(along)
+        flow, value = Flow(rig, name), float(rig.value(name) or 0.0)
+        seen = motion_from(flow, flow.ahead(value, AHEAD), value, PATIENCE, attracts=True)
+        if seen.cycle is None:
+            return f"the rig itself {seen.words}"
+        period = format_quantity(seen.cycle.period, "s", 7)
+        sentence = slip_sentence(rig, seen.cycle)
+        return f"the rig itself comes to a stable cycle of period {period}" + (f"; it {sentence}" if sentence else "")
+    return ""
+
+
 def simulations(
     onset: Onset, steady: int, rtol: float | None, value: float, beside: Sequence[Cycle]
 ) -> list[Simulation]:  # fmt: skip
@@ -176,10 +206,18 @@ def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | 
         if one.value == value:
             return one
         try:
-            return _reached(tracer, one, other, value)
+            return _closed(tracer, _reached(tracer, one, other, value))
         except (Failure, np.linalg.LinAlgError):
             continue
     return None
+
+
+def _closed(tracer: Tracer, cycle: Cycle) -> Cycle:
+    """The cycle, solved again from the motion that begins on it where it attracts but does not close well enough."""
+    if not (is_open(cycle) and cycle.stable):
+        return cycle
+    again = motion_from(tracer.flow, orbit_of(cycle).states[0], cycle.value, attracts=True).cycle
+    return again if again is not None and again.is_like(cycle) else cycle
 
 
 def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:

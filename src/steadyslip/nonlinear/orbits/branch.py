@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
@@ -15,7 +14,7 @@ import numpy as np
 from steadyslip.core.areas import outside, stress_name, total, totals
 from steadyslip.core.arrays import Array
 from steadyslip.core.checks import Check, as_data, in_words
-from steadyslip.core.errors import SteadyslipError, unknown_name
+from steadyslip.core.errors import unknown_name
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -23,13 +22,10 @@ from steadyslip.core.version import version
 from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.motion import simulate
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.at_value import CyclesAt, cycles_at, simulations
+from steadyslip.nonlinear.orbits.at_value import CyclesAt, cycles_at, simulations, slip_sentence
 from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
 from steadyslip.nonlinear.orbits.ranges import Stretch, checks_of, neighbours, stretches_of
-
-PERIODS = 4  # a recurrence is known from the third slip event on, which begins two periods after the start
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,18 +149,11 @@ class CycleBranch(Displayed):
     def at_rig(self) -> CyclesAt:
         """The cycles at the rig's own value of the parameter, as of `at`, computed once.
 
-        Its ``sentence`` tells the slip events of the last stable cycle, from a run of `PERIODS` of its periods.
+        Its ``sentence`` tells the slip events of the last stable cycle.
         """
         found = self.at(float(self.rig.value(self.along) or 0.0))
         stable = [one for one in found if one.stable]
-        return found.telling(self._sentence(stable[-1])) if stable else found
-
-    def _sentence(self, cycle: Cycle) -> str:
-        """Sentence on the slip events of a cycle of the rig itself; empty if there are none."""
-        with suppress(SteadyslipError):
-            until = PERIODS * cycle.period
-            return simulate(self.rig, until=until, initial=cycle.start, branch=self.steady).sentence
-        return ""
+        return found.telling(slip_sentence(self.rig, stable[-1], self.steady)) if stable else found
 
     def _between(self, low: Cycle, high: Cycle) -> str:
         """Describe two neighbours between which a cycle lies, for a message."""

@@ -95,7 +95,7 @@ class Cycle(Displayed):
         Distance of the end of one period from its start, by an integration of the motion alone, as a share of the
         cycle's size: logarithms of large states, shares of natural sizes of small ones.
     returned : float
-        Largest distance between returns of the simulated motion that led to the cycle, a period apart, over at least
+        Largest distance between returns of the simulated motion that led to the cycle, a period apart, over its last
         two periods, in the same measure; NaN if none did.
     """
 

@@ -277,7 +277,8 @@ def _stretches(
             sticks = sticks or len(slips.times) > 0
             state, unknowns = outcome.state[0], outcome.unknowns[0]
             now, spent = now + span, spent + len(record)
-            span *= 2.0 if max(len(slips.times), len(passes.times)) < RETURNS // 2 else 1.0
+            returned = len(slips.times) if sticks else len(passes.times)  # ringing in between is no measure of a period
+            span *= 2.0 if returned < RETURNS // 2 else 1.0
         seen = slips if len(slips.times) > 1 and _since(slips, passes) < RINGS * RETURNS else passes
         times, states = seen.times[-RETURNS:], seen.states[-RETURNS:]
         if len(times) < 2:
@@ -334,6 +335,7 @@ def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle 
     period = seen.times[-1] - seen.times[-1 - back]
     if not period > 0:  # returns within rounding of each other
         return None
+    runs.begin_motion()
     guess = shooting.packed(Orbit(seen.states[-1:], period, value))
     still = np.eye(len(guess))[-1]  # the parameter stays
     try:
@@ -348,10 +350,11 @@ def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle 
 
 
 def _returned(runs: FlowRunner, seen: _Stretch, back: int) -> float:
-    """Largest distance between returns of the motion a period apart, over at least two periods; NaN if it had fewer.
+    """Largest distance between returns of the motion a period apart, over the last two periods; NaN if it had fewer.
 
     Where a bristle rings between long rests, deviations grow and shrink by many decades within a period, and the
     multipliers lose their digits; the motion does not.
     """
     places = np.arcsinh(seen.states / runs.scales)
-    return float(np.abs(places[back:] - places[:-back]).max()) if len(places) > 2 * back else np.nan
+    last = places[-2 * back - 1 :]
+    return float(np.abs(last[back:] - last[:-back]).max()) if len(places) > 2 * back else np.nan

@@ -227,6 +227,10 @@ class FlowRunner:
 
     # -- runs
 
+    def begin_motion(self) -> None:
+        """Forget how many steps the last run took: the next is of another motion, perhaps far longer."""
+        self._usual = MOST_STEPS
+
     def run(
         self, setting: FlowSetting, states: Array, times: Array, amplitude: float = 1.0
     ) -> tuple[Array, Array, Array]:

@@ -1,5 +1,6 @@
 """Motion that rests, turns round or ends, and what comes back of it."""
 
+import re
 import sys
 from types import SimpleNamespace
 
@@ -12,6 +13,20 @@ from rigs_of_theory import rate_state, rig
 from steadyslip.kernels.layout import Setting
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
+
+# -- nothing disturbs it
+
+
+@pytest.mark.parametrize("late", [(), (ss.protocol.VelocityStep(at=20.0, to=2e-6),)], ids=["without", "too late"])
+def test_an_undisturbed_run_says_how_to_disturb_it(late):
+    """By a step of the velocity that moves it; steady sliding goes on however unstable it is."""
+    a_rig = rig(friction=rate_state(evolution=ss.laws.Aging()), stiffness=9e9)
+    run = ss.simulate(a_rig, late, until=10.0)
+    told = re.search(r'were it unstable too; .*disturb it:\n +--protocol "(.*)"\n', run.summary())
+    piece = ss.piece_from_text(told[1], None, a_rig)
+    assert (piece.at, piece.to) == (1.0, pytest.approx(1.1 * a_rig.drive.velocity))
+    assert "were it unstable" not in ss.simulate(a_rig, piece, until=10.0).summary()
+
 
 # -- rest and reversal
 

@@ -157,6 +157,15 @@ def test_a_slider_beside_a_machine_is_refused():
     assert "machine of one body" in done.stderr
 
 
+def test_a_held_axis_is_named_with_what_to_do():
+    held = ss.read_rig("examples/hunting-axis.toml")
+    with pytest.raises(ss.ParameterError, match=r"^second: drive.velocity is 0, .* a speed, .* `steadyslip hunt`"):
+        ss.compare_rigs(ss.read_rig("examples/slow-axis.toml"), held)
+    done = run("compare", "examples/slow-axis.toml", "examples/hunting-axis.toml")
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: examples/hunting-axis.toml: drive.velocity is 0")
+
+
 def test_orders_and_subsets_are_complete():
     assert {tuple(row) for row in between._all_subsets(3)} == set(itertools.product((False, True), repeat=3))
     rows = between._prefixes(np.array([[2, 0, 1]]))

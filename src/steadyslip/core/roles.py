@@ -189,6 +189,8 @@ class Parameter(Entry):
             except (TypeError, ValueError, OverflowError) as error:
                 raise self.refused(value) from error
         if not self.domain.contains(number) and number != self.domain.apart:
+            if (self.domain.low, self.domain.high) == (0, 1) and 1 < number <= 100:
+                raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}; write '{number:g} %'")
             raise self.refused(value)
         # + 0.0 turns -0.0 into 0.0, which equals the default when files are written
         return value if isinstance(value, Placeholder) else number + 0.0

@@ -33,8 +33,11 @@ _BY_NAME = {
 """Words for names that are short for them."""
 _GREEK = dict(zip("alpha beta gamma delta eta theta mu phi sigma tau psi".split(), "αβγδηθμφστψ", strict=True))  # noqa: SIM905
 _DIGITS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_NUMERALS = frozenset("one two three four five six seven eight nine ten first second third last the this that".split())  # noqa: SIM905
+"""Names of members that read as a word of the sentence; they are told with their kind, as letters are."""
 MEMBERS: Final = ("bodies", "links", "contacts")
 """First parts of the names of parameters of a machine's members, which are followed by the member's name."""
+_KINDS = dict(zip(MEMBERS, ("body", "link", "contact"), strict=True))
 
 
 def letter_of(rig: Rig, name: str) -> str:
@@ -74,6 +77,8 @@ def words_of(rig: Rig, name: str) -> str:
         words = f"drive {words or last.replace('_', ' ')}"
     words = words or last.replace("_", " ") * (len(base) > 1)
     member = ".".join([between[0], *(between[2:3] if between[1:2] == ["points"] else [])]) if own and between else ""
+    if member and (len(member) == 1 or member.lower() in _NUMERALS):
+        member = f"{_KINDS[part]} {member}"
     return f"{member} {words}".strip()
 
 

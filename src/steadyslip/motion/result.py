@@ -23,7 +23,8 @@ from steadyslip.motion.history import HistoryData
 from steadyslip.motion.sentence import sentences
 from steadyslip.motion.status import remedy
 
-STEADY_SPREAD = 1e-6  # relative spread of velocity up to which a run counts as steady: ten times the default rtol
+NUDGED, FASTER = 0.1, 1.1  # when (share of a run) and by what factor a step of the drive's velocity is suggested
+STEADY_SPREAD = 1e-4  # relative spread of velocity up to which a run counts as steady: below the digits that are told
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +84,10 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     @property
     def undisturbed(self) -> bool:
         """True if nothing disturbed steady sliding, which then goes on even if it is unstable."""
+        acts = any(float(getattr(piece, "at", 0.0)) < self.end for piece in self.protocol.pieces)
         known = self.velocities.values() if isinstance(self.velocities, dict) else [self.velocities]
         still = all(high - low <= STEADY_SPREAD * abs(high) for low, high in known)
-        return not self.protocol.pieces and still and self.status == "done"
+        return not acts and still and self.status == "done"
 
     def _caveats(self) -> list[str]:
         """Lines that warn of easily misread runs."""
@@ -95,7 +97,12 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         if self.protocol.lets_go:
             lines.append("drive           is let go for some time, and pulls then with a force of its own (creep = 1)")
         if self.undisturbed:
-            lines.append("disturbance     none: steady sliding goes on, were it unstable too; analyze tells")
+            at, unit = format_quantity(NUDGED * self.end, "s"), self.rig.parameters()["drive.velocity"].role.unit
+            to = format_quantity(FASTER * float(self.rig.drive.velocity), unit)
+            lines += [
+                "disturbance     none: steady sliding goes on, were it unstable too; analyze tells, or disturb it:",
+                f"                --protocol \"velocity-step at='{at}' to='{to}'\"",
+            ]
         return lines
 
     def _contacts(self) -> list[str]:

@@ -222,6 +222,7 @@ def compare_rigs(
     if type(first) is not type(second):
         message = "one is a slider and the other a machine; describe the slider as a machine of one body"
         raise ParameterError([Problem("rigs", message)])
+    _check_slides((first, second), names)
     a, b = comparable(first, second)
     found = places(a, b)
     measure, differences = _differences(Between(a, b, found)) if found else ("", ())
@@ -237,9 +238,21 @@ def compare_files(
     """Compare the rigs of two files, with the tolerances that are written there; see `compare_rigs`."""
     kept = list(changes)
     (a, of_a), (b, of_b) = (rig_and_tolerances(path, kept) for path in (first, second))
+    _check_slides((a, b), (str(first), str(second)))
     names = (Path(first).stem, Path(second).stem)
     names = names if names[0] != names[1] else (str(first), str(second))
     return compare_rigs(a, b, tolerances=(of_a or None, of_b or None), names=names)
+
+
+def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> None:
+    """Refuse rigs whose drive holds a place, by name."""
+    message = (
+        "drive.velocity is 0, and verdicts on sliding are compared; give it a speed, such as '1 mm/min', and leave out "
+        "what is of a held place alone, or ask `steadyslip hunt`, ss.hunt(rig) in Python, of either rig"
+    )
+    problems = [Problem(name, message) for rig, name in zip(rigs, names, strict=True) if rig.holds]
+    if problems:
+        raise ParameterError(problems)
 
 
 def _differences(between: Between) -> tuple[str, tuple[Difference, ...]]:

@@ -40,6 +40,7 @@ DESIGN = (
     (PRELOAD,), ("viscous",),
 )  # fmt: skip
 """What a designer chooses, in the order of asking: speed, stiffness, damping, mass, preload, lubricant."""
+OWN_VALUES = "without tolerances this is of the rig's own values, whatever chance is asked for"
 SURE = Tested(
     "a chance between 0 and 1, or text such as '95 %'",
     lambda v: isinstance(v, str) or (isinstance(v, (int, float)) and not isinstance(v, bool) and 0 < v <= 1),
@@ -137,6 +138,8 @@ class Cures(ReadOnly):
     fails : tuple of Window
         For a rig with enough chance as it is: of every parameter whose change would lose it, that first which needs the
         smallest.
+    without_tolerances : bool
+        True if nothing of the rig varies: what is told is then of the rig itself, whatever chance is asked for.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -147,6 +150,7 @@ class Cures(ReadOnly):
     pair: Mapping[str, float]
     pair_cost: float
     fails: tuple[Window, ...]
+    without_tolerances: bool = False
 
     @property
     def best(self) -> Window | None:
@@ -158,13 +162,15 @@ class Cures(ReadOnly):
         wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails))
         now = format_chance(self.chance, self.error) if self.error else stability(self.rig)
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
+        alone = [OWN_VALUES] if self.without_tolerances else []
         if self.chance >= self.sure:
             already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
             near = [one for one in self.fails if one.leaves is not None and distance(one.value, one.leaves) <= FAR]
             lines = [f"{one.parameter:<{wide}}{_change(one, one.leaves)}" for one in near]
             whatever = f"whatever single value changes by less than a factor of {REMOTE}"
-            return "\n".join([f"{already}. What would lose it first:", *lines] if near else [f"{already}, {whatever}"])
-        lines = [f"To be {wanted} (now {now})"]
+            found = [f"{already}. What would lose it first:", *lines] if near else [f"{already}, {whatever}"]
+            return "\n".join([*found, *alone])
+        lines = [f"To be {wanted} (now {now})", *alone]
         if (best := self.best) is not None:
             lines.append(
                 f"cheapest single change: {best.parameter} {_change(best, best.nearest)}, cost {best.cost:.3g}"
@@ -193,6 +199,7 @@ class Cures(ReadOnly):
         found: dict[str, Any] = finite(
             {
                 "sure": self.sure, "chance": self.chance, "error": self.error,
+                "without_tolerances": self.without_tolerances,
                 "best": None if self.best is None else self.best.parameter,
                 "pair": dict(self.pair), "pair_cost": self.pair_cost,
                 "windows": [data(one) for one in self.windows], "fails": [data(one) for one in self.fails],
@@ -244,6 +251,7 @@ def cure(
     >>> rig = ss.read_rig("examples/inclined-spring.toml")
     >>> print(ss.cure(rig, adjust=None))
     To be stable (now unstable)
+    without tolerances this is of the rig's own values, whatever chance is asked for
     cheapest single change: slider.damping from 0 Pa s/m to 57.53 GPa s/m, cost 1
     no pair is cheaper
     drive.velocity    1 um/s now; not reached from 1 nm/s to 1 mm/s
@@ -265,7 +273,7 @@ def cure(
         least = min((one.cost for one in windows), default=math.inf)
         pair, cost = _cheapest_pair(chances, windows, given, wanted, least)
     fails = _fails(chances, windows, wanted) if chance >= wanted else ()
-    return Cures(rig, wanted, chance, error, windows, pair, cost, fails)
+    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, chances.single)
 
 
 def _share(sure: float | str) -> float:

@@ -46,7 +46,7 @@ def told(given, measured, times=()):
         (protocol(1.05 * FAST), 0.0, "from 30 to 45 s the protocol .* at 10.5 um/s, but .* at 10 um/s"),
         (protocol(at=29.5), 0.0, "change to 10 um/s at 29.5 s [45][09].* ms later: it came then, or a servo"),
         (protocol(at=30.2), 0.0, "change to 10 um/s at 30.2 s [12][09].* ms earlier: it came then;"),
-        (protocol(), 0.3, "change to 10 um/s at 30 s [23][09].* ms later: a servo follows it late"),
+        (protocol(), 0.3, "change to 10 um/s at 30 s [23][09].* ms later: the load point follows it late"),
     ],
 )
 def test_a_protocol_that_the_displacement_contradicts_is_told(given, late, said):

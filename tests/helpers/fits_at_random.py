@@ -2,7 +2,7 @@
 
 python tests/helpers/fits_at_random.py KIND 100 1 fits 100 records of a kind with seed 1 and prints a line for each
 (deviations from the truth in standard errors, CPU seconds, whether a servo is named), then what they say together.
-Kinds are those of `DESIGNS`, and the cells of `SERVOS` with the law, such as "aging, overshoot".
+Kinds are those of `DESIGNS`, and the cells of `SERVOS` and `WAYS` with the law, such as "aging, overshoot".
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import steadyslip as ss
-from servo_records import record as servo_record
+from servo_records import WAYS, record as servo_record
 
 SLOW = 1e-6
 SEEN = ("shear_stress", "normal_stress", "load_displacement")
@@ -54,6 +54,9 @@ class Outcome:
 def servo_case(rng: np.random.Generator, kind: str) -> Drawn:
     """Two steps by a servo of a cell."""
     law, cell = kind.split(", ")
+    if cell in WAYS:
+        record, rig = servo_record(int(rng.integers(2**31)), evolution=getattr(ss.laws, law.title())(), way=cell)
+        return Drawn(rig, law, record)
     lag, overshoot = (rng.uniform(*ends) if ends[1] else 0.0 for ends in SERVOS[cell])
     record, rig = servo_record(int(rng.integers(2**31)), lag, overshoot, getattr(ss.laws, law.title())())
     return Drawn(rig, law, record)
@@ -183,7 +186,7 @@ def holds(rng: np.random.Generator, kind: str) -> Drawn:
 
 DESIGNS: dict[str, Callable[[np.random.Generator, str], Drawn]] = {
     "steps": steps, "five": five, "stress": stress, "dirty": dirty, "holds": holds,
-} | {f"{law}, {cell}": servo_case for law in ("slip", "aging") for cell in SERVOS}  # fmt: skip
+} | {f"{law}, {cell}": servo_case for law in ("slip", "aging") for cell in (*SERVOS, *WAYS)}  # fmt: skip
 
 
 def drawn(kind: str, count: int, seed: int) -> Iterator[Drawn]:
@@ -209,7 +212,7 @@ def outcome(one: Drawn) -> Outcome:
         for i, estimate in enumerate(fit.estimates)
         if estimate.name in truth and estimate.determined and estimate.name != "friction.mu_ref"
     }
-    servo = any(change.lag for loading in fit.plan.loading for _, _, change in loading.changes)
+    servo = any(change.lag or change.pieces for loading in fit.plan.loading for _, _, change in loading.changes)
     return Outcome(z, seconds, servo, fit.whiteness.p, fit.ssq)
 
 

@@ -35,6 +35,21 @@ def response(since, lag, overshoot):
     return 1 - np.exp(-zeta * omega * since) * (np.cos(fast * since) + zeta * omega / fast * np.sin(fast * since))
 
 
+def first_order(since, lag):
+    """Share made `since` (s) by a first-order lag."""
+    return -np.expm1(-np.maximum(since, 0.0) / lag)
+
+
+WAYS = {
+    "creep": lambda since: 0.85 * first_order(since, 0.25) + 0.15 * first_order(since, 4.0),
+    "two times": lambda since: 0.6 * first_order(since, 0.1) + 0.4 * first_order(since, 1.2),
+    "stick": lambda since: (since > 0.5) * (1 + 0.6 * (1 - first_order(since - 0.5, 0.5))),
+    "corner": lambda since: np.interp(since, [0, 0.4, 1.6], [0, 0.7, 1]),
+    "curve": lambda since: 0.5 - 0.5 * np.cos(np.pi * np.clip(since / 1.2, 0, 1)),
+}
+"""Shares of a change made by load points that follow in ways that are none of a servo of second order."""
+
+
 def record(
     seed,
     lag=0.0,
@@ -44,6 +59,7 @@ def record(
     sensor=5e-8,
     rate=10.0,
     steps=((60.13, 10e-6), (110.37, 1e-6)),
+    way=None,
 ):
     """A noisy record, and the rig behind it."""
     chance = np.random.default_rng(seed)
@@ -61,7 +77,7 @@ def record(
     fine = fine[fine <= until]
     v, before = np.full(len(fine), SLOW), SLOW
     for at, to in steps:
-        v += (to - before) * response(fine - at, lag, overshoot)
+        v += (to - before) * (WAYS[way](fine - at) if way else response(fine - at, lag, overshoot))
         before = to
     place = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(fine))])
     piece = ss.protocol.LoadPointTable(time=tuple(fine), displacement=tuple(place))

@@ -180,11 +180,15 @@ class StepTable(Displayed):
         memories = [one.name for one in parts if one is not evolution and hasattr(one, "name")]
         kind += "" if law.forgets_stress() else "".join(f", {name} memory of normal stress" for name in memories)
         free = [name for name, one in line.estimates().items() if one not in self.joint.derived]
-        late = [one for loading in plan.loading if loading.load for one in loading.load.changes if one.lag]
+        changes = [one for loading in plan.loading if loading.load for one in loading.load.changes]
+        late = [one for one in changes if one.lag]
         further = [
             f"The load point was taken to follow changes of its rate late, as a servo of second order does (by "
             f"{format_quantity(late[0].lag, 's')} in the end)."
             if late
+            else "",
+            "Around changes of its rate the load point was taken to move as measured, in straight pieces of the rate."
+            if any(one.pieces for one in changes)
             else "",
             f"A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else "",
             "A constant was added to friction." if plan.offset else "",

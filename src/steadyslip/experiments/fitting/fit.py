@@ -26,9 +26,11 @@ from steadyslip.experiments.fitting.search import (
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
+from steadyslip.experiments.loading.loading import as_followed
 from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
@@ -166,8 +168,22 @@ def search_fit(
     starts: int = STARTS, effort: float = 1.0, threads: int | None = None, progress: Progress | None = None,
     **options: Any,
 ) -> Fit:  # fmt: skip
-    """Fit a rig to records as `fit` does, without the short refits that are told beside it."""
+    """Fit a rig to records as `fit` does, without the short refits that are told beside it.
+
+    Where a displacement around changes is beside the commanded loading, and friction is not fitted to its noise with
+    the load point that follows it, friction tells if it does: else the sensor has glitches there.
+    """
+    search: Any = {"errors": errors, "starts": starts, "effort": effort, "threads": threads, "progress": progress}
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
+    if plan.follows and any(one.load and one.load.otherwise for one in plan.loading):
+        many = records if isinstance(records, (list, tuple)) else (records,)
+        followed, commanded = (
+            [replace(one, commanded=as_followed(one.loading, pieces)) for one in many] for pieces in (True, False)
+        )
+        fits = [search_fit(rig, followed, free, **search, **options)]
+        if fits[0].whiteness.p < STRUCTURE:
+            fits += [search_fit(rig, commanded, free, **search, **options)]
+        return min(fits, key=lambda one: one.rms)
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
@@ -176,10 +192,7 @@ def search_fit(
         if plan.loss == "linear" and options.get("weights") is None:
             kept = _without_outliers(plan, found)
             if any(map(operator.is_not, kept, plan.records)):
-                return search_fit(
-                    rig, kept, free, errors=errors, starts=starts, effort=effort, threads=threads, progress=progress,
-                    **options,
-                )  # fmt: skip
+                return search_fit(rig, kept, free, **search, **options)
     else:  # outliers shift the first fit and widen its scatter; the width shrinks as their weight does
         found = find_minimum(replace(plan, loss="linear"), starts, allowed, progress)
         last = np.inf

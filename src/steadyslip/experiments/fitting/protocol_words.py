@@ -77,9 +77,9 @@ def _late(source: str, stretches: list[_Stretch], course: Course | None) -> str:
         if abs(behind) > max(BEYOND * noise * np.sqrt(1 / before.count + 1 / after.count), noise):
             late = behind / (after.rate - before.rate)
             when = f"{format_quantity(abs(late), 's')} {'later' if late > 0 else 'earlier'}"
-            lags = course is not None and any(change.lag for change in course.changes)
+            lags = course is not None and any(change.lag or change.pieces for change in course.changes)
             why = (
-                "a servo follows it late"
+                "the load point follows it late"
                 if lags
                 else "it came then, or a servo follows it"
                 if late > 0

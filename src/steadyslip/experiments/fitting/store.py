@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import astuple, fields, replace
+from itertools import chain
 from os import PathLike
 from typing import Any, TypeVar
 
@@ -38,8 +39,8 @@ _OPTIONS = {
     "calibrated": {float, None}, "rtol": float,
 }  # fmt: skip
 _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
-_CHANGE = {(float,) * 8, (float,) * len(fields(Change))}
-_COURSE = (float, [_CHANGE], [float], [_CURVE], float, int, int, int, int, [(float, float)])
+_NUMBERS = len(fields(Change)) - 1  # of a change in files, without its pieces; 8 before there were lags
+_COURSE = (float, [[float]], [float], [_CURVE], float, int, int, int, int, [(float, float)])
 _COLUMNS = (*ROLES, "worth")
 RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
@@ -237,7 +238,7 @@ def _loading_to_json(loading: Loading | None) -> Any:
 
 
 def _course_to_json(course: Course) -> list[Any]:
-    changes = [list(astuple(change)) for change in course.changes]
+    changes = [[*astuple(change)[:-1], *chain.from_iterable(change.pieces)] for change in course.changes]
     return [course.first, changes, list(course.errors), _curves_to_json(course.curve), course.strays, course.slips,
             course.glitches, course.early, course.late, [list(one) for one in course.servos]]  # fmt: skip
 
@@ -255,7 +256,7 @@ def _loading_from_json(table: ExpectedTable, written: list[Any]) -> Loading | No
     try:
         load, stress, pore = (_course_from_json(one[0]) if one else None for one in written)
     except ValueError as error:
-        raise table.fault(f"a curve of its loading {error}") from error
+        raise table.fault(f"its loading {error}") from error
     return Loading(load, stress, pore)
 
 
@@ -265,8 +266,18 @@ def _course_from_json(one: list[Any]) -> Course:
     curve: Any = None
     if own:
         curve = JoinedCurves([(*ends, smooth) for ends, smooth in own]) if own[0][0] else own[0][1]
-    course = Course(first, tuple(Change(*change) for change in changes), np.array(errors), curve, *rest)
+    course = Course(first, tuple(map(_change_from_json, changes)), np.array(errors), curve, *rest)
     return replace(course, servos=tuple((lag, damping) for lag, damping in servos))
+
+
+def _change_from_json(one: list[float]) -> Change:
+    """Change from its numbers and, after these, three of each of its pieces."""
+    rest = one[_NUMBERS:]
+    if len(one) not in (8, _NUMBERS + 3 * (len(rest) // 3)):
+        raise ValueError(f"has a change of {len(one)} numbers")
+    pieces = tuple(zip(rest[::3], rest[1::3], rest[2::3], strict=True))
+    numbers = dict(zip((item.name for item in fields(Change)), one[:_NUMBERS], strict=False))
+    return Change(**numbers, pieces=pieces)
 
 
 def _record(

@@ -329,7 +329,12 @@ def drive_line(fit: FitNumbers) -> str:
 
 
 def _servo(course: Course) -> str:
-    """Clause on the servo behind the changes of a course; empty without."""
+    """Clause on how the load point follows the changes of a course; empty for steps and ramps."""
+    if any(change.pieces for change in course.changes):
+        return (
+            "; around changes the load point moves as measured, in straight pieces of its rate, because the "
+            "displacement there lies beside steps, ramps and the response of a servo by more than its noise"
+        )
     late = next((change for change in course.changes if change.lag), None)
     if late is None:
         return ""

@@ -1,18 +1,19 @@
-"""How a load point follows its command: at once, along ramps, or late by a servo.
+"""How a load point follows its command: at once, along ramps, late by a servo, or in a way of its own.
 
 Tested on the displacement around each change. SensorSamples far from changes are averaged, as they tell lines alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.joint import OUTLIER, JointFit, SensorSamples, fit_at_once, fit_servo
+from steadyslip.experiments.loading.loading import is_slight
+from steadyslip.experiments.loading.pieces import fit_pieces, is_beside
 from steadyslip.experiments.loading.servo import GAIN, settling
 from steadyslip.experiments.numerics.noise import describe
 
@@ -38,12 +39,20 @@ class Kinks:
         Times at which the level of the sensor seems to change, s from the first sample.
     reach : float
         Shortest time around a change in which nothing else changes, s.
+    glitches : sequence of (float, float)
+        Ends of glitches of the sensor within a line, s from the first sample.
     """
 
     meets: Array
     durations: Array
     levels: Array
     reach: float
+    glitches: Sequence[tuple[float, float]] = ()
+
+    def in_glitch(self, time: Array) -> Array:
+        """True for times (n,) in a glitch of the sensor."""
+        first, last = np.array(self.glitches).reshape(-1, 2).T
+        return np.asarray(np.any((time[:, None] > first) & (time[:, None] < last), axis=1))
 
     @property
     def longest(self) -> float:
@@ -57,8 +66,10 @@ class Kinks:
         return np.asarray(self.levels[~near])
 
 
-def followed(time: Array, values: Array, noise: float, ways: Iterator[Kinks]) -> JointFit:
+def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) -> Iterator[JointFit]:
     """How a load point follows changes of its rate: at once or along ramps, or late by a servo if that fits better.
+
+    Where its displacement is beside each of these, a fit in pieces that follow it comes second.
 
     Parameters
     ----------
@@ -66,14 +77,16 @@ def followed(time: Array, values: Array, noise: float, ways: Iterator[Kinks]) ->
         s from the first sample, m.
     noise : float
         Standard deviation, m.
-    ways : iterator of Kinks
+    ways : sequence of Kinks
         All changes, then fewer and fewer: those that the response of a servo may have made are left out.
     """
     spacing = float(np.median(np.diff(time)))
-    lines = next(ways)
-    best = fit_at_once(_thinned(time, values, noise, lines, lines.levels, spacing), lines.meets, lines.durations)
-    at_once, inflation, most = best.misfit, 0.0, GAIN
-    for kinks in chain([lines], ways):
+    lines = ways[0]
+    best = at_once = fit_at_once(
+        _thinned(time, values, noise, lines, lines.levels, spacing), lines.meets, lines.durations
+    )
+    inflation, most = 0.0, GAIN
+    for kinks in ways:
         levels = kinks.far_levels(spacing)
         samples = _thinned(time, values, noise, kinks, levels, spacing)
         steps = fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets)))
@@ -85,12 +98,22 @@ def followed(time: Array, values: Array, noise: float, ways: Iterator[Kinks]) ->
             continue
         inflation = inflation or _inflation(servo, time, values)
         spared = len(lines.levels) - len(levels) + 2 * (len(lines.meets) - len(kinks.meets))
-        gain = (at_once - servo.misfit) / inflation + spared * GAIN
+        gain = (at_once.misfit - servo.misfit) / inflation + spared * GAIN
         if gain > most:
             most, best = gain, replace(servo, covariance=inflation * servo.covariance)
         if np.all(np.diff(servo.times) > settling(servo.lag, servo.damping)):
             break
-    return best
+    time, values = (column[~lines.in_glitch(time)] for column in (time, values))
+    yield best
+    if not is_beside(time, (values - best.predicted(time)) / noise, lines.meets):
+        return
+    slight = sum(map(is_slight, at_once.rates, at_once.rates[1:]))  # changes that the way of others may have made
+    for kinks in reversed([one for one in ways if len(lines.meets) - len(one.meets) <= slight]):
+        samples = _thinned(time, values, noise, kinks, kinks.far_levels(spacing), spacing)
+        best = fit_pieces(samples, fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets))), spacing)
+        if not is_beside(time, (values - best.predicted(time)) / noise, lines.meets):
+            break
+    yield best
 
 
 def _off(found: JointFit, at: Array, time: Array, values: Array, noise: float, spacing: float) -> list[Array]:

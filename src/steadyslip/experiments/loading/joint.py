@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from steadyslip.core.arrays import Array
+from steadyslip.experiments.loading.loading import Pieces
 from steadyslip.experiments.loading.servo import DAMPINGS, rate_share, travel
 
 OUTLIER = 3.0  # standard deviations from which a sample weighs less
@@ -54,6 +55,8 @@ class JointFit:
         Sum of squared deviations, in which large ones count less.
     covariance : ndarray (2, 2)
         Of the logarithms of lag and damping for white noise; empty without a servo.
+    pieces : tuple
+        Straight ramps of each change, if they were fitted: begin after its time (s), duration (s), share of the change.
     """
 
     rates: Array
@@ -65,6 +68,7 @@ class JointFit:
     deviations: Array
     misfit: float
     covariance: Array
+    pieces: tuple[Pieces, ...] = ()
 
     def others(self) -> tuple[tuple[float, float], ...]:
         """Lag and damping one standard deviation away along each axis of their covariance, a factor of 2 at most."""
@@ -98,9 +102,7 @@ def fit_at_once(samples: SensorSamples, times: Array, durations: Array) -> Joint
     spread = np.maximum(durations, 1e-12 * (1 + np.abs(times)))
 
     def responses(t: Array, x: Array) -> tuple[Array, Array]:
-        since = t[:, None] - x + 0.5 * spread
-        share = np.clip(since / spread, 0.0, 1.0)
-        return np.where(share < 1, 0.5 * share * since, since - 0.5 * spread), share
+        return ramp_responses(t, x - 0.5 * spread, spread)
 
     return _joint_fit(samples, _fitted(samples, times, responses), responses, len(times), 0.0, 0.0, 0.5 * spread)
 
@@ -148,13 +150,13 @@ def _joint_fit(
     earlier: Array | float,
 ) -> JointFit:  # fmt: skip
     """Fit of `count` changes, whose commands are `earlier` (s) than the times that were fitted."""
-    x, linear, deviations, misfit, covariance = found
+    x, linear, deviations, size, covariance = found
 
     def predicted(time: Array) -> Array:
-        return np.asarray(_columns(replace(samples, time=time), responses(time, x)[0]) @ linear)
+        return np.asarray(joint_columns(replace(samples, time=time), responses(time, x)[0]) @ linear)
 
     rates = linear[1] + np.concatenate([[0.0], np.cumsum(linear[2 : 2 + count])])
-    return JointFit(rates, x[:count] - earlier, samples.levels, lag, damping, predicted, deviations, misfit, covariance)
+    return JointFit(rates, x[:count] - earlier, samples.levels, lag, damping, predicted, deviations, size, covariance)
 
 
 def _coarser(samples: SensorSamples, deviations: Array) -> SensorSamples:
@@ -178,7 +180,7 @@ def _starts(
     """Gain over steps, lag and damping of servos, from the share of each that fits what steps leave best."""
     t, jumps = samples.time, np.diff(step.rates)
     moved, share = _at_once(t, step.times)
-    base = np.linalg.qr(np.hstack([_columns(samples, moved), share]) / samples.scale[:, None])[0]
+    base = np.linalg.qr(np.hstack([joint_columns(samples, moved), share]) / samples.scale[:, None])[0]
     left = (samples.values - samples.values.mean()) / samples.scale
     left -= base @ (base.T @ left)
     found = []
@@ -199,13 +201,20 @@ def _at_once(t: Array, times: Array) -> tuple[Array, Array]:
     return since, (since > 0) * 1.0
 
 
+def ramp_responses(t: Array, begins: Array, durations: Array) -> tuple[Array, Array]:
+    """Travel (s) and rate share after unit ramps, each (n, ramps)."""
+    since = t[:, None] - begins
+    share = np.clip(since / durations, 0.0, 1.0)
+    return np.where(share < 1, 0.5 * share * since, since - 0.5 * durations), share
+
+
 def _late(t: Array, commands: Array, lag: float, damping: float) -> tuple[Array, Array]:
     """Travel (s) and rate share after unit steps at `commands`, each (n, changes)."""
     since = t[:, None] - commands
     return travel(since, lag, damping), rate_share(since, lag, damping)
 
 
-def _columns(samples: SensorSamples, moved: Array) -> Array:
+def joint_columns(samples: SensorSamples, moved: Array) -> Array:
     """Columns (n, p) of the linear fit: level, time, travel after each change, levels of the sensor."""
     t = samples.time
     levels = t[:, None] >= np.asarray(samples.levels, dtype=float)[None, :]
@@ -214,7 +223,7 @@ def _columns(samples: SensorSamples, moved: Array) -> Array:
 
 def _linear(samples: SensorSamples, moved: Array) -> tuple[Array, Array, float]:
     """Robust linear fit: coefficients, deviations in standard deviations, misfit."""
-    columns = _columns(samples, moved) / samples.scale[:, None]
+    columns = joint_columns(samples, moved) / samples.scale[:, None]
     values, weight = samples.values / samples.scale, np.ones(len(samples.time))
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     columns /= size
@@ -223,10 +232,11 @@ def _linear(samples: SensorSamples, moved: Array) -> tuple[Array, Array, float]:
         found = np.linalg.lstsq(heavy.T @ columns, heavy.T @ values, rcond=1e-14)[0]
         off = values - columns @ found
         weight = 1 / (1 + (off / OUTLIER) ** 2)
-    return found / size, off, _misfit(off)
+    return found / size, off, misfit(off)
 
 
-def _misfit(deviations: Array) -> float:
+def misfit(deviations: Array) -> float:
+    """Sum of squared deviations, in which large ones count less."""
     return float(OUTLIER**2 * np.sum(np.log1p((deviations / OUTLIER) ** 2)))
 
 
@@ -242,7 +252,7 @@ def _fitted(samples: SensorSamples, start: Array, responses: _Responses, extra: 
         if np.any((x[:count] < inside[0]) | (x[:count] > inside[1])):
             return np.full(len(samples.time), OUTSIDE)
         moved, _ = responses(samples.time, x[: len(start)])
-        return np.asarray((_columns(samples, moved) @ x[len(start) :] - samples.values) / samples.scale)
+        return np.asarray((joint_columns(samples, moved) @ x[len(start) :] - samples.values) / samples.scale)
 
     def slopes(x: Array) -> Array:
         own, coefficients = x[: len(start)], x[len(start) :]
@@ -254,11 +264,11 @@ def _fitted(samples: SensorSamples, start: Array, responses: _Responses, extra: 
             other[k] += CHANGED
             ahead, _ = responses(samples.time, other)
             found.append(((ahead - moved) @ jumps / CHANGED)[:, None])
-        return np.asarray(np.hstack([*found, _columns(samples, moved)]) / fine)
+        return np.asarray(np.hstack([*found, joint_columns(samples, moved)]) / fine)
 
     done = least_squares(residuals, whole, slopes, x_scale="jac", loss="cauchy", f_scale=OUTLIER, max_nfev=EVALUATIONS)
     slope = slopes(done.x) / np.sqrt(1 + (done.fun / OUTLIER) ** 2)[:, None]
     size = np.maximum(np.linalg.norm(slope, axis=0), 1e-100)
     own = slice(count, count + extra)
     covariance = (np.linalg.pinv((slope / size).T @ (slope / size), hermitian=True) / np.outer(size, size))[own, own]
-    return done.x[: len(start)], done.x[len(start) :], -done.fun, _misfit(done.fun), covariance
+    return done.x[: len(start)], done.x[len(start) :], -done.fun, misfit(done.fun), covariance

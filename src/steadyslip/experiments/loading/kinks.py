@@ -13,7 +13,8 @@ from scipy.optimize import minimize_scalar
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import REST_SHARE, reversed_column, samples_off_line
 from steadyslip.experiments.loading.following import Kinks, followed
-from steadyslip.experiments.loading.loading import Change, Course
+from steadyslip.experiments.loading.joint import JointFit
+from steadyslip.experiments.loading.loading import Change, Course, Pieces
 from steadyslip.experiments.loading.runs import Run, straight_runs
 from steadyslip.experiments.numerics.noise import Noise, describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
@@ -41,50 +42,67 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     """Course of the load-point rate from a displacement: straight runs or, if these do not fit, a smooth curve.
 
     `blurred` is for a displacement that was integrated from a rate: it does not determine within a sampling interval
-    when the rate changed.
+    when the rate changed. Where the displacement around changes is beside the course, `otherwise` is one that follows.
     """
     if not np.ptp(displacement) > 0:
         return Course(0.0)
     runs = straight_runs(time, displacement)
     if not _piecewise_linear(runs, time):
         return smooth_load(time, displacement)
-    strays, errors, inflation = _errors(runs, time, displacement)
-    if max(inflation) > LASTING:  # noise that looks like slips and glitches of the sensor
-        lasting = max(size * float(np.sqrt(many)) for size, many in zip(strays, inflation, strict=True))
+    lines = _Lines(time, displacement, runs)
+    if max(lines.inflation) > LASTING:  # noise that looks like slips and glitches of the sensor
+        lasting = max(size * float(np.sqrt(many)) for size, many in zip(lines.strays, lines.inflation, strict=True))
         if _piecewise_linear(others := straight_runs(time, displacement, lasting), time):
-            runs = others
-            strays, errors, inflation = _errors(runs, time, displacement)
-    kinks = _kinks(time, displacement, runs, strays, errors, inflation)
-    servo = None
-    if any(one.tells for one in kinks):
-        durations = np.array([one.ramp[0] if one.tells else 0.0 for one in kinks])
-        noise = max(float(np.median(strays)), EXACTLY * float(np.ptp(displacement)))
-        some = {len(fewer) - 1: fewer for fewer in _without_brief(runs, time)}
-        ways = (replace(_as_lines(time, fewer), durations=durations[:n]) for n, fewer in some.items())
-        best = followed(time - time[0], displacement, noise, ways)
-        servo = best if best.lag else None
-        if len(best.times) < len(kinks):
-            runs = some[len(best.times)]
-            strays, errors, inflation = _errors(runs, time, displacement)
-            kinks = _kinks(time, displacement, runs, strays, errors, inflation)
-    rates = np.array([run.rate for run in runs]) if servo is None else servo.rates
-    rest = _at_rest(rates, runs, errors, time, displacement)
-    rates = np.where(rest, 0.0, rates)
-    levels = list(pairwise(rates.tolist()))
-    if servo is None:
-        changes = [kink.change(*own, blurred) for kink, own in zip(kinks, levels, strict=True)]
-    else:
-        changes = [kink.late_change(time[0] + at, *own, servo.lag, servo.damping)
-                   for kink, at, own in zip(kinks, servo.times.tolist(), levels, strict=True)]  # fmt: skip
-    found = tuple(_within_record(one, time) for one in _without_overlap(changes))
-    return Course(
-        float(rates[0]), found, np.where(rest, 0.0, errors), None, float(np.median(strays)),
-        sum(max(run.groups) for run in runs) if servo is None else len(servo.levels),
-        sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs) if servo is None else 0,
-        samples_off_line(time, displacement, runs[0], max(strays)),
-        samples_off_line(reversed_column(time), reversed_column(displacement), runs[-1].reversed(time), max(strays)),
-        () if servo is None else servo.others(),
-    )  # fmt: skip
+            lines = _Lines(time, displacement, others)
+    if not any(one.tells for one in lines.kinks):
+        return lines.course(None, blurred)
+    durations = np.array([one.ramp[0] if one.tells else 0.0 for one in lines.kinks])
+    noise = max(float(np.median(lines.strays)), EXACTLY * float(np.ptp(displacement)))
+    some = {len(fewer) - 1: fewer for fewer in _without_brief(lines.runs, time)}
+    ways = [replace(_as_lines(time, fewer), durations=durations[:n]) for n, fewer in some.items()]
+    found = []
+    for joint in followed(time - time[0], displacement, noise, ways):
+        count = len(joint.times)
+        own = lines if count == len(lines.kinks) else _Lines(time, displacement, some[count])
+        found.append(own.course(joint if joint.lag or joint.pieces else None, blurred))
+    return replace(found[0], otherwise=found[1]) if len(found) > 1 else found[0]
+
+
+class _Lines:
+    """Lines through a displacement: runs, their scatter (see `_errors`), and changes between them."""
+
+    def __init__(self, time: Array, displacement: Array, runs: list[Run]) -> None:
+        self.time, self.displacement, self.runs = time, displacement, runs
+        self.strays, self.errors, self.inflation = _errors(runs, time, displacement)
+        beside = (pairwise(column) for column in (runs, self.errors, self.strays, self.inflation))
+        self.kinks = [
+            _ChangeFit(time, displacement, before, after, pair, max(scales), max(worths))
+            for (before, after), pair, scales, worths in zip(*beside, strict=True)
+        ]
+
+    def course(self, joint: JointFit | None, blurred: bool) -> Course:
+        """Course of steps and ramps, or of changes that a joint fit found to be followed late."""
+        time, displacement, runs, kinks = self.time, self.displacement, self.runs, self.kinks
+        rates = np.array([run.rate for run in runs]) if joint is None else joint.rates
+        rest = _at_rest(rates, runs, self.errors, time, displacement)
+        rates = np.where(rest, 0.0, rates)
+        levels = pairwise(rates.tolist())
+        if joint is None:
+            changes = [kink.change(*own, blurred) for kink, own in zip(kinks, levels, strict=True)]
+        else:
+            pieces = joint.pieces or ((),) * len(kinks)
+            changes = [kink.late_change(time[0] + at, *own, joint.lag, joint.damping, ways)
+                       for kink, at, own, ways in zip(kinks, joint.times, levels, pieces, strict=True)]  # fmt: skip
+        found = tuple(_within_record(one, time) for one in _without_overlap(changes))
+        back = reversed_column(time), reversed_column(displacement)
+        return Course(
+            float(rates[0]), found, np.where(rest, 0.0, self.errors), None, float(np.median(self.strays)),
+            sum(max(run.groups) for run in runs) if joint is None else len(joint.levels),
+            sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs) if joint is None else 0,
+            samples_off_line(time, displacement, runs[0], max(self.strays)),
+            samples_off_line(*back, runs[-1].reversed(time), max(self.strays)),
+            joint.others() if joint is not None and joint.lag else (),
+        )  # fmt: skip
 
 
 def _at_rest(rates: Array, runs: list[Run], errors: list[float], time: Array, displacement: Array) -> Array:
@@ -96,17 +114,6 @@ def _at_rest(rates: Array, runs: list[Run], errors: list[float], time: Array, di
     known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # backward and so slowly: a sensor that drifts in a hold
     rest = still | (np.abs(rates) <= np.minimum(known, slow))
     return np.asarray(rest & (len(runs) > 1))
-
-
-def _kinks(
-    time: Array, displacement: Array, runs: list[Run], strays: list[float], errors: list[float], inflation: list[float]
-) -> list[_ChangeFit]:
-    return [
-        _ChangeFit(time, displacement, before, after, pair, max(scales), max(worths))
-        for (before, after), pair, scales, worths in zip(
-            pairwise(runs), pairwise(errors), pairwise(strays), pairwise(inflation), strict=True
-        )
-    ]
 
 
 def _without_brief(runs: list[Run], time: Array) -> Iterator[list[Run]]:
@@ -138,7 +145,13 @@ def _as_lines(time: Array, runs: list[Run]) -> Kinks:
     lasts = [time[run.last - 1] - time[run.first] for run in runs]
     reach = min(2 * min(pair) + time[after.first] - time[before.last - 1]
                 for pair, (before, after) in zip(pairwise(lasts), pairs, strict=True))  # fmt: skip
-    return Kinks(np.array(meets), np.zeros(len(meets)), np.array(levels), float(reach))
+    glitches = [
+        (time[one[1] - 1] - time[0], time[other[0]] - time[0])
+        for run in runs
+        for one, other in pairwise(run.members)
+        if 1 < other[0] - one[1] < min(one[1] - one[0], other[1] - other[0])  # a late response begins or ends a run
+    ]
+    return Kinks(np.array(meets), np.zeros(len(meets)), np.array(levels), float(reach), glitches)
 
 
 def _piecewise_linear(runs: list[Run], time: Array) -> bool:
@@ -263,10 +276,12 @@ class _ChangeFit:
         """True if the samples around the change can tell how the load point follows it."""
         return len(self.time) >= ENOUGH_SAMPLES and self.reach > 0
 
-    def late_change(self, at: float, before: float, after: float, lag: float, damping: float) -> Change:
-        """Step commanded at a time (s) that a servo follows late; the time is as uncertain as where the lines meet."""
+    def late_change(
+        self, at: float, before: float, after: float, lag: float, damping: float, pieces: Pieces = ()
+    ) -> Change:
+        """Step at a time (s) that is followed late; the time is as uncertain as where the lines meet."""
         half = 6 * self.deviation + self.spacing + LAG_ERROR * lag
-        return Change(at, 0.0, before, after, at - half, at + half, lag=lag, damping=damping)
+        return Change(at, 0.0, before, after, at - half, at + half, lag=lag, damping=damping, pieces=pieces)
 
     def _uncertain_change(self, before: float, after: float, slack: float) -> Change:
         """Change where the lines do not meet between the runs, because of a glitch or a slip of the sensor."""

@@ -18,8 +18,14 @@ from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.loading.servo import ramps
 
 LoadCurve = Callable[[Array], Array]
+Pieces = tuple[tuple[float, float, float], ...]
 SLIGHT = 1.5  # ratio of rates up to which a change may be waviness of a sensor: commanded ones are larger
 FELT = 1e-6  # error of a level, relative to the highest, below which it has no effect on a fit
+
+
+def is_slight(before: float, after: float) -> bool:
+    """True for two rates so close that they may be one."""
+    return bool(before > 0 < after and max(before, after) < SLIGHT * min(before, after))
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,9 @@ class Change:
     lag, damping : float
         Of a servo that follows a step late (see `steadyslip.experiments.loading.servo`), s and 1; `time` is then that
         of the command. Zero where the level changes at once or along a ramp.
+    pieces : tuple of (float, float, float)
+        Straight ramps of a level that follows in a way of its own: begin after `time` (s), duration (s), share of the
+        change; empty otherwise.
     """
 
     time: float
@@ -53,10 +62,13 @@ class Change:
     longest: float = 0.0
     lag: float = 0.0
     damping: float = 0.0
+    pieces: Pieces = ()
 
     @property
     def ramps(self) -> tuple[tuple[float, float, float], ...]:
         """Straight ramps of which it consists: begin after `time` (s), duration (s) and share of the change."""
+        if self.pieces:
+            return self.pieces
         return ramps(self.lag, self.damping) if self.lag else ((0.0, self.duration, 1.0),)
 
     @property
@@ -67,7 +79,7 @@ class Change:
     @property
     def slight(self) -> bool:
         """True for a change of rate so small that it may be none but waviness of the sensor."""
-        return self.before > 0 < self.after and max(self.before, self.after) < SLIGHT * min(self.before, self.after)
+        return is_slight(self.before, self.after)
 
     @property
     def stretches(self) -> bool:
@@ -100,6 +112,9 @@ class Course(ReadOnly):
         the sensor or the loading differed.
     servos : tuple of (float, float)
         Lag (s) and damping ratio of servos one standard deviation from that of the changes, in independent directions.
+    otherwise : Course or None
+        One with changes made of pieces that follow the column, if that is beside this course by more than its noise: a
+        load point that follows in a way of its own, or glitches of the sensor.
     """
 
     first: float
@@ -112,6 +127,7 @@ class Course(ReadOnly):
     early: int = 0
     late: int = 0
     servos: tuple[tuple[float, float], ...] = ()
+    otherwise: Course | None = field(default=None, repr=False)
 
     @property
     def levels(self) -> Array:
@@ -173,6 +189,14 @@ class Loading:
             for i, change in enumerate(course.changes)
         ]
         return tuple(sorted(found, key=lambda one: (one[2].time, one[0])))
+
+
+def as_followed(loading: Loading, pieces: bool) -> Loading:
+    """Loading with the load point as it moves in pieces, where there is such a course, or as it was commanded."""
+    load = loading.load
+    if load is None or load.otherwise is None:
+        return loading
+    return replace(loading, load=load.otherwise if pieces else replace(load, otherwise=None))
 
 
 def with_reference(loading: Loading) -> Loading:

@@ -358,7 +358,7 @@ def test_every_sliding_rig_has_a_locus(name):
     assert bottom == -top
     assert any("this rig" in text for text in legend_texts(ax))
     own = replace(ODD[name], axial_stiffness=None, stiffness=1.0)
-    what = "gain kp" if ODD[name] is CONTROLLED else "stiffness"
+    what = "drive proportional gain" if ODD[name] is CONTROLLED else "stiffness"
     ends = (ss.stable_values(own, "kp") if ODD[name] is CONTROLLED else ss.stable_stiffness(own)).ravel()
     edges = [end for end in ends if 0 < end < np.inf]
     marked = [text for text in legend_texts(ax) if text.startswith(f"critical {what}")]

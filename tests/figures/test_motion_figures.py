@@ -42,9 +42,13 @@ def test_blow_up_is_said_and_clipped():
     run = ss.simulate(unit_rig("slip", 0.5, 0.3), ss.protocol.VelocityStep(at=5.0, to=1.5), until=60.0)
     panels = run.plot()
     assert "blow-up" in panels[0].get_title()
+    assert "drawn up to 10000 times the steady velocity" in panels[0].get_title()
     low, high = panels[0].get_ylim()
     assert low < run["v"].min()  # clipped above only: the slow part stays in view
-    assert high <= 1e13
+    assert 1e3 < high < 1e5
+    friction = run["friction"][run["v"] < 1e4]
+    assert panels[1].get_ylim()[1] < friction.max() + 0.1 * np.ptp(friction)
+    assert run.plot("phase", ax=Figure().subplots()).get_xlim()[1] < 1.2 * np.log(1e4)
     assert any(line.get_xdata()[0] == pytest.approx(run.end) for line in panels[1].lines[1:])
 
 

@@ -1,5 +1,6 @@
 """Reports for who ordered them: letters, references, recommendation, held axes, two rigs beside each other."""
 
+import html
 import inspect
 import re
 from itertools import product
@@ -18,8 +19,9 @@ from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
 from steadyslip.reports.elements import _LINE, _lines, equation
 from steadyslip.reports.literature import PUBLICATIONS, cited
+from steadyslip.reports.recommendation import Order, recommendation
 from steadyslip.reports.rig import input_table
-from steadyslip.reports.sections import letters, motion, notes_of, recommendation
+from steadyslip.reports.sections import letters, motion, notes_of
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
 RIGS = [path for path in EXAMPLES if "[drive]" in path.read_text() and not path.stem.startswith(("hunting", "reed"))]
@@ -84,7 +86,7 @@ def test_a_recommendation_changes_what_is_there():
     """No dashpot of many GPa s/m to a rig that has none, unless a dashpot is what can be added."""
     found = ss.analyze(ss.read_rig("examples/inclined-spring.toml"))
     assert "damping" not in words("".join(recommendation(found)))
-    assert "damping c" in words("".join(recommendation(found, ("slider.damping",))))
+    assert "damping c" in words("".join(recommendation(found, Order((), {"slider.damping": ss.verdict.Adjustment()}))))
 
 
 def test_a_stable_rig_is_told_what_to_hold():
@@ -93,7 +95,9 @@ def test_a_stable_rig_is_told_what_to_hold():
     text = words("".join(recommendation(found)))
     assert "evolution effect b₁, now 0.006: keep it below 0.009113" in text
     assert "Of what can be set, the nearest is that of stiffness k, now 20 GPa/m: keep it above 2.503 GPa/m" in text
-    assert "preload σ₀, now 25 MPa: keep it below" in words("".join(recommendation(found, ("contact.preload",))))
+    assert "preload σ₀, now 25 MPa: keep it below" in words(
+        "".join(recommendation(found, Order((), {"contact.preload": ss.verdict.Adjustment()})))
+    )
 
 
 def test_a_stable_rig_is_kept_only_where_it_is_surely_stable():
@@ -103,11 +107,47 @@ def test_a_stable_rig_is_kept_only_where_it_is_surely_stable():
     for width, kept in (("5 %", True), ("70 %", False)):
         within = ss.tolerate(rig, {"friction.states.1.b": width})
         assert (within.share == 1.0) == kept
-        text = words("".join(recommendation(found, (), within)))
+        text = words("".join(recommendation(found, tolerated=within)))
         assert ("Keep it as it is" in text) == kept
         assert (within.headline() in text) != kept
-        assert "steadyslip cure --sure '95 %'" in text or kept
         assert "keep it below 0.009113" in text
+        cured = ss.cure(rig, {"friction.states.1.b": width})
+        if not kept:
+            to = cured.best.written(cured.best.nearest)
+            assert f"Change {said(rig, cured.best.parameter)} from" in text
+            assert f"to {to}: with this change alone it is stable in 95 % of them" in text
+            assert "measuring evolution effect b₁" in text
+            assert "steadyslip" not in text
+        for one in () if kept else (one for one in cured.windows if one.value):
+            assert said(rig, one.parameter) in text
+            assert str(one) in text or not one.windows
+
+
+def test_what_may_be_adjusted_bounds_what_is_recommended():
+    """A value beyond the limit of [adjust] was recommended; two changes stand where none alone is enough."""
+    rig = ss.read_rig("examples/slow-axis.toml")
+    gain, preload = ss.verdict.Adjustment(high=1.1e6 / 40e-4), ss.verdict.Adjustment(low=500 / 40e-4)
+    found = ss.analyze(rig)
+    text = words("".join(recommendation(found, Order((), {"drive.kp": gain}))))
+    assert "Change drive proportional gain k_p from 600 kN/m to 1.068 MN/m" in text
+    text = words("".join(recommendation(found, Order((), {"contact.preload": preload}))))
+    assert "None of the values below makes it stable" in text
+    assert "Not enough alone, whatever the value within range: preload σ₀" in text
+    gain = ss.verdict.Adjustment(high=0.8e6 / 40e-4)
+    text = words("".join(recommendation(found, Order((), {"drive.kp": gain, "contact.preload": preload}))))
+    assert re.search(r"No single change is enough. Change .* from .* to .* and .* with both it is stable", text)
+    assert "go beyond them as far as you can" in text
+
+
+def test_tolerances_are_kept_for_the_document_of_a_verdict_within_them():
+    rig = ss.read_rig("examples/double-direct-shear.toml")
+    values = ss.verdict.read_tolerances(
+        "examples/double-direct-shear.toml", ["friction.states.1.b=0.006 ± 70 %"]
+    ).values
+    given = ss.verdict.Tolerances(values, adjust={"slider.stiffness": ss.verdict.Adjustment()})
+    text = words(ss.report(ss.tolerate(rig, given), explorer=False).html)
+    assert "Change stiffness k from 20 GPa/m to" in text
+    assert "up to" not in text[text.index("The recommendation") : text.index("Assumptions")]
 
 
 def test_a_motion_says_how_it_ends():
@@ -144,8 +184,17 @@ def test_a_held_axis_has_a_report_on_its_hunting():
     assert ss.hunt(ss.read_rig(path)).sentence.capitalize() in text
     assert "There is no explorer at the end: the drive holds a place" in text
     assert "does it hunt" in text
-    assert "the best is a dead band of 127.8 mm of the integral (2 amplitudes)" in text
-    assert "no integral (drive integral gain k_i = 0) Settles within 337.9 mm of the target" in text
+    assert "Make this change: friction at rest no larger than in sliding (static friction μ_S from 1.5 to 1)" in text
+    assert "The axis then rests, on the target" in text
+    rests = "no cure: it rests, but farther off than that"
+    assert re.search(
+        rf"a dead band of 127.8 mm of the integral .2 amplitudes. Settles .* 127.8 mm, 2 times as far as now {rests}",
+        text,
+    )
+    assert re.search(
+        rf"Settles within 337.9 mm of the target after 10.1 s 337.9 mm, 5.3 times as far as now {rests}", text
+    )
+    assert "no cure: it still hunts, less far" in text
     assert "Canudas de Wit" in text
     assert "[protocol]" not in text or "[protocol]" in path.read_text()
     assert len(found.encode()) <= 500_000
@@ -162,6 +211,8 @@ def test_the_longest_report_and_that_of_a_structure_are_documents(name):
     assert len(found.encode()) <= 500_000
     assert "Change preload" in text or "Change reed.tip angle φ" in text
     assert ("structures move as their matrices say" in text) == ("reed" in name)
+    assert ("oscillates at 726.6 Hz, doubles in 55.59 ms and after 184.7 ms" in text) == ("reed" in name)
+    assert path.read_text() in html.unescape(found)  # with its comments, not as the program writes it
 
 
 def test_paths_of_figures_keep_their_places():
@@ -187,6 +238,6 @@ def test_two_rigs_are_told_beside_each_other():
 def test_the_first_chart_has_what_is_recommended_first():
     """Charts were of friction alone, whose values nobody buys."""
     for name, first in (("inclined-spring", "preload"), ("lead-screw", "drive velocity")):
-        html = ss.report(ss.read_rig(f"examples/{name}.toml")).html
-        assert f"Change {first}" in html
-        assert f"Where sliding is stable over {first}" in html[: html.index("the dot is this rig")]
+        text = ss.report(ss.read_rig(f"examples/{name}.toml")).html
+        assert f"Change {first}" in text
+        assert f"Where sliding is stable over {first}" in text[: text.index("the dot is this rig")]

@@ -21,7 +21,11 @@ from steadyslip.reports.elements import html_text, math, table
      ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
 )  # fmt: skip
 def test_words_are_set_as_in_print(text, printed):
-    assert html_text(text) == printed
+    assert html_text(text).replace("\u00a0", " ") == printed
+
+
+def test_a_unit_stays_in_the_line_of_its_number():
+    assert html_text("from 5 MPa to 3 of 4") == "from 5\u00a0MPa to 3\u00a0of 4"
 
 
 def test_lines_of_names_and_words_become_tables():

@@ -217,7 +217,7 @@ def test_reason_names_the_direct_effect_where_that_is_the_fault():
 
 def test_controllers_are_judged_by_their_gain():
     rig = ss.Slider(friction=PLAIN.friction, contact=PLAIN.contact, drive=ss.machine.PD(1e-6, kp=4e9))
-    assert "gain kp, 4 GPa/m, is 0.8 times the critical 5 GPa/m" in ss.analyze(rig).reason
+    assert "drive proportional gain, 4 GPa/m, is 0.8 times the critical 5 GPa/m" in ss.analyze(rig).reason
     assert all(edge.value > 0 for edge in ss.boundary(rig, "kp"))
 
 
@@ -230,17 +230,17 @@ def test_a_gain_that_is_all_the_stiffness_is_what_is_said_to_be_stable(drive, ma
     rig = ss.Slider(friction=PLAIN.friction, contact=CONTACTS[contact], drive=drive, mass=mass)
     found = ss.analyze(rig)
     support = support_stiffness(found)
-    assert (support.name, support.own, support.beside) == ("gain kp", 4e9, 0.0)
+    assert (support.name, support.own, support.beside) == ("drive proportional gain", 4e9, 0.0)
     small = [end for pair in support_stiffness(ss.analyze(rig.with_values({"kp": 1.0}))).stable for end in pair]
     assert [end for pair in support.stable for end in pair] == pytest.approx(small, rel=1e-9)
     beyond = [max(end - 4e9, 0.0) for end in small if end > 4e9]
     assert [end for pair in found.stable_stiffness for end in pair if end] == pytest.approx(beyond, rel=1e-8)
     assert "stiffness" not in found.reason.partition(":")[0]
     (words,) = [words for name, words in facts(found) if name == "stable for"]
-    assert "gain kp" in words
+    assert "drive proportional gain" in words
     assert "stiffness" not in words
     beside = ss.analyze(replace(rig, stiffness=1e9))
-    assert "stiffness beside the gain kp" in dict(facts(beside))["stable for"]
+    assert "stiffness beside the drive proportional gain" in dict(facts(beside))["stable for"]
 
 
 def test_only_rigs_are_judged():

@@ -14,6 +14,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.palette import BLACK, VERMILION
 from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
 from steadyslip.linear import eigenvalues, stable_stiffness, stable_values
+from steadyslip.machine.letters import words_of
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
@@ -83,7 +84,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     if figure is not None:
         figure.colorbar(points, ax=ax, label=axis_label(parameter_label(rig, along), unit_name))
     for edge, at in zip(edges, crossings, strict=True):
-        what = f"gain {along.rpartition('.')[2]}" if along == name else "stiffness"
+        what = words_of(rig, along) if along == name else "stiffness"
         label = f"critical {what} {edge / factor:.4g} {unit_name}"
         ax.plot(at.real, at.imag, "D", color="white", markeredgecolor=BLACK, markersize=8, zorder=3, label=label)
     _set_view(ax, roots, own_roots, crossings)

@@ -25,7 +25,8 @@ MIN_BAND_SHARE = 4e-3  # least width of a shaded slip event, as share of the tim
 _MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
 _LOG_RATIO = 3.0  # highest over lowest slip rate above which the axis is logarithmic (by trial)
 _MIN_STEADY_RATIO = 1e-3  # least slip rate of the line of steady states over the highest of the run
-_MAX_SPEED_RATIO = 1e12  # slip rates above this times the steady one (a blow-up) are not drawn
+LEAVES = 1e4  # slip rate over the steady one beyond which a run that ends early is not drawn: what the model leaves
+# out, such as mass, decides there
 
 
 def history(run: History, panels: np.ndarray) -> np.ndarray:
@@ -34,13 +35,14 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
     colors = {name: _CONTACTS[i % len(_CONTACTS)] for i, name in enumerate(names)}
     factor, unit = display_unit("s", float(run.end) or 1.0)
     time = run["t"] / factor
+    left = np.any([leaves(run, run[f"{name}.slip_rate"], steady_rate(run.rig, name)) for name in names], axis=0)
     series = (("slip_rate", "m/s", "slip rate"), ("friction", "", "friction"), ("normal_force", "N", "normal force"))
     for panel, (what, si, label) in zip(panels, series, strict=True):
-        values = {name: run[f"{name}.{what}"] for name in names}
+        values = {name: np.where(left, np.nan, run[f"{name}.{what}"]) for name in names}
         largest = max(float(np.nanmax(np.abs(own), initial=0.0)) for own in values.values()) or 1.0
         scale, own_unit = display_unit(si, largest) if si else (1.0, "1")
-        positive = all(np.all(own > 0) for own in values.values())
-        if what == "slip_rate" and positive and largest > 30 * min(float(own.min()) for own in values.values()):
+        positive = all(np.all(own[~left] > 0) for own in values.values())
+        if what == "slip_rate" and positive and largest > 30 * min(float(np.nanmin(own)) for own in values.values()):
             panel.set_yscale("log")
         for name in names:
             panel.plot(time, values[name] / scale, color=colors[name], linewidth=1, label=name)
@@ -53,7 +55,7 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
     add_legend_above(panels[0], 4, 1.0, fontsize="small")
     if run.status != "done":
         where = f" ({run.contact})" if run.contact else ""
-        title = f"{run.status}{where} at {format_quantity(run.end, 's')}"
+        title = f"{run.status}{where} at {format_quantity(run.end, 's')}{drawn_up_to(left)}"
         panels[0].set_title(title, color=VERMILION, fontsize="medium", pad=22)
     return panels
 
@@ -67,11 +69,10 @@ def phase_plane(
     """
     name = contact or _most_varying_contact(run, rig)
     ax, rate, force = axes_or_new(ax), run[f"{name}.slip_rate"], run[f"{name}.friction_force"]
-    steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))
-    own = abs(float(steady["slip_rate"][0]))
-    scale, unit = display_unit("m/s", own)
+    own = steady_rate(rig, name)
+    scale, unit = display_unit("m/s", abs(own))
     factor, force_unit = display_unit("N", float(np.nanmax(np.abs(force), initial=0.0)) or 1.0)
-    shown_rate = np.where(np.abs(rate) < own * _MAX_SPEED_RATIO, rate, np.nan) / scale  # NaN: not drawn
+    shown_rate = np.where(leaves(run, rate, own), np.nan, rate) / scale  # NaN: not drawn
     ax.plot(shown_rate, force / factor, color=color, label=label or None, linewidth=1)
     low, high = float(np.nanmin(shown_rate)), float(np.nanmax(shown_rate))
     logarithmic = low > 0 and high > _LOG_RATIO * low
@@ -84,7 +85,7 @@ def phase_plane(
         ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # otherwise rounding would fill the panel
     else:
         add_arrowheads(ax, shown_rate, force / factor, color)
-    beside = shown_rate * scale / steady["slip_rate"][0]
+    beside = shown_rate * scale / own
     fastest = max(float(np.nanmax(beside)), 1.0)
     slowest = min(max(float(np.nanmin(beside)), _MIN_STEADY_RATIO * fastest), 1.0)
     speeds = rig.drive.velocity * np.geomspace(0.9 * slowest, 1.1 * fastest, 81)
@@ -101,6 +102,21 @@ def phase_plane(
     ax.grid(color=GREY, linewidth=0.3)
     ax.legend(fontsize="small")
     return ax
+
+
+def steady_rate(rig: Any, name: str) -> float:
+    """Slip rate of a contact in steady sliding (m/s)."""
+    return float(steady_contact_at(rig, name, np.array([rig.drive.velocity]))["slip_rate"][0])
+
+
+def leaves(run: History, rates: np.ndarray, steady: float) -> np.ndarray:
+    """Mask of the samples of a run that ends early at which it is too fast to be drawn."""
+    return np.asarray((run.status != "done") & (np.abs(rates) > LEAVES * abs(steady)))
+
+
+def drawn_up_to(left: np.ndarray) -> str:
+    """Words for a title on what is left out of a figure; empty if that is nothing."""
+    return f", drawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
 
 
 def _most_varying_contact(run: History, rig: Machine) -> str:

@@ -16,7 +16,7 @@ from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREY, ORANGE
 from steadyslip.figures import machine_motion
-from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE
+from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE, drawn_up_to, leaves
 from steadyslip.figures.style import (
     add_arrowheads,
     add_legend_above,
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from steadyslip.motion import History
 
 _MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
-_MAX_DECADES = 12.0  # decades above the drive velocity to which a blow-up is drawn
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
@@ -75,15 +74,17 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     area = run.rig.area
     factor, unit = display_unit("s", float(run.end) or 1.0)
     time = run["t"] / factor
-    _velocity_panel(run, panels[0], time)
-    panels[1].plot(time, run["friction"], color=BLUE)
+    left = leaves(run, run["v"], run.rig.drive.velocity)
+    v, friction, normal = (np.where(left, np.nan, run[name]) for name in ("v", "friction", "normal_stress"))
+    _velocity_panel(run, v, panels[0], time)
+    panels[1].plot(time, friction, color=BLUE)
     panels[1].set_ylabel("friction τ/σ (1)")
-    stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)), area)
-    panels[2].plot(time, run["normal_stress"] / stress_factor, color=BLUE)
+    stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(normal), initial=1.0)), area)
+    panels[2].plot(time, normal / stress_factor, color=BLUE)
     panels[2].set_ylabel(axis_label(stress_name("normal stress", area), stress_unit))
     panels[2].set_xlabel(axis_label("time", unit))
-    _limit_zoom(panels[1], run["friction"])
-    _limit_zoom(panels[2], run["normal_stress"] / stress_factor)
+    _limit_zoom(panels[1], friction)
+    _limit_zoom(panels[2], normal / stress_factor)
     machine_motion.shade_let_go(run, panels, factor)
     slips = run.slip_events if len(run.slip_events) < MAX_SHADED_EVENTS else ()
     _add_slip_legend(panels[0], len(run.slip_events))
@@ -98,9 +99,8 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
             panel.axvline(run.end / factor, color=BLOW_UP, linewidth=1.5, linestyle="--")
     if run.status != "done":
         pad = 36 if "creep" in run.data else 22  # the legend has a second line
-        panels[0].set_title(
-            f"{run.status} at {format_quantity(run.end, 's')}", color=BLOW_UP, fontsize="medium", pad=pad
-        )
+        title = f"{run.status} at {format_quantity(run.end, 's')}{drawn_up_to(left)}"
+        panels[0].set_title(title, color=BLOW_UP, fontsize="medium", pad=pad)
     return panels
 
 
@@ -128,26 +128,26 @@ def _add_slip_legend(ax: Axes, count: int) -> None:
     add_legend_above(ax, 3, 1.0, fontsize="small")
 
 
-def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
-    """Plot block and load-point velocity, on a logarithmic axis if the block never rests or reverses."""
-    v, load = run["v"], run["load_velocity"]
+def _velocity_panel(run: History, v: np.ndarray, ax: Axes, time: np.ndarray) -> None:
+    """Plot block and load-point velocity, on a logarithmic axis if the block never rests or reverses.
+
+    Velocities `v` (m/s) of the block are NaN where they are not drawn.
+    """
+    load, moves = run["load_velocity"], bool(np.all(run["v"] > 0))
     reference = "steady sliding" if Protocol.of(run.protocol).frees_load_point else "load point"
     drive = run.rig.drive.velocity
-    top = drive * 10.0**_MAX_DECADES
     factor, unit = display_unit("m/s", drive)
-    load_shown = np.where(load > 0, load, np.nan) if np.all(v > 0) else load
-    together = np.concatenate([v, load_shown[np.isfinite(load_shown)]])
-    if np.all(v > 0) and _ticks_between(together.min() / factor, together.max() / factor) > 1:
+    load_shown = np.where(load > 0, load, np.nan) if moves else load
+    together = np.concatenate([v[np.isfinite(v)], load_shown[np.isfinite(load_shown)]])
+    if moves and _ticks_between(together.min() / factor, together.max() / factor) > 1:
         ax.set_yscale("log")
         load = load_shown
-        if v.max() > top:  # set both ends: set_ylim(top=...) alone would fix the bottom at its value without data
-            ax.set_ylim(0.5 * min(v.min(), np.nanmin(load, initial=drive)) / factor, top / factor)
-        if v.max() < 100 * v.min():  # less than two decades: numbers instead of powers of ten
+        if np.nanmax(v) < 100 * np.nanmin(v):  # less than two decades: numbers instead of powers of ten
             ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_formatter(NullFormatter())
     ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label=reference)
-    ax.plot(time, np.minimum(v, 10 * top) / factor, color=BLUE, label="block")
+    ax.plot(time, v / factor, color=BLUE, label="block")
     ax.set_ylabel(axis_label("velocity", unit))
     if ax.get_yscale() == "linear":
         _limit_zoom(ax, v / factor, load / factor)
@@ -204,9 +204,9 @@ def phase_plane(
     moving = run["v"] > 0
     with np.errstate(all="ignore"):
         u = np.where(moving, np.log(np.where(moving, run["v"], 1.0) / drive), np.nan)
-    shows = np.abs(u) < _MAX_DECADES * np.log(10)
+    u[leaves(run, run["v"], drive)] = np.nan
     factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), area)
-    x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
+    x, y = u, np.where(np.isnan(u), np.nan, run["spring_stress"] / factor)
     ax.plot(x, y, color=color, label=label or "the run", linewidth=1)
     add_arrowheads(ax, x, y, color)
     if not ax.get_xlabel():

@@ -16,6 +16,7 @@ from steadyslip.reports import lab  # noqa: F401 -- registers documents of fits
 from steadyslip.reports.brief import brief
 from steadyslip.reports.document import Report, document_html, source_text
 from steadyslip.reports.results import parts_of
+from steadyslip.verdict import Analysis, Tolerated
 
 __all__ = ["Report", "brief", "report"]
 
@@ -72,7 +73,7 @@ def report(
     """
     path = None if source is None else Path(source)
     block = {"project": project, "author": author, "revision": revision, "approval": approval}
-    if isinstance(result, Rig):
+    if isinstance(result, Rig | Analysis | Tolerated):
         options["source"] = source_text(path)
     return Report(document_html(parts_of(result, **options), title, explorer, path, block), title)
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from steadyslip.core.errors import NotAvailable, ParameterError, RigFileError
 from steadyslip.explorer.assembly import document, fragment, style
 from steadyslip.files.specifications import rig_to_text
-from steadyslip.files.specifications.read import protocol_of, rig_from_text, text_of
+from steadyslip.files.specifications.read import read_whole, text_of
 from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -37,9 +37,12 @@ body { background: #fff; }
 .report .block { border: 1px solid #1b2430; padding: 4px 10px; margin: 0 0 14px; }
 @page { size: A4; margin: 16mm; @bottom-right { content: counter(page) " / " counter(pages); font: 9pt sans-serif; } }
 @media print {
-  .report { padding: 0; }
-  .report figure svg, .report figure img { max-height: 150mm; }
-  .report pre { font-size: 11px !important; }
+  .report.steadyslip-told { padding: 0; font-size: 13px; max-width: none; }
+  .report.steadyslip-told h2 { margin-top: 16px; }
+  .report.steadyslip-told p { margin: 7px 0; }
+  .report figure svg:not(.sketch), .report figure img { max-height: 100mm; width: auto !important; }
+  .report.steadyslip-told .wide, .report.steadyslip-told .formula { overflow: visible; }
+  .report pre { font-size: 10px !important; }
   .steadyslip-root, .on-screen { display: none !important; }
 }
 """
@@ -126,17 +129,15 @@ def source_text(source: Path | None) -> str:
 
 def _rig_listing(parts: Parts, source: Path | None) -> str:
     """Text of a file of the rig: that of the user, with comments and units, if it has the same rig and protocol."""
-    own, text = source_text(source), parts.rig_file
+    own = source_text(source)
+    if not own or source is None or parts.rig is None:
+        return parts.rig_file
     try:
-        same = own and text and _rig_and_protocol(own) == _rig_and_protocol(text)
-    except ParameterError:  # a law that no file can name
-        same = False
-    return own if same else text
-
-
-def _rig_and_protocol(text: str) -> tuple[Slider | Machine, Protocol | None]:
-    """Rig and protocol of the text of a rig file."""
-    return rig_from_text(text), protocol_of(text, "rig", ())
+        whole = read_whole(source)
+    except ParameterError:  # not a file of a rig
+        return parts.rig_file
+    same = whole.rig == parts.rig and (parts.protocol is None or whole.protocol == parts.protocol)
+    return own if same else parts.rig_file
 
 
 def _provenance(text: str, source: Path | None) -> str:

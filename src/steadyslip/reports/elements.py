@@ -21,6 +21,8 @@ _EXPONENT, _SUPERSCRIPTS = (
     str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
 )
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
+_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])")  # space between a number and its unit, or what it counts
+_LONG = 30  # characters of a word that may be broken, for it is none
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
@@ -35,8 +37,14 @@ STYLE = """
 .steadyslip-told th { font-weight: 650; }
 .steadyslip-told thead th { min-width: 4.5em; }
 .steadyslip-told .n { white-space: nowrap; }
-.steadyslip-told h1, .steadyslip-told p, .steadyslip-told td { overflow-wrap: anywhere; }
+.steadyslip-told h1, .steadyslip-told p, .steadyslip-told td { overflow-wrap: break-word; }
+.steadyslip-told td.l { overflow-wrap: anywhere; }
 .steadyslip-told tr { break-inside: avoid; }
+.steadyslip-told caption, .steadyslip-told thead { break-inside: avoid; break-after: avoid; }
+.steadyslip-told tbody tr:nth-child(-n+2), .steadyslip-told tbody tr:nth-last-child(-n+2) { break-before: avoid; }
+.steadyslip-told table:not(:has(tbody tr:nth-child(9))) { break-inside: avoid; }
+.steadyslip-told p:has(+ .formula, + figure, + .wide) { break-after: avoid; }
+.steadyslip-told p { orphans: 3; widows: 3; }
 .steadyslip-told .wide { overflow-x: auto; max-width: 100%; }
 .steadyslip-told figure { margin: 10px 0; break-inside: avoid; }
 .steadyslip-told figure svg, .steadyslip-told figure img { max-width: 100%; height: auto; }
@@ -66,8 +74,20 @@ def why(refused: Exception) -> str:
 
 
 def html_text(text: Any) -> str:
-    """Text with print typography, escaped for HTML; subscripts of letters, such as d_c, stand below the line."""
-    return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", html.escape(typographic(text), quote=True))
+    """Text with print typography, escaped for HTML; subscripts of letters, such as d_c, stand below the line.
+
+    No line breaks between a number and its unit.
+    """
+    return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", html.escape(_NUMBER.sub("\u00a0", typographic(text)), quote=True))
+
+
+def with_subscripts(text: str) -> str:
+    """Text in which a letter and a digit, such as B0, are a letter with a subscript, B_0.
+
+    >>> with_subscripts("eq. 1: σ = σ0 - B0 T of B819")
+    'eq. 1: σ = σ_0 - B_0 T of B819'
+    """
+    return re.sub(r"(?<![\w.])([^\W\d_])(\d)(?![\w.])", r"\1_\2", text)
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -91,7 +111,7 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
     for row in rows:
         first, *rest = [cell if isinstance(cell, Markup) else html_text(cell) for cell in row]
         side = f"<th scope=row>{_breakable(first)}</th>" if left else f"<td>{first}</td>"
-        cells = (f"<td{_nowrap_class(cell)}>{cell}</td>" for cell in rest)
+        cells = (f"<td{_width_class(cell)}>{cell}</td>" for cell in rest)
         lines.append(f"<tr>{side}{''.join(cells)}</tr>")
     return (
         f'<div class="wide" tabindex="0"><table>{above}{top}<tbody>{"".join(lines)}</tbody></table></div>'
@@ -105,9 +125,11 @@ def _breakable(name: str) -> str:
     return re.sub(r"(?<=[.])(?=\w)|(?<=_)(?=\w)", "<wbr>", name) if re.fullmatch(r"[A-Za-z]\w*(\.\w+)+", name) else name
 
 
-def _nowrap_class(cell: str) -> str:
-    """HTML class attribute that keeps a short cell, such as a value with unit, on one line; else empty."""
-    return " class=n" if len(cell) <= 20 and " " in cell else ""
+def _width_class(cell: str) -> str:
+    """HTML class attribute: keeps a short cell, such as a value with unit, on one line; breaks hashes anywhere."""
+    if max(map(len, cell.split()), default=0) > _LONG and "<" not in cell:
+        return " class=l"
+    return " class=n" if len(cell) <= 20 and re.search("[ \u00a0]", cell) else ""
 
 
 class Markup(str):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,47 +12,136 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.machine.letters import said
+from steadyslip.machine.rig import Rig
 from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.reports.elements import heading, paragraph, table
 
 BAND = 2.0  # dead band over the amplitude; a band a little wider than the cycle only slows it down
+STIFFER = 2.0  # factor of all gains that is tried
+LONGER = 4.0  # length of the runs with changes over that of the run without, which bounds their computing time
+WHY = "it hunts because the integral winds up while friction at rest, larger than in sliding, holds the axis"
 HOLDS = (
     "Each contact has one normal force, and bodies are rigid. The motion is simulated for the values below and one "
     "step of the target; it says nothing of wear, heat or of what the laws leave out."
 )
 
 
+@dataclass(frozen=True)
+class Tried:
+    """A change of a rig that hunts, simulated.
+
+    Attributes
+    ----------
+    what : str
+    then : Hunt
+    least : float
+        Distance from the target at which it may rest in other runs than this one: half a dead band; m or rad.
+    """
+
+    what: str
+    then: Hunt
+    least: float
+
+    @property
+    def reach(self) -> float:
+        """Largest distance from the target, in the end of this run or of others; m or rad."""
+        rests = np.isfinite(self.then.settled_at) or self.then.hunts
+        return max(self.least, _reach(self.then) if rests else 0.0)  # ever smaller strokes end on the target
+
+    def verdict(self, allowed: float) -> str:
+        """What the change is worth where `allowed` is the distance from the target that may be left."""
+        if self.then.hunts is False and not self.then.runs_away:
+            return "ends it" if self.reach <= allowed else "no cure: it rests, but farther off than that"
+        if self.then.hunts and self.reach < allowed:
+            return "no cure: it still hunts, less far"
+        return "no cure"
+
+
 def recommendation(result: Hunt) -> Iterator[str]:
-    """HTML of what ends hunting, each change alone and simulated anew; of an axis that settles, that it does."""
+    """HTML of what ends hunting, each change alone and simulated anew; of an axis that settles, how near.
+
+    A change is called a cure only if the axis then rests within the dead band of its controller, or without one
+    nearer to the target than it hunts now.
+    """
     yield heading("The recommendation")
     if result.runs_away:
         yield paragraph("It is not friction that has to change: the controller is unstable, or too weak for its load.")
-    elif not result.hunts:
-        settles = (
-            "Keep it as it is." if result.hunts is False else "Simulate it for longer (until) before it is judged."
-        )
-        yield paragraph(settles)
+    elif result.hunts:
+        yield from _cures(result)
+    elif result.hunts is None:
+        yield paragraph("Simulate it for longer (until) before it is judged.")
+    elif np.isfinite(result.settled_at):
+        far = format_quantity(_reach(result), result.unit)
+        yield paragraph(f"Keep it as it is, if {far} from the target is near enough: there it rests.")
     else:
-        found = [(what, hunt(rig, result.protocol)) for what, rig in _changed(result)]
-        good = [(what, one) for what, one in found if np.isfinite(one.settled_at)]
-        good.sort(key=lambda pair: max(abs(pair[1].lowest), abs(pair[1].highest)))
-        best = f"the best is {good[0][0]}" if good else "none of them ends it"
-        yield paragraph(f"Each change below was tried alone; {best}.")
-        why = "What ends hunting: the integral winds up while friction at rest, larger than in sliding, holds the axis."
-        yield table([(what, one.sentence.capitalize()) for what, one in found], ("change", "then"), caption=why)
+        yield paragraph("Keep it as it is: its strokes become ever smaller.")
     yield heading("Assumptions")
     yield paragraph(HOLDS)
 
 
-def _changed(result: Hunt) -> Iterator[tuple[str, Any]]:
-    """What may end the hunting of an axis, in words, and the rig so changed."""
+def _cures(result: Hunt) -> Iterator[str]:
+    """HTML of the changes that were tried, the best first, and of what each leaves."""
+    unit, own, asked = result.unit, _reach(result), getattr(result.rig.drive, "dead_band", None)
+    allowed = own if asked is None else float(asked)
+    until = LONGER * float(result.time[-1])
+    found = [Tried(what, hunt(rig, result.protocol, until=until), least) for what, rig, least in _changed(result)]
+    found.sort(key=lambda one: (one.verdict(allowed) != "ends it", one.reach))
+    bound = "the dead band of its controller" if asked is not None else "as far as it hunts now"
+    limit = f"{format_quantity(allowed, unit)} ({bound})"
+    good = [one for one in found if one.verdict(allowed) == "ends it"]
+    if good:
+        told = f"Make this change: {good[0].what}. The axis then rests, "
+        told += f"within {format_quantity(good[0].reach, unit)} of the target" if good[0].reach else "on the target"
+        yield paragraph(f"{told}; {WHY}.")
+    else:
+        yield paragraph(f"None of the changes below lets it rest within {limit} of the target; {WHY}.")
+    rows = [
+        (
+            one.what,
+            one.then.sentence.capitalize(),
+            f"{format_quantity(one.reach, unit)}, {one.reach / own:.2g} times as far as now" if one.reach else "0",
+            one.verdict(allowed),
+        )
+        for one in found
+    ]
+    words = f"Changes, each alone and simulated. A cure leaves the axis at rest within {limit} of the target."
+    yield table(rows, ("change", "then", "off the target by up to", "worth"), caption=words)
+
+
+def _reach(result: Hunt) -> float:
+    return max(abs(result.lowest), abs(result.highest))
+
+
+def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
+    """What may end the hunting of an axis: in words, the rig so changed, and the least distance that it may leave."""
     rig: Any = result.rig
     known = rig.parameters()
-    band = BAND * max(abs(result.lowest), abs(result.highest))
+    rest = {
+        name: float(known[sliding].value)
+        for name, one in known.items()
+        if name.endswith(".mu_static") and (sliding := f"{name.removesuffix('static')}coulomb") in known
+        if one.value and known[sliding].value and one.value > known[sliding].value
+    }
+    if rest:
+        lower = " and ".join(f"{said(rig, name)} from {known[name].value:.4g} to {to:.4g}" for name, to in rest.items())
+        yield (
+            f"friction at rest no larger than in sliding ({lower}), by other guides or oil",
+            rig.with_values(rest),
+            0.0,
+        )
+    band = BAND * _reach(result)
     with suppress(ParameterError, NotAvailable, TypeError):  # a drive without these keys
         words = f"a dead band of {format_quantity(band, result.unit)} of the integral ({BAND:g} amplitudes)"
-        yield words, replace(rig, drive=replace(rig.drive, dead_band=band, dead_band_of="integral"))
+        yield words, replace(rig, drive=replace(rig.drive, dead_band=band, dead_band_of="integral")), band
+    gains = {name: STIFFER * one.value for name, one in known.items() if _is_gain(rig, name) and one.value}
+    if gains:
+        names = ", ".join(said(rig, name) for name in gains)
+        yield f"a stiffer controller, all gains times {STIFFER:g} ({names})", rig.with_values(gains), 0.0
     for name, one in known.items():
         if name.startswith("drive.") and one.role.adds_state and one.value:
-            yield f"no integral ({said(rig, name)} = 0)", rig.with_values({name: 0.0})
+            yield f"no integral ({said(rig, name)} = 0)", rig.with_values({name: 0.0}), 0.0
+
+
+def _is_gain(rig: Rig, name: str) -> bool:
+    return name in ("drive.kp", "drive.kd", "drive.ki") and bool(rig.parameters()[name].value)

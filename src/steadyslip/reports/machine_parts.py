@@ -12,21 +12,22 @@ from steadyslip.machine.letters import said
 from steadyslip.reports import rig as rig_report
 from steadyslip.reports.brief import sketch_of
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import figure, heading, table
-from steadyslip.reports.sections import assumptions, motion, notes_of, recommendation, references, tolerances_of
+from steadyslip.reports.elements import figure, heading, paragraph, table
+from steadyslip.reports.recommendation import ORDER, Order, recommendation
+from steadyslip.reports.sections import assumptions, motion, notes_of, references, tolerances_of
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.whole_text import facts
 from steadyslip.verdict.words import headline, told
 
+_MAX_ROOTS = 12  # rows of the table of eigenvalues, so that it fits half a page (by trial)
 
-def verdict_parts(
-    analysis: Analysis, tolerated: Tolerated | None = None, order: rig_report.Order = rig_report.ORDER
-) -> Parts:
+
+def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order: Order = ORDER) -> Parts:
     """Contents of the document of a verdict on a machine, with tolerances if given."""
     machine = analysis.rig
     speed = told(machine, "drive.velocity", float(machine.drive.velocity))
     body = [
-        *recommendation(analysis, tuple(order.adjustable), tolerated),
+        *recommendation(analysis, order, tolerated),
         *assumptions(machine, analysis.warnings, rig_report.VALIDITY),
         heading("The machine"), sketch_of(machine),
         rig_report.input_table(machine, tolerances_of(tolerated), notes_of(order.source)),
@@ -67,7 +68,10 @@ def _verdict_section(analysis: Analysis) -> Iterator[str]:
     yield heading("Steady sliding", 3)
     yield table(contacts, ("contact", "slides at", "normal force", "friction force", "friction"))
     yield heading("Eigenvalues", 3)
-    yield table(map(_eigenvalue_row, (s for s in analysis.eigenvalues if s.imag >= 0)), ("rate", "period", "size"))
+    roots = [s for s in analysis.eigenvalues if s.imag >= 0]
+    yield table(map(_eigenvalue_row, roots[:_MAX_ROOTS]), ("rate", "period", "size"))
+    if len(roots) > _MAX_ROOTS:
+        yield paragraph(f"and {len(roots) - _MAX_ROOTS} more, which decay faster", "small")
 
 
 def _eigenvalue_row(s: complex) -> tuple[str, str, str]:

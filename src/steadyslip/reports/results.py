@@ -37,6 +37,7 @@ from steadyslip.reports import held, machine_parts as machine_report, rig as rig
 from steadyslip.reports.brief import kind_of, result_html, sketch_of, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
+from steadyslip.reports.recommendation import Order
 from steadyslip.reports.sections import notes_of, references
 from steadyslip.verdict import Analysis, Tolerated, analyze, tolerate
 from steadyslip.verdict.compare import RigComparison
@@ -178,7 +179,7 @@ def _rig(
         found = predict(result, fit)
         result = found.rig
     within = tolerate(result, tolerances) if tolerances else None
-    order = rig_report.Order(charts, getattr(tolerances, "adjust", ()), source)
+    order = Order(charts, getattr(tolerances, "adjust", {}), source)
     return rig_report.verdict_parts(analyze(result, branch=branch), found, within, order)
 
 
@@ -194,7 +195,7 @@ def _machine(
             "a machine has one steady sliding, and fits and charts are of a slider; leave branch, fit and charts out"
         )
     within = tolerate(result, tolerances) if tolerances else None
-    order = rig_report.Order((), getattr(tolerances, "adjust", ()), source)
+    order = Order((), getattr(tolerances, "adjust", {}), source)
     return machine_report.verdict_parts(analyze(result), within, order)
 
 
@@ -253,19 +254,20 @@ def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
 
 
 @parts_of.register
-def _tolerated(result: Tolerated) -> Parts:
-    return _verdict_parts(analyze(result.rig), result)
+def _tolerated(result: Tolerated, source: str = "") -> Parts:
+    order = Order((), getattr(result.tolerances, "adjust", {}), source)
+    return _verdict_parts(analyze(result.rig), order, result)
 
 
 @parts_of.register
-def _analysis(result: Analysis) -> Parts:
-    return _verdict_parts(result)
+def _analysis(result: Analysis, source: str = "") -> Parts:
+    return _verdict_parts(result, Order((), {}, source))
 
 
-def _verdict_parts(result: Analysis, within: Tolerated | None = None) -> Parts:
+def _verdict_parts(result: Analysis, order: Order, within: Tolerated | None = None) -> Parts:
     if result.rig.in_forces:
-        return machine_report.verdict_parts(result, within)
-    return rig_report.verdict_parts(result, tolerated=within)
+        return machine_report.verdict_parts(result, within, order)
+    return rig_report.verdict_parts(result, tolerated=within, order=order)
 
 
 @parts_of.register

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import sympy as sp
@@ -20,7 +20,7 @@ from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
-from steadyslip.machine.letters import said, worded, words_of
+from steadyslip.machine.letters import letter_of, said, worded, words_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
@@ -28,14 +28,13 @@ from steadyslip.model.numeric import by_matrices
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import equation as equation_html, figure, heading, inline_math, paragraph, table, why
+from steadyslip.reports.recommendation import ORDER, Order, changeable, recommendation
 from steadyslip.reports.sections import (
     assumptions,
-    changeable,
     input_letter,
     letters,
     motion,
     notes_of,
-    recommendation,
     references,
     tolerances_of,
 )
@@ -49,18 +48,6 @@ VALIDITY = (
 )
 
 
-@dataclass(frozen=True)
-class Order:
-    """What a document was asked for: charts over pairs of parameters, what can be changed, text of the rig's file."""
-
-    charts: Sequence[tuple[str, str]] = ()
-    adjustable: Collection[str] = ()
-    source: str = ""
-
-
-ORDER = Order()
-
-
 def verdict_parts(
     analysis: Analysis, prediction: Prediction | None = None, tolerated: Tolerated | None = None, order: Order = ORDER
 ) -> Parts:
@@ -68,7 +55,7 @@ def verdict_parts(
     rig = analysis.rig
     speed = format_quantity(rig.drive.velocity, "m/s")
     body = [
-        *recommendation(analysis, tuple(order.adjustable), tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
+        *recommendation(analysis, order, tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
         heading("The rig"), figure(sketch(rig)), input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), table(facts(analysis)),
         *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # the motion is below
@@ -102,7 +89,7 @@ def input_table(
                 words_of(rig, name),
                 known,
                 format_quantity(one.value, one.role.unit, 6, rig.printed_area(name)),
-                stress_name(_meaning(one), rig.printed_area(name)),
+                stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)),
                 *((tolerances.get(name, ""),) if tolerances else ()),
                 *((notes[name] or "rig file" if name in notes else "default",) if notes else ()),
             )
@@ -111,9 +98,11 @@ def input_table(
     return table(rows, ("input", "letter", "value", "meaning", *more), caption="Inputs.")
 
 
-def _meaning(one: Address) -> str:
-    """What a parameter is; of the effects of friction also what they do."""
+def _meaning(one: Address, letter: str) -> str:
+    """What a parameter is, with its `letter`; of the effects of friction also what they do."""
     kind, doc = one.role.kind, one.role.doc
+    if "_" in letter:  # "Kp" of a description is the letter K_p
+        doc = re.sub(rf"\b{letter.replace('_', '')}\b", letter, doc)
     return f"{doc}: {PARAMETER_KINDS[kind]}" if kind.endswith("effect") and doc.startswith(kind) else doc
 
 
@@ -137,7 +126,7 @@ def checks_line(analysis: Analysis) -> Iterator[str]:
 
 def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
-    told = [*changeable(analysis, tuple(order.adjustable)), *(one for one in analysis.margins if one.edge is not None)]
+    told = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
     near = [name for name in dict.fromkeys(one.parameter for one in told) if name != stiffness]
     for x, y in order.charts or [(name, stiffness) for name in near[:2]]:
         over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))

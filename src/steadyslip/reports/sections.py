@@ -1,4 +1,4 @@
-"""Sections of a document for who ordered it: recommendation, assumptions, inputs, motion, laws and letters."""
+"""Sections of a document for who ordered it: assumptions, tolerances and notes of inputs, motion, letters, laws."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ import sympy as sp
 
 from steadyslip import figures
 from steadyslip.core.areas import outside, stress_name
-from steadyslip.core.errors import NotAvailable, ParameterError, SteadyslipError
+from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import figure_html
-from steadyslip.linear.boundary import Margin
 from steadyslip.linear.formula import MEANINGS
-from steadyslip.linear.status import stability
-from steadyslip.machine.letters import letter_of, said
+from steadyslip.machine.letters import letter_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -29,108 +27,12 @@ from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
 from steadyslip.model.numeric import has_structure
 from steadyslip.motion import History
-from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table, why
+from steadyslip.motion.status import BLOWN_UP
+from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table, why, with_subscripts
 from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, motion_after
-from steadyslip.verdict.words import told
-
-BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
-SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
-_ROWS = 4  # changes that are recommended, nearest first
-
-
-def recommendation(
-    analysis: Analysis, adjustable: Sequence[str] = (), tolerated: Tolerated | None = None
-) -> Iterator[str]:
-    """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
-
-    `adjustable` names what can be changed; otherwise all that the rig has but parameters of friction, and these if
-    nothing else helps. With tolerances it is kept only where it is stable with a chance of `SURE`.
-    """
-    yield heading("The recommendation")
-    if tolerated is not None and tolerated.share < SURE:
-        asked = f"steadyslip cure --sure '{100 * SURE:g} %' gives changes that make it so sure"
-        yield paragraph(f"{tolerated.headline()}: {asked}. What follows is of the values themselves.")
-    elif analysis.stable:
-        yield paragraph("Keep it as it is.")
-    if analysis.stable:
-        yield paragraph(_what_to_hold(analysis, adjustable))
-        return
-    rows = [row for one in changeable(analysis, adjustable) if (row := _change(analysis, one))][:_ROWS]
-    if not rows:
-        yield paragraph("No single change within range makes it stable; change several, as steadyslip cure proposes.")
-        return
-    name, now, to, *_ = rows[0]
-    yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
-    share = f"{100 * BEYOND_EDGE:g} %"
-    head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
-    yield table(rows, head, caption="Changes that make it stable.")
-
-
-def changeable(analysis: Analysis, adjustable: Sequence[str] = ()) -> list[Margin]:
-    """Margins that a document speaks of, nearest first: of what would make the rig stable, or keep it so.
-
-    Of what is named in `adjustable`; else of all that the rig has but friction, and of that if there is nothing else.
-    """
-    edged = [one for one in analysis.margins if one.edge is not None and (analysis.stable or _cures(one))]
-    chosen = [one for one in edged if one.parameter in adjustable]
-    present = [one for one in edged if one.value]  # from zero it is no change, but a part to be added
-    return chosen or [one for one in present if "friction." not in one.parameter] or present
-
-
-def _what_to_hold(analysis: Analysis, adjustable: Sequence[str]) -> str:
-    """Sentences on the nearest edge of all, and on that of what can be set, if it is another."""
-    edged = [one for one in analysis.margins if one.edge is not None]
-    if not edged:
-        return "No parameter has an edge within range."
-    can_be_set = set(adjustable) or {one.parameter for one in edged if "friction." not in one.parameter}
-    settable = [one for one in edged if one.parameter in can_be_set]
-    nearest, chosen = edged[0], next(iter(settable), None)
-    if nearest is chosen:
-        return f"The nearest edge is that of {_side(analysis, nearest)}."
-    text = f"The nearest edge is one of friction, {_side(analysis, nearest)}."
-    if chosen is None:
-        return f"{text} Nothing that can be set has one within range."
-    return f"{text} Of what can be set, the nearest is that of {_side(analysis, chosen)}."
-
-
-def _side(analysis: Analysis, margin: Margin) -> str:
-    """Parameter, its own value, and the side of its edge on which sliding stays stable."""
-    edge = margin.edge.value if margin.edge else math.nan
-    side = "below" if edge > margin.value else "above"
-    now, end = (_value(analysis, margin, value) for value in (margin.value, edge))
-    return f"{said(analysis.rig, margin.parameter)}, now {now}: keep it {side} {end}"
-
-
-def _cures(margin: Margin) -> bool:
-    edge = margin.edge
-    if edge is None or not edge.value:
-        return False
-    return not margin.remote and edge.stable == ("above" if edge.value > margin.value else "below")
-
-
-def _change(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str] | None:
-    """Row of a change: name, value, recommended value, edge, and whether it is stable there; None if not."""
-    if margin.edge is None:
-        return None
-    rig: Any = analysis.rig
-    edge = margin.edge.value
-    away = math.copysign(BEYOND_EDGE * abs(edge - margin.value if margin.unit == "rad" else edge), edge - margin.value)
-    try:
-        holds = stability(rig.with_values({margin.parameter: edge + away})) == "stable"
-    except (ParameterError, NotAvailable):
-        holds = False
-    if not holds:
-        return None
-    word = "above" if edge > margin.value else "below"
-    words = [_value(analysis, margin, value) for value in (margin.value, edge + away, edge)]
-    return said(rig, margin.parameter), words[0], words[1], f"{word} {words[2]}", "yes"
-
-
-def _value(analysis: Analysis, margin: Margin, value: float) -> str:
-    return told(analysis.rig, margin.parameter, value)
 
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
@@ -189,7 +91,10 @@ def motion(analysis: Analysis) -> Iterator[str]:
         branch, unstable = getattr(analysis, "branch", 0), analysis.stable is False
         run = None if analysis.stable is None else motion_after(rig, analysis.eigenvalues, branch, repeated=unstable)
     except SteadyslipError as refused:
-        yield paragraph(f"It was not simulated: {why(refused)}.")
+        if has_structure(rig):
+            yield paragraph(_of_structure(analysis))
+        else:
+            yield paragraph(f"It was not simulated: {why(refused)}.")
         return
     if run is None:
         yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
@@ -199,7 +104,29 @@ def motion(analysis: Analysis) -> Iterator[str]:
     words = "Motion after the drive was faster for a while, over time."
     yield figure(figure_html(lambda: figures.history(run), words, 6.4), words)
     words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
+    if run.status == BLOWN_UP:
+        words = "The same motion in the phase plane, which it leaves to the right."
     yield figure(figure_html(lambda: figures.phase_plane(run), words, 5.0), words)
+
+
+def _of_structure(analysis: Analysis) -> str:
+    """Why the motion of a structure is not simulated, and what its eigenvalues tell of it."""
+    text = "The motion of a structure is not simulated, as its equations are matrices instead of formulas."
+    leading = next(iter(analysis.eigenvalues), None)
+    if leading is None or not leading.real:
+        return text
+    grows, share = leading.real > 0, STEP - 1
+    first = f"a disturbance of the slip rate by {100 * share:.0f} %"
+    swings = f"oscillates at {format_quantity(leading.imag / (2 * math.pi), 'Hz')}, " if leading.imag else ""
+    changes = f"{'doubles' if grows else 'halves'} in {format_quantity(math.log(2) / abs(leading.real), 's')}"
+    text += f" By its eigenvalues {first} {swings}{changes}"
+    if not grows:
+        return f"{text} and dies out."
+    after = format_quantity(-math.log(share) / leading.real, "s")
+    return (
+        f"{text} and after {after} is as large as the slip rate itself: from then on the contact sticks for a part of "
+        "each period, which these eigenvalues know nothing of."
+    )
 
 
 def _told(run: History, analysis: Analysis) -> str:
@@ -244,7 +171,11 @@ def references(*rigs: Slider | Machine) -> Iterator[str]:
     both = [law for rig in rigs for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
     laws = [one for law in both for one in (law, *records_in(law)) if one.name]
     rows = dict.fromkeys((law.family, law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0]) for law in laws)
-    yield table(rows, ("part", "law", "what it is"), caption="Laws that were used.")
+    yield table(
+        ((*of, with_subscripts(words)) for *of, words in rows),
+        ("part", "law", "what it is"),
+        caption="Laws that were used.",
+    )
     yield from map(paragraph, dict.fromkeys(one for *_, words in rows for one in cited(words)))
     if not any(rig.holds for rig in rigs):
         yield paragraph(f"Method and numbered equations: {METHOD}, eqs 17-32, with corrections.")

@@ -82,7 +82,7 @@ def reason(analysis: Findings) -> str:
 
 def page_reasons(rig: Slider) -> dict[str, str]:
     """Phrases for a browser page: `REASONS`, and under ``name`` the controller gain that acts as a stiffness."""
-    return REASONS | {"name": gain_words(rig.gain_name())}
+    return REASONS | {"name": gain_words(rig)}
 
 
 def _many(ratio: float) -> str:

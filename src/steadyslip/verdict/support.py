@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from steadyslip.linear.linear_sets import linear_set
+from steadyslip.machine.letters import words_of
+from steadyslip.machine.rig import Rig
 from steadyslip.model.point import operating_point
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ class SupportStiffness(NamedTuple):
     Attributes
     ----------
     name : str
-        ``stiffness`` or, where no spring is beside the controller, the gain, such as ``gain kp``.
+        ``stiffness`` or, where no spring is beside the controller, the gain, such as ``drive proportional gain``.
     own : float
         The rig's value of it.
     beside : float
@@ -32,7 +34,7 @@ class SupportStiffness(NamedTuple):
     stable : tuple of (float, float)
         All stable values as open intervals, with `beside` unchanged.
     gain : str
-        Name of the controller gain, such as ``gain kp``.
+        Name of the controller gain, such as ``drive proportional gain``.
     """
 
     name: str
@@ -45,7 +47,7 @@ class SupportStiffness(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Name of the varied stiffness for a sentence, such as ``stiffness beside the gain kp``."""
+        """Name of the varied stiffness for a sentence, such as ``stiffness beside the drive proportional gain``."""
         return f"{self.name} beside the {self.gain}" if self.beside else self.name
 
 
@@ -55,7 +57,7 @@ def support_stiffness(analysis: Findings) -> SupportStiffness:
     point = operating_point(rig, branch=analysis.branch)
     own, gain = float(point.named()["slider.stiffness"]), float(rig.drive.proportional())
     name = rig.gain_name()
-    label = gain_words(name)
+    label = gain_words(rig)
     found = linear_set(point, name) if name and gain and not own else None
     if found is None:
         edge = analysis.critical_stiffness, analysis.critical_side
@@ -67,6 +69,7 @@ def support_stiffness(analysis: Findings) -> SupportStiffness:
     return SupportStiffness(label, gain, 0.0, critical, side, stable, label)
 
 
-def gain_words(name: str | None) -> str:
-    """Name of a drive's gain for a sentence: ``gain kp`` for ``drive.kp``, ``gain`` for None."""
-    return "gain" if name is None else f"gain {name.rpartition('.')[2]}"
+def gain_words(rig: Rig) -> str:
+    """Gain of a rig's controller in words: ``drive proportional gain`` for ``drive.kp``, ``gain`` where it has none."""
+    name = rig.gain_name()
+    return "gain" if name is None else words_of(rig, name)

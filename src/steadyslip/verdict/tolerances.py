@@ -78,6 +78,8 @@ class Tolerated(ReadOnly):
     Attributes
     ----------
     rig : Slider or Machine
+    tolerances : mapping or Tolerances
+        As they were given.
     alone : tuple of Alone
         Each parameter by itself, the one first whose measurement would tell most.
     stable : ndarray of bool (m,)
@@ -103,6 +105,7 @@ class Tolerated(ReadOnly):
     """
 
     rig: Slider | Machine = field(repr=False)
+    tolerances: Mapping[str, Any] | Tolerances = field(repr=False)
     alone: tuple[Alone, ...]
     stable: Array = field(repr=False)
     exists: Array = field(repr=False)
@@ -256,8 +259,8 @@ def tolerate(
     alone.sort(key=lambda one: -one.share)
     count = len(next(iter(corners.values()))) if corners else 0
     return Tolerated(
-        rig, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety, error, count,
-        otherwise,
+        rig, tolerances, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety, error,
+        count, otherwise,
     )  # fmt: skip
 
 

@@ -131,7 +131,7 @@ def onset_words(onset: Onset) -> str:
     if onset.rig.default_along is None:
         text = text.replace("edge in stiffness", f"edge in {said(onset.rig, onset.along)}")
     elif onset.along == onset.rig.gain_name():
-        text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.along)}")
+        text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.rig)}")
     own = onset.rig.parameters()[onset.along].value
     if onset.kind != "subcritical" or own is None:
         return text

@@ -151,7 +151,7 @@ def test_the_bar_of_a_gain_is_that_of_the_gain(browser, tmp_path):
     ss.explore(own).save(tmp_path / "rig.html")
     (edge,) = [one.value for one in ss.boundary(own, "drive.kp")]
     with Visit(browser, tmp_path / "rig.html") as visit:
-        assert "The gain kp, 900 GPa/m, is 108 times the critical 8.357 GPa/m" in visit.reason()
+        assert "The drive proportional gain, 900 GPa/m, is 108 times the critical 8.357 GPa/m" in visit.reason()
         bar = visit.page.locator(".bar")
         assert "now 900 GPa/m" in bar.inner_text()
         assert (

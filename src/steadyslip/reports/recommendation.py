@@ -1,0 +1,200 @@
+"""What a document recommends: to keep a rig, or what to change so that it slides stably, and how far."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.format import format_percent
+from steadyslip.files.specifications.tolerance_tables import Adjustment
+from steadyslip.linear.boundary import Margin
+from steadyslip.linear.status import stability
+from steadyslip.machine.letters import said, worded
+from steadyslip.reports.elements import heading, paragraph, table, why
+from steadyslip.verdict import Cures, Tolerated, Window, cure
+from steadyslip.verdict.analysis import Analysis
+from steadyslip.verdict.cures import default_adjust
+from steadyslip.verdict.tolerances import LEAST
+from steadyslip.verdict.words import told
+
+BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
+SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
+_ROWS = 4  # changes that are recommended, nearest first
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a document was asked for.
+
+    Attributes
+    ----------
+    charts : sequence of (str, str)
+        Pairs of parameters over which stability is drawn.
+    adjustable : dict of str to Adjustment
+        What can be changed, by dotted name; if empty, all that the rig has but friction.
+    source : str
+        Text of the rig's file.
+    """
+
+    charts: Sequence[tuple[str, str]] = ()
+    adjustable: Mapping[str, Adjustment] = field(default_factory=dict)
+    source: str = ""
+
+
+ORDER = Order()
+
+
+def recommendation(analysis: Analysis, order: Order = ORDER, tolerated: Tolerated | None = None) -> Iterator[str]:
+    """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
+
+    With tolerances a rig is kept only where it is stable with a chance of `SURE`; otherwise stands what `cure` finds.
+    """
+    adjustable = order.adjustable
+    yield heading("The recommendation")
+    if tolerated is not None and tolerated.share < SURE:
+        yield from _made_sure(tolerated, adjustable)
+        if analysis.stable:
+            yield paragraph(f"Of the values themselves: {_what_to_hold(analysis, adjustable)}")
+        return
+    if analysis.stable:
+        yield paragraph("Keep it as it is.")
+        yield paragraph(_what_to_hold(analysis, adjustable))
+        return
+    able = [one for one in changeable(analysis, adjustable) if not adjustable or one.parameter in adjustable]
+    rows = [row for one in able if (row := _change(analysis, one, adjustable.get(one.parameter)))][:_ROWS]
+    if not rows:
+        yield from _cured(analysis.rig, {}, adjustable, "stable", "stable at")
+        return
+    name, now, to, *_ = rows[0]
+    yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
+    share = f"{100 * BEYOND_EDGE:g} %"
+    head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
+    yield table(rows, head, caption="Changes that make it stable.")
+
+
+def _made_sure(tolerated: Tolerated, adjustable: Mapping[str, Adjustment]) -> Iterator[str]:
+    """HTML of what makes a rig stable with a chance of `SURE`, and of what to measure where that may be enough."""
+    wanted = format_percent(SURE)
+    text = worded(tolerated.rig, tolerated.headline())
+    yield paragraph(f"{text}; {wanted} are asked for here.")
+    yield from _cured(
+        tolerated.rig, tolerated.tolerances, adjustable, f"stable in {wanted} of them", f"stable in {wanted} at"
+    )
+    telling = [one for one in tolerated.alone if one.share >= LEAST]
+    if 0 < tolerated.share < 1 and telling:
+        name, part = said(tolerated.rig, telling[0].parameter), format_percent(round(telling[0].share, 2))
+        yield paragraph(
+            f"Before anything is changed it may be worth measuring {name}: of all tolerances, that of this value "
+            f"decides most ({part} of the variance of the verdict)."
+        )
+
+
+def _cured(rig: Any, tolerances: Any, adjustable: Mapping[str, Adjustment], reached: str, at: str) -> Iterator[str]:
+    """HTML of what `cure` finds: the cheapest change, the cheapest pair, and the windows of each parameter."""
+    present = {name: one for name, one in default_adjust(rig).items() if rig.parameters()[name].value}
+    try:
+        found = cure(rig, tolerances, sure=SURE, adjust=adjustable or present)
+    except (NotAvailable, ParameterError) as refused:
+        yield paragraph(f"No single change within range makes it stable, and several were not tried: {why(refused)}.")
+        return
+    of = {one.parameter: one for one in found.windows}
+    pair = " and ".join(_moved(rig, of[name], value) for name, value in found.pair.items())
+    if found.best is not None:
+        one = found.best
+        text = f"Change {_moved(rig, one, one.nearest)}: with this change alone it is {reached}."
+        text += f" Two smaller changes do it as well: {pair}." if pair else ""
+    elif pair:
+        text = f"No single change is enough. Change {pair}: with both it is {reached}."
+    else:
+        text = f"None of the values below makes it {reached}, nor do two of them together: something else must change."
+    yield paragraph(text)
+    if not tolerances and (pair or found.best):
+        yield paragraph("These values are edges: go beyond them as far as you can.")
+    yield from _windows(found, at)
+
+
+def _moved(rig: Any, window: Window, to: float | None) -> str:
+    return f"{said(rig, window.parameter)} from {window.written(window.value)} to {window.written(to or 0.0)}"
+
+
+def _windows(found: Cures, at: str) -> Iterator[str]:
+    """HTML table of the values of each parameter at which the chance is reached, and a line of those without any."""
+    rig: Any = found.rig
+    able = sorted((one for one in found.windows if one.windows), key=lambda one: one.cost)
+    rows = [(said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
+    words = "Values that are enough, each alone, the others unchanged, the cheapest first. "
+    cost = "A cost of 1 is that of doubling or halving a value, unless the rig file gives another."
+    yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
+    if without := [said(rig, one.parameter) for one in found.windows if not one.windows]:
+        yield paragraph(f"Not enough alone, whatever the value within range: {', '.join(without)}.", "small")
+
+
+def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Margin]:
+    """Margins that a document speaks of, nearest first: of what would make the rig stable, or keep it so.
+
+    Of what is named in `adjustable`; else of all that the rig has but friction, and of that if there is nothing else.
+    """
+    edged = [one for one in analysis.margins if one.edge is not None and (analysis.stable or _cures(one))]
+    chosen = [one for one in edged if one.parameter in adjustable]
+    present = [one for one in edged if one.value]  # from zero it is no change, but a part to be added
+    return chosen or [one for one in present if "friction." not in one.parameter] or present
+
+
+def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:
+    """Sentences on the nearest edge of all, and on that of what can be set, if it is another."""
+    edged = [one for one in analysis.margins if one.edge is not None]
+    if not edged:
+        return "No parameter has an edge within range."
+    can_be_set = set(adjustable) or {one.parameter for one in edged if "friction." not in one.parameter}
+    settable = [one for one in edged if one.parameter in can_be_set]
+    nearest, chosen = edged[0], next(iter(settable), None)
+    if nearest is chosen:
+        return f"The nearest edge is that of {_side(analysis, nearest)}."
+    of = "one of friction," if "friction." in nearest.parameter else "that of"
+    text = f"The nearest edge is {of} {_side(analysis, nearest)}."
+    if chosen is None:
+        return f"{text} Nothing that can be set has one within range."
+    return f"{text} Of what can be set, the nearest is that of {_side(analysis, chosen)}."
+
+
+def _side(analysis: Analysis, margin: Margin) -> str:
+    """Parameter, its own value, and the side of its edge on which sliding stays stable."""
+    edge = margin.edge.value if margin.edge else math.nan
+    side = "below" if edge > margin.value else "above"
+    now, end = (_value(analysis, margin, value) for value in (margin.value, edge))
+    return f"{said(analysis.rig, margin.parameter)}, now {now}: keep it {side} {end}"
+
+
+def _cures(margin: Margin) -> bool:
+    edge = margin.edge
+    if edge is None or not edge.value:
+        return False
+    return not margin.remote and edge.stable == ("above" if edge.value > margin.value else "below")
+
+
+def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> tuple[str, str, str, str, str] | None:
+    """Row of a change: name, value, recommended value, edge, whether it is stable there; None if not, or too far."""
+    if margin.edge is None:
+        return None
+    rig: Any = analysis.rig
+    edge = margin.edge.value
+    away = math.copysign(BEYOND_EDGE * abs(edge - margin.value if margin.unit == "rad" else edge), edge - margin.value)
+    low, high = (None, None) if within is None else (within.low, within.high)
+    if (low is not None and edge + away < low) or (high is not None and edge + away > high):
+        return None
+    try:
+        holds = stability(rig.with_values({margin.parameter: edge + away})) == "stable"
+    except (ParameterError, NotAvailable):
+        holds = False
+    if not holds:
+        return None
+    word = "above" if edge > margin.value else "below"
+    words = [_value(analysis, margin, value) for value in (margin.value, edge + away, edge)]
+    return said(rig, margin.parameter), words[0], words[1], f"{word} {words[2]}", "yes"
+
+
+def _value(analysis: Analysis, margin: Margin, value: float) -> str:
+    return told(analysis.rig, margin.parameter, value)

@@ -74,7 +74,8 @@ class Formulation:
         self.reduction, self.choice = reduction, choice
         self.method: Method = METHODS[choice.method]()
         self.size = len(reduction.state)
-        self.counted = self.size - len(reduction.model.held)  # number of variables that the error norm averages over
+        unheard = len(reduction.model.held) + len(reduction.model.past)
+        self.counted = self.size - unheard  # number of variables that the error norm averages over
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | self._inputs
         own = (one.variable.w for one in reduction.slidings if one.variable is not None)
         variables = {*reduction.state, *reduction.continuous, *self._inputs, *own}
@@ -89,6 +90,12 @@ class Formulation:
         self.timed = choice.level != "constant" or any(rate.has(TIME) for rate in self._rates)
         self._write()
         self.layout = self._made_layout()
+
+    @cached_property
+    def elimination(self) -> list[int]:
+        """Indices of the state in the order of elimination: parts of late signals first, which fill in least."""
+        past = {item.symbol for item in self.reduction.model.past}
+        return sorted(range(self.size), key=lambda i: self.reduction.state[i] not in past)
 
     @property
     def _inputs(self) -> dict[sp.Symbol, str]:

@@ -132,7 +132,7 @@ class Step(Evaluator):
         jacobian = dict(zip(sorted(kernel.pattern), entries, strict=False))
         in_time = entries[len(jacobian) :]
         inverse = 1.0 / h
-        matrix = factorised(n, jacobian, inverse * (1 / method.gamma))
+        matrix = factorised(kernel.elimination, jacobian, inverse * (1 / method.gamma))
         arguments = method.arguments()
         self.stages = []
         y: list[Value] = list(self.old)

@@ -15,14 +15,15 @@ from steadyslip.core.symbols import Letters
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
-from steadyslip.model.equations import HELD, MOVED, TIME, V_LP, Contact, Coordinate, Model, P, Q, Variable
+from steadyslip.model.equations import HELD, MOVED, TIME, V_LP, Contact, Coordinate, Model, P, Q
 from steadyslip.model.forces import INTEGRAL, Forces, SymbolicContact, all_of_law, of_law
 from steadyslip.model.statics import row_of
+from steadyslip.model.variables import Variable
 
 
 def assemble(
     mechanism: Mechanism, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter], letters: Letters,
-    drive: str = MOVED,
+    drive: str = MOVED, order: int = 0,
 ) -> Model:  # fmt: skip
     """Assemble the Model of a symbolic mechanism.
 
@@ -37,13 +38,15 @@ def assemble(
         Display letters of the parameters; those of other symbols are added.
     drive : str
         `MOVED`, `PULLED` or `EITHER`: the drive moves, its force is imposed, or both alternate.
+    order : int
+        Polynomials of each late signal in a Model for motion; 0 for one with delays.
 
     Raises
     ------
     NotAvailable
         If an imposed force of the drive would act on several links or contacts.
     """
-    return _Assembly(mechanism, letters, drive).model(given, roles)
+    return _Assembly(mechanism, letters, drive, order).model(given, roles)
 
 
 class _Assembly(Forces):
@@ -86,6 +89,7 @@ class _Assembly(Forces):
             steady=self._steady(coordinates),
             observables=self._observables(),
             late=self.late,
+            late_signals=tuple(self.past),
             letting_go=self.letting_go,
             carried=None if self.single else self.statics.carried,
         )
@@ -131,7 +135,10 @@ class _Assembly(Forces):
         delay = law.lateness()
         if delay == 0:
             return of_law(law, "strength", site.velocity, *now)
-        late = row_of(site.port.slip, self._delayed(delay, self.moving))
+        if self.order:
+            late = self._late(row_of(site.port.slip, self.moving), site.speed, delay, "m/s")
+        else:
+            late = row_of(site.port.slip, self._delayed(delay, self.moving))
         return of_law(law, "late_strength", site.velocity, late, *now)
 
     def _variables(
@@ -163,6 +170,9 @@ class _Assembly(Forces):
             what = "force of the drive that its motion does not make"
             variables.append(Variable(HELD, self.held, "Pa" if self.bare else "N", what, "held"))
             rates.append(sp.Integer(0))
+        for past in self.past:
+            variables += past.variables
+            rates += past.rates
         return tuple(variables), tuple(rates)
 
     def _controller_error(self, senses: Shares) -> sp.Expr:
@@ -189,6 +199,7 @@ class _Assembly(Forces):
             found |= dict(zip(site.memory, memory, strict=True))
             found |= dict(zip(site.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
+        found |= {symbol: zero for past in self.past for symbol in past.symbols}
         without = (*self.push.values(), *(one for site in self.sites for one in (site.press, site.outside)))
         own = [self.loading] * self.imposed + ([self.free, self.held] if self.alternates else [])
         none = dict.fromkeys((*without, *own), zero)

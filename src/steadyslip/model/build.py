@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from functools import lru_cache
+from dataclasses import replace
+from functools import lru_cache, partial
 from typing import Any
 
 import sympy as sp
@@ -84,7 +85,7 @@ def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model
         )
     kept = frozenset(present)
     key = (shape_of(rig), kept, drive)
-    return _build_cached(_Structure(key, rig, kept, drive))
+    return _build_cached(_Structure(key, rig, kept, drive), 0)
 
 
 class _Structure:
@@ -101,7 +102,8 @@ class _Structure:
 
 
 @lru_cache(maxsize=128)
-def _build_cached(structure: _Structure) -> Model:
+def _build_cached(structure: _Structure, order: int) -> Model:
+    """Model of a structure; with an `order` that for motion, if it has delays."""
     rig = structure.rig
     symbols, known = _parameter_symbols(rig, structure.present)
     given = {name: symbol for name, symbol in symbols.items() if symbol.is_Symbol}
@@ -112,7 +114,8 @@ def _build_cached(structure: _Structure) -> Model:
     laws = [law for one in rig.laws_by_contact().values() for law in (one.friction, one.contact)]
     several = {name for name, many in Counter(name for law in laws for name in law.memory()).items() if many > 1}
     taken = {*RESERVED, *known.values(), *several, *(("a",) if rig.contact_names else ())}  # a: an acceleration
-    return assemble(mechanism, given, roles, Letters(taken, known), structure.drive)
+    model = assemble(mechanism, given, roles, Letters(taken, known), structure.drive, order)
+    return replace(model, for_motion=partial(_build_cached, structure)) if model.late else model
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:

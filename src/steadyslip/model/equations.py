@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,21 +14,8 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import inner_symbols
-
-
-@dataclass(frozen=True)
-class Variable:
-    """Differential variable of the Model: name, symbol, SI unit, meaning.
-
-    `kind` is ``slip``, ``velocity``, ``memory`` (of friction), ``state`` (of a contact law), ``integral`` (of a
-    controller) or ``held`` (force of a released drive).
-    """
-
-    name: str
-    symbol: sp.Symbol
-    unit: str
-    doc: str
-    kind: str
+from steadyslip.model.dead_time import LateSignal
+from steadyslip.model.variables import Variable
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +231,11 @@ class Model(Keeper, Displayed):
         Named results and their SI units.
     late : dict of sympy.Symbol to (sympy.Symbol, sympy.Expr)
         Symbols of delayed displacements, velocities or integrals: the undelayed symbol, and the delay (s).
+    late_signals : tuple of LateSignal
+        Of a Model for motion; see `steadyslip.model.dead_time`.
+    for_motion : callable or None
+        With delays: function that builds the Model for motion, without delays, from the number of variables of each
+        late signal (`steadyslip.model.dead_time`). It has the same parameters.
     letting_go : LettingGo or None
         For a drive that is alternately moved and released.
     carried : Carried or None
@@ -264,6 +256,8 @@ class Model(Keeper, Displayed):
     steady: dict[sp.Symbol, sp.Expr]
     observables: dict[str, tuple[sp.Expr, str]]
     late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = field(default_factory=dict)
+    late_signals: tuple[LateSignal, ...] = ()
+    for_motion: Callable[[int], Model] | None = field(default=None, repr=False)
     letting_go: LettingGo | None = None
     carried: Carried | None = None
 
@@ -329,6 +323,16 @@ class Model(Keeper, Displayed):
     def integrals(self) -> tuple[Variable, ...]:
         """Integral variables of controllers."""
         return tuple(item for item in self.variables if item.kind == "integral")
+
+    @cached_property
+    def past(self) -> tuple[Variable, ...]:
+        """Variables of late signals, in a Model for motion."""
+        return tuple(item for signal in self.late_signals for item in signal.variables)
+
+    @property
+    def late_order(self) -> int:
+        """Number of variables of each late signal, in a Model for motion; 0 without."""
+        return len(self.late_signals[0].variables) if self.late_signals else 0
 
     @property
     def held(self) -> tuple[sp.Symbol, ...]:

@@ -19,6 +19,7 @@ from steadyslip.core.expressions import derivative, supported
 from steadyslip.core.symbols import Letters, inner_symbol
 from steadyslip.laws.contact import ContactInputs
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
+from steadyslip.model.dead_time import LateSignal, late_signal
 from steadyslip.model.equations import EITHER, MOVED, V_LP, LettingGo, P, Q
 from steadyslip.model.statics import NormalStress, Statics, row_of, statics
 
@@ -104,10 +105,15 @@ class Forces:
     moving, speeds : dict of str
         Velocity symbols and steady speeds of coordinates and load point.
     sites : list of SymbolicContact
+    late : dict of sympy.Symbol to (sympy.Symbol, sympy.Expr)
+        `Model.late`; empty in a Model for motion.
+    past : list of LateSignal
+        Late signals of a Model for motion.
     """
 
-    def __init__(self, mechanism: Mechanism, letters: Letters, drive: str) -> None:
-        self.mechanism, self.letters = mechanism, letters
+    def __init__(self, mechanism: Mechanism, letters: Letters, drive: str, order: int) -> None:
+        self.mechanism, self.letters, self.order = mechanism, letters, order
+        self.past: list[LateSignal] = []
         self.imposed, self.alternates = drive != MOVED, drive == EITHER
         self.loading = self._drive_symbol("loading") if self.imposed else sp.Integer(0)
         if self.alternates:
@@ -250,13 +256,42 @@ class Forces:
             acting = [one for one in acting if LOAD_POINT not in one.senses]
             total -= sp.Add(*(one.acts[name] * self._tension(one, {}, self.speeds) for one in drive_elements))
             total += self._imposed_pull(drive_elements[0], name) * self._force_area() if drive_elements else 0
-        for one in self._grouped(acting):
+        late = [one for one in acting if self.order and one.delay != 0]
+        for one in self._grouped([one for one in acting if one not in late]):
             total -= one.acts[name] * one.stiffness * row_of(one.senses, self._delayed(one.delay, self.x))
             total -= one.acts[name] * one.damping * row_of(one.senses, self._delayed(one.delay, self.moving))
-        if not integral:
-            return total
-        late = 0 if self.mechanism.integral is None else self.mechanism.integral.delay
-        return total - self._integrated(name, self._delayed(late, {"": INTEGRAL})[""])
+        delay = 0 if self.mechanism.integral is None else self.mechanism.integral.delay
+        if self.order and (late or delay != 0):
+            return total - self._late_pull(name, late, integral)
+        return total - self._integrated(name, self._delayed(delay, {"": INTEGRAL})[""]) if integral else total
+
+    def _late_pull(self, name: str, elements: list[Element], integral: bool) -> sp.Expr:
+        """Late force of elements, and of integral action, on a coordinate; equal dead times make one signal."""
+        parts: dict[tuple[Any, Any], list[tuple[sp.Expr, sp.Expr]]] = {}
+        for one in elements:
+            both = self._tension(one, self.x, self.moving), self._tension(one, {}, self.speeds)
+            parts.setdefault((one.acts[name], one.delay), []).append(both)
+        acting = self.mechanism.integral
+        if integral and acting is not None and not self.imposed and name in acting.acts:
+            parts.setdefault((acting.acts[name], acting.delay), []).append((acting.gain * INTEGRAL, sp.Integer(0)))
+        unit = "Pa" if self.bare else "N"
+        return sp.Add(*(
+            share * self._late(sp.Add(*(now for now, _ in each)), sp.Add(*(steady for _, steady in each)), delay, unit)
+            for (share, delay), each in parts.items()
+        ))  # fmt: skip
+
+    def _late(self, signal: sp.Expr, steady: sp.Expr, delay: Any, unit: str) -> sp.Expr:
+        """Value of a signal a `delay` (s) ago, in a Model for motion."""
+        if self.alternates:
+            raise NotAvailable(
+                "creep as a part of a run is not offered with a delay; let creep last for the whole run, or set the "
+                "delay to 0"
+            )
+        for one in self.past:
+            if (one.signal, one.delay) == (signal, delay):
+                return one.late
+        self.past.append(late_signal(len(self.past), self.order, signal, steady, sp.sympify(delay), unit))
+        return self.past[-1].late
 
     def _imposed_pull(self, element: Element, name: str) -> sp.Expr:
         """Force on a coordinate from the imposed force, transmitted by an element."""

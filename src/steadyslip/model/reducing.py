@@ -28,6 +28,7 @@ from steadyslip.core.expressions import derivative, replaced
 from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.mechanism import LOAD_POINT
+from steadyslip.model.dead_time import USUAL_ORDER
 from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.kinematics import in_variables, kinematics, solve_jointly, solve_sequentially
 from steadyslip.model.reduction import SPEED, TIME, V_LP, Reduction, Sliding, channels_for, slope_of
@@ -52,6 +53,7 @@ def reduce_model(
     eliminate: int | tuple[int | None, ...] | None = 0,
     pushes: tuple[str, ...] = (),
     presses: tuple[str, ...] = (),
+    order: int = USUAL_ORDER,
 ) -> Reduction:
     """Choose the variables of a Model and derive their rates.
 
@@ -65,12 +67,15 @@ def reduce_model(
         Names of the coordinates and contacts on which disturbances and normal stresses act, one channel each; or
         `EVERYWHERE`. A push may be `steadyslip.machine.mechanism.LOAD_POINT`, a press a contact's name with `PORES`
         appended. A slider needs no names.
+    order : int, optional
+        Variables of each late signal, if the model has delays.
 
     Raises
     ------
     NotAvailable
         If the motion cannot be brought into this form.
     """
+    model = model if model.for_motion is None else model.for_motion(order)
     each = eliminate if isinstance(eliminate, tuple) else (eliminate,) * len(model.contacts)
     return _Reducer(model, pushes, presses).reduction(each)
 
@@ -78,6 +83,7 @@ def reduce_model(
 @question
 def can_eliminate(model: Model, index: int, which: int) -> bool:
     """True if memory variable `which` of contact `index` can be eliminated by the balance of forces."""
+    model = model if model.for_motion is None else model.for_motion(USUAL_ORDER)
     return _Reducer(model, (), ()).eliminated_memory(index, which) is not None
 
 
@@ -85,13 +91,12 @@ class _Reducer:
     """Builder of one Reduction."""
 
     def __init__(self, model: Model, pushes: tuple[str, ...], presses: tuple[str, ...]) -> None:
-        if model.delays:
-            raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
         self.model, self.moving = model, kinematics(model)
         self.channels = channels_for(len(pushes), len(presses))
         self.given = _inputs(model, self.channels, pushes, presses)
         self.memory = tuple(item.symbol for item in (*model.memory, *model.states))
         self.integrals = tuple(item.symbol for item in model.integrals)
+        self.rest = (*self.integrals, *model.held, *(item.symbol for item in model.past))
         owner = {s.symbol: contact for contact in model.contacts for s in (*contact.memory, *contact.own_states)}
         speeds = {contact.velocity for contact in model.contacts}
         self.definitions = {
@@ -187,8 +192,8 @@ class _Reducer:
         speeds = tuple(self._speed_of(one) for one in heavy)
         own = tuple(w for _, w in self.light) if self.eliminated else ()
         memory = tuple(symbol for symbol in self.memory if symbol not in self.eliminated)
-        state = (*places, *own, *speeds, *memory, *self.integrals, *model.held)
-        continuous = (*places, *speeds, *self.memory, *self.integrals, *model.held)
+        state = (*places, *own, *speeds, *memory, *self.rest)
+        continuous = (*places, *speeds, *self.memory, *self.rest)
         self._solve_rates(heavy)
         rates = {symbol: self._in_state(self.raw[symbol]) for symbol in state}
         for i, variable in enumerate(self.moving.variables):
@@ -295,8 +300,7 @@ class _Reducer:
         for symbol in (
             *(one.displacement for one in self._independent()),
             *self.memory,
-            *self.integrals,
-            *self.model.held,
+            *self.rest,
         ):
             self.raw[symbol] = replaced(self.inlined(self.rates[symbol]), self.accelerations)
         for one in heavy:

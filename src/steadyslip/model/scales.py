@@ -13,6 +13,7 @@ from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import SPEED, Reduction
+from steadyslip.model.variables import Variable
 from steadyslip.model.weights import Weights, slip_rates, weight_expressions, weights
 
 _LEAST_DIRECT_SHARE = 1e-7  # lower bound of the direct effect in scales, relative to normal stress; chosen by trial
@@ -143,6 +144,10 @@ def machine_scales(
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.{SPEED}": found[SPEED]}
     scales |= {item.name: force for item in model.variables if item.kind == "held"}
+    largest = force
+    for area, stress in zip(areas, stresses, strict=True):
+        largest = choose(force > 0, largest, largest + area * abs(stress))
+    scales |= {item.name: least([abs(one) for one in speeds]) if _is_speed(item) else largest for item in model.past}
     for item, rate in zip(model.variables, model.rates, strict=True):
         if item.kind == "integral":
             sensed = [scales[f"{one.name}.x"] for one in model.coordinates if rate.has(one.displacement)]
@@ -174,6 +179,11 @@ def direct_effect_scale(found: Weights, choose: Choose) -> Any:
     """Direct effect used for scaling (Pa): bounded below relative to the normal stress, 0 if there is none."""
     direct, least = abs(found.direct), _LEAST_DIRECT_SHARE * abs(found.stress)
     return choose(direct > 0, choose(direct > least, direct, least), 0.0)
+
+
+def _is_speed(past: Variable) -> bool:
+    """True for a part of a late slip rate, false of a late force."""
+    return past.unit == "m/s"
 
 
 def contact_scales(
@@ -209,6 +219,8 @@ def contact_scales(
     scales |= {
         item.name: choose(direct > 0, direct, by_slip * x) for item in reduction.model.variables if item.kind == "held"
     }
+    past = reduction.model.past if reduction.model.is_single else ()
+    scales |= {item.name: abs(drive) if _is_speed(item) else choose(direct > 0, direct, by_slip * x) for item in past}
     if reduction.model.is_single and reduction.restarts:
         return scales, scales[SPEED]
     force = choose(direct > by_slip * x, direct, by_slip * x) / found.by_unknown

@@ -87,7 +87,7 @@ def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
     memory = [item.symbol for item in model.memory]
     ((w, balance),) = reduction.restarts
     at_rest = dict.fromkeys(reduction.inputs, sp.Integer(0)) | {V_LP: model.parameters["drive.velocity"]}
-    at_rest |= {item.symbol: sp.Integer(0) for item in model.integrals}
+    at_rest |= {item.symbol: sp.Integer(0) for item in (*model.integrals, *model.past)}
     at_rest |= {item.symbol: sp.sympify(model.steady[item.symbol]) for item in model.states}
     expression = balance.xreplace({w: reduction.w_of_v}).xreplace(at_rest)
     slope = derivative(expression, memory[index])
@@ -154,7 +154,9 @@ def _initial_values(
         memory[free[0]] = _matching_memory(reduction, point, places[0], speeds[0], memory, free[0])
     values = dict(zip((item.name for _, item in own), places, strict=True)) | dict(zip(names, memory, strict=True))
     values |= {f"{name}v": speed for (name, _), speed in zip(own, speeds, strict=True)}
-    values |= {item.name: start.get(item.name, 0.0) for item in model.integrals}
+    values |= {item.name: start.get(item.name, 0.0) for item in model.integrals} | {
+        item.name: 0.0 for item in model.past
+    }
     for item, value in zip(model.states, point.evaluate(_steady_states(model)), strict=True):
         values[item.name] = _number(start.get(item.name, value))
     if model.letting_go is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -35,7 +36,7 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
         In the order of time; `ContactEvent` of a machine.
     status : str
         ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
-        ``out of range`` (of floating point; samples stop before it) or ``interrupted``.
+        ``out of range`` (of floating point; samples stop before it), ``delay not resolved`` or ``interrupted``.
     end : float
         Time reached, s: of the blow-up, of the loss of contact, or the end of the protocol.
     method : str
@@ -45,6 +46,9 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     velocities : tuple of float
         Lowest and highest velocity of the run, m/s, also between samples; of a machine, a dict of slip rates by
         contact.
+    late_error : float
+        With a delay: relative change of slips, peaks and recurrences, and of the range of velocity, by a finer history
+        of what acts late; NaN without, and of loaded files.
     version : str
         Version of the program that computed it.
     """
@@ -61,6 +65,7 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     steps: int
     rejected: int
     velocities: tuple[float, float] | dict[str, tuple[float, float]]
+    late_error: float = math.nan
     version: str = field(default_factory=version, repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:

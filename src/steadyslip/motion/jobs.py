@@ -21,7 +21,9 @@ from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
+from steadyslip.model.dead_time import USUAL_ORDER
 from steadyslip.model.equations import EITHER, PULLED, Model
+from steadyslip.model.late_orders import order_for
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.posed import resolved, well_posed
 from steadyslip.model.range import in_range, require_range
@@ -66,12 +68,15 @@ class Options:
         Limit of steps.
     arrest : float
         Share of the drive velocity below which the block counts as arrested.
+    order : int
+        Variables of each late signal (`steadyslip.model.dead_time`); 0 to choose it by the rig.
     """
 
     method: str = "auto"
     rtol: float = 1e-7
     most_steps: int = 10_000_000
     arrest: float = 1e-3
+    order: int = 0
 
     def __post_init__(self) -> None:
         problems = []
@@ -127,6 +132,11 @@ class Jobs:
     def exists(self) -> np.ndarray:
         """True for rigs with steady sliding to start from."""
         return np.atleast_1d(np.asarray(self.point.exists))
+
+    @property
+    def late_order(self) -> int:
+        """Number of variables of each late signal; 0 without delays."""
+        return self.reduction.model.late_order
 
     @property
     def posed(self) -> np.ndarray:
@@ -261,7 +271,8 @@ def prepare(
                      "an infinite force; use a short velocity step instead")]
         )  # fmt: skip
     eliminate = eliminable(point)
-    reduction = reduce_model(point.model, eliminate, acting.pushes, acting.presses)
+    order = options.order or (order_for(point) if point.model.delays else USUAL_ORDER)
+    reduction = reduce_model(point.model, eliminate, acting.pushes, acting.presses, order)
     _refuse_slow_to_compile(reduction, options.method)
     if acting.drive == EITHER and not np.all(np.asarray(point.evaluate(_taken_up_by(point.model))) > 0):
         raise NotAvailable(NEEDS_STIFFNESS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Any, TypeVar
 
@@ -24,6 +24,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
+from steadyslip.model.late_orders import finer_order
 from steadyslip.motion.engine import (
     ILL_POSED,
     INTERRUPTED,
@@ -35,13 +36,14 @@ from steadyslip.motion.engine import (
     run_many,
 )
 from steadyslip.motion.jobs import Jobs, Options, prepare
+from steadyslip.motion.late_check import LATE_TOLERANCE, late_errors
 from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.single import areas, checked_times
-from steadyslip.motion.status import WORDS
+from steadyslip.motion.status import UNRESOLVED, WORDS
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
-DONE = STATUSES.index("done")
+DONE, NOT_RESOLVED = STATUSES.index("done"), WORDS.index(UNRESOLVED)
 _UNITS = ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "Hz", "s", "s", "1")
 EVENT_UNITS = {name: unit for name, unit in zip_longest(TALLY, _UNITS, fillvalue="1") if name}
 R = TypeVar("R", bound=Rig)
@@ -244,6 +246,11 @@ def simulate_many(
             count = size if index is None else len(index)
             if not _run(jobs, store, index, count, requested, threads, advanced):
                 break
+            if jobs.late_order:
+                own = replace(options, order=finer_order(jobs.late_order))
+                finer = prepare(group_rig, protocol, until, part, begin, own, branch)
+                if not store.check_late(finer, index, count, requested, threads):
+                    break
     if store is None:
         raise InternalError("at least one group of runs")
     return store.result(shape, together.dims or (), together.coords)
@@ -329,13 +336,13 @@ class _Store:
         ]
         if problems:
             raise ParameterError(problems)
-        self.watch, self.times = events, times
+        self.watch, self.told, self.times = events or jobs.late_order > 0, events, times
         self.code = np.full(size, INTERRUPTED, dtype=np.int8)
         self.end = np.full(size, np.nan)
         self.steps = np.zeros(size, dtype=np.int64)
         self.rejected = np.zeros(size, dtype=np.int64)
         self.final: dict[str, np.ndarray] = {name: np.full(size, np.nan) for name in wanted}
-        self.columns = _columns(jobs.point.model) if events else {}
+        self.columns = _columns(jobs.point.model) if self.watch else {}
         self.events = {name: np.full(size, np.nan) for name in self.columns}
         self.samples: dict[str, np.ndarray] = {}
         if len(times):
@@ -383,13 +390,27 @@ class _Store:
         self.code[rows[bad]] = OUT_OF_RANGE
         np.minimum.at(self.end, rows[bad], time[bad])
 
+    def check_late(
+        self, jobs: Jobs, index: np.ndarray | None, size: int, times: np.ndarray, threads: int | None
+    ) -> bool:
+        """Run again with a finer history of what acts late, and mark runs that differ; False if interrupted."""
+        finer = _Store(jobs, len(self.code), times, (), True)
+        if not _run(jobs, finer, index, size, times, threads, None):
+            return False
+        where = slice(None) if index is None else index
+        apart = late_errors(self.events, finer.events)[where] > LATE_TOLERANCE
+        ran = (self.code[where] == DONE) | (finer.code[where] == DONE)
+        unlike = ran & (apart | (self.code[where] != finer.code[where]))
+        self.code[where] = np.where(unlike, NOT_RESOLVED, self.code[where])
+        return True
+
     def result(self, shape: tuple[int, ...], dims: tuple[str, ...], coords: Any) -> Ensemble:
         def shaped(array: np.ndarray) -> np.ndarray:
             return array.reshape(shape + array.shape[1:])
 
         return Ensemble(
             shaped(self.code), shaped(self.end), shaped(self.steps), shaped(self.rejected),
-            {n: shaped(a) for n, a in self.final.items()}, {n: shaped(a) for n, a in self.events.items()},
+            {n: shaped(a) for n, a in self.final.items()}, {n: shaped(a) for n, a in self.events.items() if self.told},
             {n: shaped(a) for n, a in self.samples.items()}, self.times, self.units, dims, coords,
         )  # fmt: skip
 

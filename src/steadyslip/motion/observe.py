@@ -27,6 +27,7 @@ OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress
 LOADING = "loading of the drive"  # imposed force on the drive; keys of intermediate values, not in results
 WAY, LOAD = "way of the drive", "velocity of the drive"  # of a contact; keys of intermediate values
 STRESSES = ("normal_stress", "shear_stress", "spring_stress")
+UNSEEN = ("held", "past")  # kinds of variables that are not among the results
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s"}
 
 
@@ -40,7 +41,7 @@ def observable_units(model: Model, acting: Targets) -> dict[str, str]:
         | {name: "1" if kind == "share" else "Pa" for name, (_, kind, _) in acting.named().items()}
     )
     units |= {name: unit for name, (_, unit) in model.observables.items()}
-    return units | {m.name: m.unit for m in model.variables if m.kind != "held"}
+    return units | {m.name: m.unit for m in model.variables if m.kind not in UNSEEN}
 
 
 def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
@@ -64,7 +65,7 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
         turns = kind == "push" and ways.get(on, turning) == "rad"
         units[name] = "1" if kind == "share" else "N m" if turns else "N"
     units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}
-    return units | {m.name: m.unit for m in model.variables if m.name not in units and m.kind != "held"}
+    return units | {m.name: m.unit for m in model.variables if m.name not in units and m.kind not in UNSEEN}
 
 
 def out_of_range(found: dict[str, Array]) -> Array:

@@ -20,14 +20,16 @@ from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
+from steadyslip.model.late_orders import finer_order
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import AnyEvent, event_of, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
+from steadyslip.motion.late_check import LATE_TOLERANCE, late_error
 from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.result import History
-from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact, remedy
+from steadyslip.motion.status import BLOWN_UP, LOST, UNRESOLVED, WORDS, ending_contact, remedy
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
@@ -109,7 +111,21 @@ def simulate(
     most = most_steps or (OWN_STEPS if times is None else Options.most_steps)
     options = Options(method, rtol, most, arrest)
     plan = in_units_of(rig, Protocol.of(protocol))
+    run, order = _simulated(rig, plan, until, times, initial, events, options, branch, progress)
+    if not order or run.status == "interrupted":
+        return run
+    finer = replace(options, order=finer_order(order))
+    error = late_error(run, _simulated(rig, plan, until, times, initial, True, finer, branch)[0])
+    return replace(run, late_error=error, status=UNRESOLVED if error > LATE_TOLERANCE else run.status)
+
+
+def _simulated(
+    rig: Slider | Machine, plan: Protocol, until: float | str | None, times: Any, initial: Mapping[str, Any] | None,
+    events: bool, options: Options, branch: int, progress: Callable[[float], None] | None = None,
+) -> tuple[History, int]:  # fmt: skip
+    """Run, and the number of variables of each late signal."""
     jobs = prepare(rig, plan, until, {}, initial or {}, options, branch)
+    events = events or jobs.late_order > 0
     if not jobs.exists[0]:
         steady_state(rig)  # raises, and says why
     if not jobs.posed[0]:
@@ -118,7 +134,8 @@ def simulate(
     requested = checked_times(times, final)
     machine = jobs.runner(lanes=1, dense=True)
     outcome = run_single(jobs, machine, requested, watch=events, record=times is None, progress=progress)
-    return _history(rig, _with_end(plan, final), jobs, machine, outcome, requested, times is None)
+    run = _history(rig, _with_end(plan, final), jobs, machine, outcome, requested, times is None)
+    return run, jobs.late_order
 
 
 @lru_cache(maxsize=32)

@@ -12,7 +12,9 @@ from steadyslip.machine.rig import Rig
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import slip_rates
 
-WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range")
+UNRESOLVED = "delay not resolved"
+"""Status of runs with a delay that a finer late signal changes (`steadyslip.motion.late_check`)."""
+WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range", UNRESOLVED)
 LOST, BLOWN_UP = "contact lost", "blow-up"
 
 REMEDIES = {
@@ -34,6 +36,8 @@ REMEDIES = {
     "out of range": "numbers of the rig or of its motion leave the range of floating point (1e308), or are so far "
     "apart that rounding decides how the block moves; look for a parameter that is too small or too large by orders "
     "of magnitude (b, d_c, a normal stress near zero)",
+    UNRESOLVED: "what acts late is not known to 1 %: slips are too sharp for a delay this long, or the run is so long "
+    "that small differences grow; shorten the delay or the run, or raise rtol's accuracy (1e-9, say)",
     "running": "",
 }
 

@@ -121,6 +121,3 @@ def test_verdicts_with_a_delay_tell_the_onset():
     found = ss.analyze(lagging())
     assert found.onset.coefficient == ss.hopf(lagging(), "stiffness").coefficient
     assert found.onset.kind in str(found)
-    late = two_mass(kp=3.5).with_values({"drive.delay": 0.02})
-    with pytest.raises(ss.NotAvailable, match="motion with a delay is not offered"):
-        ss.cycles(late, "drive.kp")

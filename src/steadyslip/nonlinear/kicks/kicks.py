@@ -178,7 +178,7 @@ class Kicked:
         jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model, rtol), branch)
         if kick in ("force", "normal-force"):
             pushes, presses = ((self.at,), ()) if kick == "force" else ((), (self.at,))
-            reduction = reduce_model(jobs.point.model, jobs.eliminate, pushes, presses)
+            reduction = reduce_model(jobs.reduction.model, jobs.eliminate, pushes, presses)
             jobs = replace(jobs, targets=Targets(pushes, presses), reduction=reduction)
         self.jobs = jobs
         self.drive = np.broadcast_to(np.asarray(values.drive, dtype=float), (self.size,))

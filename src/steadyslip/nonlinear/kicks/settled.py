@@ -57,9 +57,12 @@ def _balance(reduction: Reduction) -> _Balance:
     inputs[model.inputs["normal_disturbance"]] = P
     place |= inputs
 
+    past = {symbol: e for one in model.late_signals for symbol, e in one.settled.items()}
+
     def solved(stress: sp.Symbol, unknown: sp.Symbol, target: sp.Expr) -> sp.Expr:
         """What the definition of a stress, linear in `unknown`, needs to be `target`."""
-        definition = model.definitions[stress].xreplace({s: e for s, e in place.items() if s is not unknown})
+        definition = model.definitions[stress].xreplace(past)
+        definition = definition.xreplace({s: e for s, e in place.items() if s is not unknown})
         return (target - definition.xreplace({unknown: zero})) / sp.diff(definition, unknown)
 
     place[contact.spring] = solved(contact.friction, contact.spring, place[contact.friction])
@@ -67,6 +70,7 @@ def _balance(reduction: Reduction) -> _Balance:
     if follows is not contact.slip:
         place[contact.slip] = zero
     place[follows] = solved(contact.spring, follows, place[contact.spring])
+    place |= {symbol: e.xreplace(place) for symbol, e in past.items()}
     residual = model.definitions[contact.normal].xreplace(place) - S
     slope = sp.diff(residual, S)
     w = reduction.w_of_v.xreplace(place)
@@ -182,7 +186,7 @@ def _steady_state_of(reduction: Reduction) -> ArrayFunction:
     steady = {item.symbol: moved(model.steady[item.symbol]) for item in (*model.memory, *model.states)}
     for one in model.coordinates:
         steady |= {one.displacement: sp.Integer(0), one.velocity: moved(one.speed), one.acceleration: sp.Integer(0)}
-    steady |= {item.symbol: sp.Integer(0) for item in model.integrals}
+    steady |= {item.symbol: sp.Integer(0) for item in (*model.integrals, *model.past)}
     speeds = {contact.velocity: moved(model.steady[contact.velocity]) for contact in model.contacts}
     steady |= {contact.friction: moved(model.steady[contact.friction]) for contact in model.contacts}
     for sliding in reduction.slidings:

@@ -1,5 +1,7 @@
 """Hunting with Coulomb friction: theory 14, a second route, limits."""
 
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -153,6 +155,40 @@ def test_a_sampled_controller_is_that_of_a_simulation_by_hand(more):
     ours = 1.0 - np.array([found.error[np.argmin(np.abs(found.time - t))] for t in times])
     assert np.ptp(theirs) > 0.9
     assert ours == pytest.approx(theirs[1:], abs=1e-9)
+
+
+def test_a_sampled_axis_with_an_encoder_is_told_by_its_average():
+    """Its strokes never repeat themselves: they end when the controller samples."""
+    found = ss.hunt(axis(**THEORY, sample_time=0.01, resolution=1e-3, derivative="measurement"))
+    assert found.hunts
+    assert len(found.strokes) == pytest.approx(12, abs=2)
+    assert found.highest == pytest.approx(0.0657, rel=0.05)
+    assert re.fullmatch(r"HUNTS .* about the target every 2[34]\.\d+ s( on average)?", found.sentence)
+
+
+@pytest.mark.parametrize("sampled", [{}, {"sample_time": 0.05}], ids=["continuous", "sampled"])
+def test_a_motion_that_is_cut_short_says_what_it_did_so_far(sampled):
+    ends = {
+        until: ss.hunt(axis(**THEORY, **sampled), DisplacementStep(at=0, by=1.0), until=until)
+        for until in (0.5, 6.0, 30.0)
+    }
+    assert [one.hunts for one in ends.values()] == [None] * 3
+    assert re.fullmatch(r"NOT DECIDED by 500 ms: it is [\d.]+ m+ from the target, still on.*", ends[0.5].sentence)
+    assert re.search(r"6 s: so far it has made one stroke of [\d.]+ m+, and is [\d.]+ m+ from", ends[6.0].sentence)
+    assert re.search(
+        r"made \d strokes, the last of [\d.]+ m+, [\d.]+ s after the one before, and is", ends[30.0].sentence
+    )
+
+
+def test_work_on_bristles_is_bounded_and_said(monkeypatch):
+    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.hunting.hunt"], "OF_BRISTLES", 300)
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml").with_values({"drive.sample_time": 0.01})
+    found = ss.hunt(held)
+    assert found.stopped
+    assert found.sentence.startswith("NOT DECIDED by ")
+    assert "the work was used up; a larger sample_time or rtol, or law = 'coulomb' with mu_static, takes less" in str(
+        found
+    )
 
 
 LIMITED = {

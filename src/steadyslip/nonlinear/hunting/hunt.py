@@ -23,7 +23,8 @@ from steadyslip.protocol.segments import pack
 
 EXACT = 1e-9  # relative difference of two cycles that are one: what exact pieces are asked to agree to
 MOST_STROKES = 400  # after which the last ones are judged as they are; chosen by trial
-MOST_STEPS = 300_000  # the same for steps, some seconds to a minute; chosen by trial
+SAMPLED_STROKES = 12  # the same of a sampled controller, whose strokes differ by when in them it samples
+MOST_STEPS, OF_BRISTLES = 150_000, 20_000  # the same for steps, exact and of bristles: some ten seconds
 LONGEST = 1e9  # s, end of a motion that ends earlier by rest, repetition, strokes or steps
 CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually there are two
 SHRINKING = 0.9  # ratio of later to earlier strokes below which they are told to shrink; chosen by trial
@@ -94,6 +95,8 @@ def hunt(
     motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol)
     last_change = max((float(t) for t in motion.segments.start[0]), default=0.0)
     close = EXACT if motion.exact else 100 * rtol
+    most_strokes = MOST_STROKES if motion.sampled is None else SAMPLED_STROKES
+    most_steps = MOST_STEPS if motion.exact else OF_BRISTLES
     at_rest = False
     for done in motion.run():
         if done is not None and progress is not None:
@@ -101,13 +104,13 @@ def hunt(
         if motion.time >= last_change and motion.at_rest:
             at_rest = True
             break
-        if motion.runs_away or motion.steps > MOST_STEPS:
+        if motion.runs_away or motion.steps >= most_steps:
             break
         if end is None and done is not None:
-            own = [one for one in motion.trace.strokes if one.start > last_change]
-            if len(own) >= MOST_STROKES or cycle_length(swings(own), close):
+            own = swings(one for one in motion.trace.strokes if one.start > last_change)
+            if len(own) >= most_strokes or cycle_length(own, close):
                 break
-    return _result(rig, given, motion, at_rest, (close, rtol), last_change)
+    return replace(_result(rig, given, motion, at_rest, (close, rtol), last_change), stopped=motion.steps >= most_steps)
 
 
 def _target(protocol: Protocol) -> Protocol:

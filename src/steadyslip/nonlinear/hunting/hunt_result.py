@@ -54,6 +54,8 @@ class Hunt(ReadOnly):
         Time from which on it rests (s); NaN if it does not.
     unit, force_unit : str
     version : str
+    stopped : bool
+        True if the motion was ended by the number of its steps.
     """
 
     rig: Slider | Machine
@@ -75,6 +77,7 @@ class Hunt(ReadOnly):
     unit: str
     force_unit: str
     version: str
+    stopped: bool = False
 
     @property
     def _swings(self) -> list[Stroke]:
@@ -107,12 +110,25 @@ class Hunt(ReadOnly):
             often += "" if self.repeats or np.isnan(self.period) else " on average"
             return f"HUNTS {size} about the target {often}"
         if self.hunts is None:
-            return f"NOT DECIDED by {format_quantity(self._end, 's')}: the last strokes reach {size} from the target"
+            return f"NOT DECIDED by {format_quantity(self._end, 's')}: {self._so_far}"
         if np.isfinite(self.settled_at):
             there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # the rest is when it was stopped
             where = "on the target" if there else f"within {size} of the target"
             return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
+
+    @property
+    def _so_far(self) -> str:
+        """What an axis has done by the end of its motion that neither rests nor hunts by then."""
+        own, now = self._swings, abs(float(self.error[-1])) if len(self.error) else 0.0
+        off = f"is {format_quantity(now, self.unit)} from the target"
+        if not own:
+            return f"it {off}" + (", still on its first stroke" if self.strokes else ", and has not moved")
+        long = format_quantity(abs(own[-1].ends - own[-1].begins), self.unit)
+        if len(own) == 1:
+            return f"so far it has made one stroke of {long}, and {off}"
+        often = f"{format_quantity(self.every, 's')} after the one before"
+        return f"so far it has made {len(own)} strokes, the last of {long}, {often}, and {off}"
 
     @property
     def _end(self) -> float:
@@ -134,6 +150,13 @@ class Hunt(ReadOnly):
             lines.append(f"controller      {low} to {high}")
         accuracy = "exact pieces" if self.exact else f"rtol {self.rtol:g}"
         lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")
+        if self.stopped:
+            way = (
+                "a larger sample_time"
+                if self.exact
+                else "a larger sample_time or rtol, or law = 'coulomb' with mu_static,"
+            )
+            lines.append(f"stopped there   the work was used up; {way} takes less")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:

@@ -61,6 +61,39 @@ class ExactSteps:
         return piece.fastest
 
 
+class Passage:
+    """Exact motion of a linear piece over a fixed time, often repeated, as one matrix: of what is between two samples.
+
+    Parameters
+    ----------
+    piece : HeldPiece
+    watched : ndarray (3, width)
+        Rows whose values at `NODES` are told.
+    length : float
+        Time (s), at most one over the fastest rate.
+    """
+
+    def __init__(self, piece: HeldPiece, watched: Array, length: float) -> None:
+        rows, self.switches = piece.guards
+        powers = [np.eye(len(piece.matrix))]
+        for k in range(1, DEGREE + 1):
+            powers.append(piece.matrix @ powers[-1] * (length / k))
+        series = np.array(powers)
+        self.width, self.guards = len(piece.matrix), len(rows)
+        guards = np.einsum("gi,kij->gkj", rows, series).reshape(-1, self.width)
+        seen = np.einsum("wi,kij,kn->wnj", watched, series, POWERS).reshape(-1, self.width)
+        self.all = np.vstack([series.sum(axis=0), guards, seen])
+
+    def passed(self, state: Array) -> tuple[Array, Array] | None:
+        """State at the end and values (3, nodes) on the way; None if a guard may become negative."""
+        found = self.all @ state
+        after = self.width + self.guards * (DEGREE + 1)
+        guards = found[self.width : after].reshape(self.guards, -1)
+        if not np.all(2 * guards[:, 0] > np.abs(guards).sum(axis=1)):
+            return None
+        return found[: self.width], found[after:].reshape(3, -1)
+
+
 class BristleSteps:
     """Steps of Rodas5P for contacts with memory; the length of a step is kept for the next piece.
 

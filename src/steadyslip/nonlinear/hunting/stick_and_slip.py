@@ -11,7 +11,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece, Switch
 from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
 from steadyslip.nonlinear.hunting.sampled import SampledController
-from steadyslip.nonlinear.hunting.steps import NODES, POWERS, BristleSteps, ExactSteps, first_crossing
+from steadyslip.nonlinear.hunting.steps import NODES, POWERS, BristleSteps, ExactSteps, Passage, first_crossing
 from steadyslip.protocol.segments import Segments
 
 BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
@@ -19,6 +19,7 @@ STILL_ERROR = 0.1  # of the error allowed per step, below which the speeds of br
 STILL = 1e-9  # of the fastest speed so far, below which what is at rest moves no more
 AT_ONCE = 100  # switches without time passing that are no sequence of switches any more
 AWAY = 1e4  # error over what friction, load or target account for, beyond which friction is negligible
+SAME = 9  # decimals of a share of the sample time to which times between samples are the same, but for rounding
 KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
 
 
@@ -94,6 +95,7 @@ class Motion:
         self.expected = loads / gain if gain else 0.0
         self.mode = HeldMode((0,) * len(plant.contacts))
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
+        self.passages: dict[tuple[HeldMode, float, float], Passage | None] = {}
         self.acceleration = 0.0
         self.exact = not plant.memory
         self.still = STILL if self.exact else max(STILL, STILL_ERROR * rtol)
@@ -139,8 +141,29 @@ class Motion:
             self.pieces[key] = HeldPiece(self.plant, *key)
         return self.pieces[key]
 
+    def _pass(self, end: float) -> bool:
+        """Go on to the next sample at once; False where that is not exact, or a contact may stick or slide before."""
+        if self.sampled is None or not self.exact or self.fresh:
+            return False
+        length = self.sampled.period * round((end - self.time) / self.sampled.period, SAME)
+        key = (self.mode, self.acceleration, length)
+        if key not in self.passages:
+            piece = self._piece()
+            self.watched[2] = piece.force
+            self.passages[key] = Passage(piece, self.watched, length) if piece.fastest * length <= 1 else None
+        passage = self.passages[key]
+        found = None if passage is None else passage.passed(self.state)
+        if found is None:
+            return False
+        self.state, values = found
+        self._keep(self.time + length * NODES, values)
+        self.time, self.at_once, self.steps = end, 0, self.steps + 1
+        return True
+
     def _step(self, end: float) -> Stroke | None:
         """Take one step, at most to a switch or the `end`; the stroke that it completes, or None."""
+        if self._pass(end):
+            return None
         piece = self._piece()
         length, coefficients = self.stepper.step(piece, self.state, end - self.time)
         self.steps += 1
@@ -235,12 +258,20 @@ class Motion:
         self.watched[2] = self._piece().force
         degrees = np.arange(len(coefficients))
         values = (self.watched @ coefficients.T * share**degrees) @ POWERS[: len(coefficients)]
-        self.trace.rows.append(np.column_stack([self.time + share * length * NODES, *values])[KEPT])
+        self._keep(self.time + share * length * NODES, values)
+
+    def _keep(self, times: Array, values: Array) -> None:
+        """Keep values (3, nodes) of a step at its times, and the extremes of the stroke."""
+        self.trace.rows.append(np.array([times[KEPT], *values[:, KEPT]]).T)
         if self.trace.strokes:
             last = self.trace.strokes[-1]
-            last.lowest = min(last.lowest, _least(values[0]))
-            last.highest = max(last.highest, -_least(-values[0]))
-            last.fastest = max(last.fastest, -_least(-np.abs(values[1])))
+            speeds = np.abs(values[1])
+            if min(values[0, 0], values[0, -1]) - last.lowest < np.ptp(values[0]) or not np.isfinite(last.lowest):
+                last.lowest = min(last.lowest, _least(values[0]))
+            if last.highest - max(values[0, 0], values[0, -1]) < np.ptp(values[0]) or not np.isfinite(last.highest):
+                last.highest = max(last.highest, -_least(-values[0]))
+            if last.fastest < 2 * speeds.max():
+                last.fastest = max(last.fastest, -_least(-speeds))
             self.fastest = max(self.fastest, last.fastest)
             self.farthest = max(self.farthest, last.highest, -last.lowest)
 
@@ -259,6 +290,8 @@ class Motion:
         plant, n = self.plant, self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
             return False
+        if self.sampled is not None and not (self.sampled.constant and not any(self.mode.contacts)):
+            return False
         pace = self.still * max([self.fastest, *(one.slow for one in plant.contacts)])
         if np.any(np.abs(self.state[n : 2 * n]) > pace):
             return False
@@ -267,7 +300,7 @@ class Motion:
         if moves and np.any(np.abs(rates[n : 2 * n]) > pace * self.stepper.fastest(self._piece(), self.state)):
             return False
         if self.sampled is not None:
-            return self.sampled.constant and not any(self.mode.contacts)
+            return True
         winds_up = self.mode.limit * float(self._piece().wanted @ rates) > 0  # the force stays at its limit
         return winds_up or bool(abs(rates[2 * n]) <= (self.still * self.farthest if moves else 0.0))
 

@@ -24,6 +24,16 @@ def curve(v, mu_coulomb, mu_static, v_stribeck, viscous, stribeck_exponent):
     return mu_coulomb + (mu_static - mu_coulomb) * np.exp(-((v / v_stribeck) ** stribeck_exponent)) + viscous * v
 
 
+def test_bristles_are_told_in_newtons_a_micrometre(tmp_path):
+    """In the text as in the file that is written."""
+    places = np.concatenate([np.linspace(0, 0.8, 30), np.linspace(0.8, -0.8, 60), np.linspace(-0.8, 0.8, 60)]) * 1e-6
+    rows = zip(places, loop_forces(places, 400e6, 580.0, 0.0)[0], strict=True)
+    (tmp_path / "loop.csv").write_text("x [m],F [N]\n" + "".join(f"{x:.9g},{f:.9g}\n" for x, f in rows))
+    force = LOAD * curve(SPEEDS, **AXIS)
+    found = fitted(force, loop=tmp_path / "loop.csv")
+    assert "bristle stiffness 400 N/um at 3.2 kN, from the loop (95 %: 400 N/um to 400 N/um)" in str(found)
+
+
 def fitted(force, speed=SPEEDS, **options):
     return ss.experiments.fit_friction_table({"speed": speed, "force": force, "load": LOAD}, "lugre", **options)
 
@@ -179,6 +189,33 @@ def test_directions_are_fitted_apart():
     found = fitted(force, speed=speed)
     assert found.backward["mu_static"].value == pytest.approx(1.1 * found.forward["mu_static"].value, rel=1e-3)
     assert "# mu_static = 0.209" in found.rig_text()
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("speed [mm/min],F [kg]", "F [kg]: kg is a mass: write kgf for the reading of a balance"),
+        ("speed [rpm],torque [kg cm]", "torque [kg cm]: kg cm is a mass: write kgf cm"),
+        ("speed [rpm],torque [%]", "torque [%]: % is a share: multiply it by the rated value, and write N m"),
+        ("speed [rpm],Drehmoment [A]", "Drehmoment [A]: A is none of its units: write N m; multiply a current"),
+        ("speed [m],torque [Nm]", "speed [m]: m is none of its units: write m/s or rad/s"),
+    ],
+)
+def test_a_column_in_another_unit_is_named_with_it(tmp_path, header, words):
+    path = tmp_path / "table.csv"
+    path.write_text(f"{header}\n1,5\n2,4\n5,3.9\n10,3.8\n")
+    with pytest.raises(ss.ParameterError) as caught:
+        read_speed_table(path)
+    assert words in str(caught.value)
+
+
+def test_coefficients_in_per_cent_and_loads_named_m_are_read(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("speed [mm/min],mu [%],m [kg]\n1,15,10\n2,14,10\n5,13,10\n")
+    read = read_speed_table(path)
+    assert read.is_coefficient
+    assert read.friction == pytest.approx([0.15, 0.14, 0.13])
+    assert read.load == pytest.approx([98.0665] * 3)
 
 
 @pytest.mark.parametrize("law", ["lugre", "coulomb-stribeck", "coulomb", "rate-state"])

@@ -1,5 +1,7 @@
 """Files to begin with: every combination of laws is a rig that answers, with every key of its laws."""
 
+import re
+
 import pytest
 
 import steadyslip as ss
@@ -25,6 +27,21 @@ def test_every_law_gives_a_rig_with_all_its_keys(friction, contact):
         for law in (type(rig.friction), type(rig.contact), type(rig.drive), Slider):
             missing = [key_of(item) for item, _ in own_fields(law) if f"{key_of(item)} = " not in text]
             assert set(missing) <= {"states"}, missing
+
+
+@pytest.mark.parametrize("drive", ["steady", "pid"])
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_commented_values_are_those_of_the_same_slide(contact, drive):
+    """Each key that is uncommented alone is read; forces are of a slide, times of a controller."""
+    text, faults = starter_text("rig", "lugre", contact, drive), []
+    for line in [one for one in text.splitlines() if re.match(r"# [a-z_]+ = ", one)]:
+        try:
+            ss.rig_from_text(text.replace(line, line.removeprefix("# ")))
+        except ss.RigFileError as error:  # of keys that exclude each other, or that need another one
+            faults.append(str(error))
+    assert not [one for one in faults if re.search("dimension|no unit|not a quantity|allowed: a", one)]
+    assert "5 MPa" not in text
+    assert 'delay = "1 ms"' in text or drive == "steady"
 
 
 def test_a_rig_answers_as_it_is(tmp_path):

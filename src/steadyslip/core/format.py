@@ -47,6 +47,7 @@ def _best(value: float, names: tuple[str, ...]) -> str | None:
 
 _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
+HIDDEN = 1e-3  # share of its error below which a value is told as 0: no digit of it is known
 _SHORTEST, _LONGEST = 1e-3, 1e5  # numbers between are written without exponent; others in the SI unit without prefix
 
 
@@ -97,16 +98,20 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
 
 
 def format_with_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
-    """Format a value and its error, both in the unit chosen for the value.
+    """Format a value and its error, both in the unit chosen for the value; that of the error where it hides the value.
 
     >>> format_with_error(1.009e-5, 8.7e-7, "m"), format_with_error(0.00696, 0.00043, "1")
     ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
+    >>> format_with_error(7e-17, 350.0, "s/m"), format_with_error(1.2e-9, 3.5e-5, "m")
+    ('0 ± 350 s/m', '0 ± 35 um')
     """
     scale, si_unit = outside(si_unit, area)
     value, error = value * scale, error * scale
+    if abs(value) < HIDDEN * error < math.inf:
+        return f"0 ± {format_quantity(error, si_unit, 2)}"
     number, _, name = format_quantity(value, si_unit).partition(" ")
     factor = value / float(number) if float(number) else 1.0
-    return f"{number} ± {error / factor:.2g} {name}".rstrip()
+    return f"{number} ± {_few(error / factor, 2)} {name}".rstrip()
 
 
 def format_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:

@@ -210,8 +210,10 @@ def words(found: SpeedFindings) -> str:
     if found.bristles is not None:
         at = "" if table.load is None else f" at {format_quantity(found.main.load, 'N')}"
         size = "N m/rad" if table.turns else "N/m"
-        low, high = (format_quantity(end, size) for end in (found.bristles.low, found.bristles.high))
-        value = format_quantity(found.bristles.value, size)
+        with display_units([] if table.turns else ["N/um"]):
+            value, low, high = (
+                format_quantity(end, size) for end in (found.bristles.value, found.bristles.low, found.bristles.high)
+            )
         lines.append(f"bristle stiffness {value}{at}, from the loop (95 %: {low} to {high})")
     known = parameters(found.main.law)
     names = [name for name in untold(found) if found.bristles is None or known[name].role.kind != BRISTLES]

@@ -138,6 +138,7 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     kinds = [role for role in ("force", "torque", "friction") if role in found]
     if "speed" not in found or len(kinds) != 1:
         lacking = "speed" if "speed" not in found else "force"
+        _refuse_misfits(Path(path))
         both = f"has columns of {' and of '.join(kinds)}; leave one out" if len(kinds) > 1 else "has no column for it"
         names = listed(repr(name) for name in _table(Path(path)).names)
         raise _fault(source, lacking, f"{both}; a table of speeds has speed, force or torque or friction, and if known "
@@ -208,6 +209,7 @@ def read_loop(path: str | PathLike[str], **columns: Any) -> PreslidingLoop:
     found, notes = _roles(Path(path), columns)
     kind = "torque" if "torque" in found else "force"
     if "displacement" not in found or kind not in found:
+        _refuse_misfits(Path(path))
         raise _fault(str(path), "displacement", "a loop before sliding has columns of displacement and force")
     x, f = found["displacement"][0], found[kind][0].values
     keep = np.isfinite(x.values) & np.isfinite(f)
@@ -243,6 +245,15 @@ def _directions(raw: bytes) -> bytes:
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 
+def _refuse_misfits(path: Path) -> None:
+    """Refuse columns that are named like a speed, force or torque and have another unit."""
+    table = _table(path)
+    heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
+    problems = [Problem(name, why) for name, head in zip(table.names, heads, strict=True) if (why := _misfit(*head))]
+    if problems:
+        raise ParameterError(problems, title=str(path))
+
+
 def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]], list[str]]:
     """Columns of a file by role, and notes; of friction there may be two, forward and backward."""
     table = _table(path)
@@ -260,6 +271,8 @@ def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]]
             continue
         stated = chosen.get(role, (None, None))[1] or own
         if stated is None:
+            if wrong := _misfit(head, None):
+                raise _fault(str(path), name, wrong)
             stated = _UNITS[role][0]
             if role not in ("friction", "direction"):
                 notes.append(f"{role}: column {name!r} has no unit; read as {stated}")
@@ -316,28 +329,53 @@ def _asked(
 
 
 def _guess(head: str, own: str | None) -> str | None:
-    """Role of a column by its name and unit; None if none is."""
+    """Role of a column by its name and unit; None if none is, or if they contradict each other."""
     if _SPREAD.search(head):
         return None
-    words = {word for word in re.split(r"[^a-zµμφωäöüß]+", head.lower()) if word}
-    joined = re.sub(r"[^a-zµμφωäöüß]", "", head.lower())
-    fits = list(_UNITS)
+    fits, named = list(_UNITS), _named(head)
     if own is not None and own != "1":
         dimension = unit(own)[1]
         fits = [role for role, allowed in _UNITS.items() if dimension in [unit(one)[1] for one in allowed]]
-        fits = [role for role in fits if role not in ("friction", "direction")]
-    named = [
-        role
-        for role, pattern in _WORDS.items()
-        if role in fits and (re.fullmatch(pattern, joined) or any(re.fullmatch(pattern, word) for word in words))
-    ]
-    if named:
-        return named[0]
+        fits = [role for role in fits if role != "direction" and (role != "friction" or role in named)]
+    if found := [role for role in named if role in fits]:
+        return found[0]
     if own is not None and own != "1" and fits:
-        return "force" if "force" in fits else fits[0]
+        return "force" if "force" in fits else None if _misfit(head, own) else fits[0]
     if _side(head):
         return "force"
     return None
+
+
+def _named(head: str) -> list[str]:
+    """Roles that the name of a column says, without its unit."""
+    words = {word for word in re.split(r"[^a-zµμφωäöüß]+", head.lower()) if word}
+    words.add(re.sub(r"[^a-zµμφωäöüß]", "", head.lower()))
+    return [role for role, pattern in _WORDS.items() if any(re.fullmatch(pattern, word) for word in words)]
+
+
+def _misfit(head: str, own: str | None) -> str:
+    """What is wrong with the unit of a column that is named like a speed, force or torque; empty if it fits.
+
+    Names of one letter say little: a mass may be m or t, a displacement s.
+    """
+    bracket = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", head)
+    said = own or (bracket[1] if bracket else "")
+    kinds = [role for role in _named(head) if role in ("force", "torque", "speed")]
+    if not said or said == "1" or not kinds or (len(head) == 1 and head.lower() != "f"):
+        return ""
+    lever = " cm" if "torque" in kinds else ""
+    good = " or ".join(one for role in kinds for one in _UNITS[role])
+    try:
+        dimension = unit(said)[1]
+    except QuantityError:
+        return f"{said} is none of its units: write {good}; multiply a current by the torque constant"
+    if dimension in [unit(one)[1] for role in kinds for one in _UNITS[role]]:
+        return ""
+    if dimension.mass == 1 and not dimension.time:
+        return f"{said} is a mass: write kgf{lever} for the reading of a balance, which is 9.80665 N{lever}"
+    if dimension == unit("1")[1]:
+        return f"{said} is a share: multiply it by the rated value, and write {good}"
+    return f"{said} is none of its units: write {good}"
 
 
 def _side(head: str) -> int:

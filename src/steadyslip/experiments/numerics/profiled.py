@@ -174,14 +174,16 @@ def _end(minimum: ProfiledMinimum, i: int, limit: float, step: float) -> float:
         return float(np.sqrt(max(ssq - minimum.ssq, 0.0) / minimum.variance)) - limit
 
     inner, size = own, limit * step
+    known = {own: -limit}  # computed again from other starts, values that are rounding may have the other sign
     for _ in range(MOST_STEPS):
         outer = own + size
         beyond = outer <= bound if step < 0 else outer >= bound
         outer = bound if beyond else outer
-        if excess(outer) >= 0:
+        known[outer] = excess(outer)
+        if known[outer] >= 0:
             if inner == own:
                 last = minimum.at
-            found = brentq(lambda x: excess(x) if x != own else -limit, inner, outer, xtol=PRECISION * abs(size))
+            found = brentq(lambda x: known[x] if x in known else excess(x), inner, outer, xtol=PRECISION * abs(size))
             return float(found)
         if beyond:
             break

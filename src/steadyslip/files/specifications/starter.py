@@ -93,10 +93,10 @@ def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterato
             yield from _comment(f"{role.doc}: one of {words}")
             yield f'# {key} = "{default}"'
         return
-    values, not_beside = _usual_values()
+    values, suggested, not_beside = _usual_values()
     usual = key in values and key not in not_beside.get(law.name, ())
     if isinstance(role, Parameter):
-        value = values.get(key, example(role.unit).replace("'", '"'))
+        value = values.get(key) or suggested.get(key) or example(role.unit).replace("'", '"')
         text = f"{key} = {value}"
         yield f"{text if usual or is_required(item) else '# ' + text:<{_WIDE}} # {role.doc}"
     elif hasattr(role, "choices"):
@@ -106,12 +106,18 @@ def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterato
 
 
 @cache
-def _usual_values() -> tuple[dict[str, str], dict[str, list[str]]]:
-    """Values of a slow machine slide as TOML text by key, and by law the keys that are left out."""
+def _usual_values() -> tuple[dict[str, str], dict[str, str], dict[str, list[str]]]:
+    """Values of a slow machine slide as TOML text by key, those of commented keys, and by law the keys left out."""
     text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
-    values, _, _ = text.partition("[not_beside]")
-    lines = (line.partition(" = ") for line in values.splitlines() if " = " in line)
-    return {key: value for key, _, value in lines}, tomllib.loads(text)["not_beside"]
+    usual, _, rest = text.partition("[suggested]")
+    suggested, _, _ = rest.partition("[not_beside]")
+    return _values(usual), _values(suggested), tomllib.loads(text)["not_beside"]
+
+
+def _values(text: str) -> dict[str, str]:
+    """TOML text of each value by key."""
+    lines = (line.partition(" = ") for line in text.splitlines() if " = " in line)
+    return {key: value for key, _, value in lines}
 
 
 def _comment(text: str) -> list[str]:

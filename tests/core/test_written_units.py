@@ -1,5 +1,6 @@
 """Rigs, their results and figures are told in the units of the file that the rig was read from."""
 
+import dataclasses
 import pickle
 import re
 
@@ -35,9 +36,9 @@ def axis():
 
 
 def plain(rig):
-    """The same rig in SI, as if built in Python."""
-    return ss.Slider(**{name: getattr(rig, name) for name in ("friction", "contact", "drive", "stiffness", "mass",
-                                                              "damping", "area")})  # fmt: skip
+    """The same rig in SI, as if built in Python, of laws of its own: those of a file know its units."""
+    laws = {name: dataclasses.replace(getattr(rig, name)) for name in ("friction", "contact", "drive")}
+    return ss.Slider(**laws, **{name: getattr(rig, name) for name in ("stiffness", "mass", "damping", "area")})
 
 
 def test_texts_of_results_keep_the_units_of_the_file(axis):
@@ -82,6 +83,13 @@ def test_a_changed_rig_keeps_them_and_gains_those_of_its_values(axis):
     changed = axis.with_values({"velocity": "60 mm/h"})
     assert "at 60 mm/h" in str(ss.steady_state(changed))
     assert "N/um" in str(ss.boundary(changed, "stiffness")[0])
+
+
+def test_a_copy_by_dataclasses_keeps_them_and_other_rigs_do_not_get_them(axis):
+    copy = dataclasses.replace(axis, stiffness=1.1 * axis.stiffness)
+    assert set(copy.written_in) == set(axis.written_in) != set()
+    assert "N/um" in str(ss.analyze(copy)).splitlines()[1]
+    assert not plain(axis).written_in
 
 
 def test_figures_and_fragments_have_them(axis):

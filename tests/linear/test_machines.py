@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from machines import at_random, brake, coulomb, leading, rate_state, surface, three_bodies, two_blocks, two_mass
+from machines import at_random, block, brake, coulomb, leading, rate_state, surface, three_bodies, two_blocks, two_mass
 from steadyslip.linear.roots import roots
 from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients
@@ -263,3 +263,13 @@ def test_eigenvalues_of_machines_at_random_make_theory_11s_matrix_singular(seed)
         values = np.linalg.svd(matrix(s), compute_uv=False)
         near = np.linalg.svd(matrix(s * (1 + 1e-6)), compute_uv=False)
         assert values[-1] < 1e-8 * values[0] or values[-1] < 1e-3 * near[-1]
+
+
+def test_edges_of_dampings_that_are_zero_are_those_of_small_ones():
+    """Also where a cure is sought among them; none of a machine that nothing damps, where the least decides."""
+    axis = ss.read_rig("examples/machines/feed-axis.toml", ["links.screw.stiffness=8 N/um", "links.screw.damping=0"])
+    (zero,) = (one for one in ss.margins(axis) if one.parameter == "links.screw.damping")
+    (small,) = ss.boundary(axis.with_values({"links.screw.damping": 1e-3}), "links.screw.damping")
+    assert zero.edge.value == pytest.approx(small.value, rel=1e-9)
+    assert zero.edge.stable == "above"
+    assert not [one for one in ss.margins(block()) if one.parameter.endswith(".damping")]

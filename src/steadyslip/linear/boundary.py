@@ -21,6 +21,7 @@ from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
 from steadyslip.linear.measured_search import MeasuredSearch
 from steadyslip.linear.search import Boundary, Search
+from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -194,20 +195,20 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
     """
     if not by_matrices(rig):
         _require_answers(rig, branch)
-    present = rig.kept_zeros()
+    present, zeros = rig.kept_zeros(), _zero_dampings(rig)
     asked = [
         (name, address)
         for name, address in rig.parameters().items()
         if not address.role.gauge
         and address.value is not None
-        and (address.value != 0 or not address.role.structural or name in present)
+        and (address.value != 0 or not address.role.structural or name in present or name in zeros)
     ]
     found, cut, share, left = [], [], 0, _TERMS
     while asked and left // len(asked) > share:  # those that took too long again, with what the others did not need
         missing, share = [], left // len(asked)
         for name, address in asked:
             with at_most(share) as allowance:
-                search = _search(rig, name, present, branch)
+                search = _search(rig, name, present if address.value else rig.kept_zeros(name), branch)
                 edges = search.boundaries(None)
             left -= share - allowance.left
             if allowance.spent or search.hides:
@@ -223,6 +224,14 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
             found.append(own)
         asked = missing
     return tuple(sorted(found, key=_urgency)), (*(name for name, _ in asked), *cut)
+
+
+def _zero_dampings(rig: Rig) -> tuple[str, ...]:
+    """Dampings of a machine that are zero but may be given; none of one that nothing damps: the least decides there."""
+    found = [name for name, one in rig.parameters().items() if name.endswith(".damping") and one.value == 0]
+    if not found or by_matrices(rig) or is_undamped(operating_point(rig)):
+        return ()
+    return tuple(found)
 
 
 def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Margin, ...]:

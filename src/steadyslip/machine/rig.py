@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
@@ -59,6 +59,25 @@ class Rig(FrozenRecord, Keeper):
     words: ClassVar[Mapping[str, str]] = {}
     """Words of messages about a rig of this class: `rig`, `block`, `place` of a coordinate by its name, and what limits
     its speed, `damping` and `mass`."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.written_in:  # of a copy by dataclasses.replace: its parts know the file
+            self.told_in(name for one in self._parts() for name in one.written_in)
+
+    def told_in(self, names: Iterable[str]) -> Self:
+        """The rig itself, which is told in these units from now on, and so is what is made of its parts."""
+        names = tuple(names)
+        for one in self._parts():
+            one.told_in(names)
+        return super().told_in(names)
+
+    def _parts(self) -> Iterator[FrozenRecord]:
+        """Records that the rig is made of, such as its laws."""
+        for item in fields(self):
+            value = self.__dict__.get(item.name)  # not the default of a class, while it is being made
+            several = value.values() if isinstance(value, Mapping) else value if isinstance(value, tuple) else (value,)
+            yield from (one for one in several if isinstance(one, FrozenRecord))
 
     @property
     def contact_names(self) -> tuple[str, ...]:

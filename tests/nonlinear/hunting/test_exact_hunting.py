@@ -2,6 +2,7 @@
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -189,6 +190,13 @@ def test_work_on_bristles_is_bounded_and_said(monkeypatch):
     assert "the work was used up; a larger sample_time or rtol, or law = 'coulomb' with mu_static, takes less" in str(
         found
     )
+
+
+def test_a_contact_that_follows_the_load_is_refused_with_the_way_out():
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml")
+    loaded = replace(held, contact=ss.laws.Transmitted(preload=1.0, transmitted=0.1))
+    with pytest.raises(ss.NotAvailable, match=r"'transmitted' lets .* law = 'constant' with the preload .* load held"):
+        ss.hunt(loaded)
 
 
 LIMITED = {

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import DURATION, checked
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
@@ -82,7 +83,10 @@ def hunt(
     HUNTS ±65.65 mm about the target every 24.01 s
     """
     if not rig.holds:
-        message = f"got {rig.drive.velocity:g}; hunting is of a drive that holds a place: a controller at velocity = 0"
+        now = format_quantity(*rig.told("drive.velocity", float(rig.drive.velocity)))
+        message = (
+            f"got {now}; hunting is of a drive that holds a place: write velocity = 0, and control = 'pid' with gains"
+        )
         raise ParameterError([Problem("drive.velocity", message)])
     given = _target(in_units_of(rig, Protocol.of(protocol)))
     plant = plant_of(rig)

@@ -177,7 +177,11 @@ def _contact(port: ContactPort, names: list[str]) -> HeldContact:
     time = sp.Symbol("t")
     load, slow = contact.load(), law.slow_velocity()
     if port.separation or contact.memory() or not contact.is_imposed() or contact.imposed(time) != 0:
-        raise NotAvailable(f"{label}contact: hunting needs a constant normal force; law = 'constant' has one")
+        raise NotAvailable(
+            f"{label}contact: the law {contact.name!r} lets the normal force change with the motion, and hunting needs "
+            "a constant one: write law = 'constant' with the preload that presses where the axis is held; for "
+            "'transmitted' that is preload + transmitted x the load held"
+        )
     if law.lateness() or (law.memory() and slow is None):
         raise NotAvailable(
             f"{label}friction: the law {law.name!r} is not offered at rest; allowed: coulomb, coulomb-stribeck, lugre"

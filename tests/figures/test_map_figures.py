@@ -52,9 +52,10 @@ def test_a_chart_has_units_regions_and_the_exact_edge(maps):
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("angle ψ (deg)", "stiffness k (GPa/m)")
     assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "log")
     assert labels(ax) == [
-        "stable", "unstable", "no steady sliding (lock-up)", "k/k_cr", "edge of stability: oscillation", "this rig",
-        "nearest edge",
+        "no steady sliding (lock-up)", "edge of stability: oscillation", "this rig", "nearest edge",
+        "stiffness over critical $k/k_{\\mathrm{cr}}$",
     ]  # fmt: skip
+    assert {"stable", "unstable", "no steady sliding"} < {text.get_text() for text in ax.texts}
     angle, stiffness = edge_of(ax).T
     exact = ss.critical_stiffness(rig(), {"contact.angle": np.radians(angle)}) / 1e9
     # 40 halvings of a grid cell of 0.045 in ln k, or of one of 2.5 degrees on an edge whose slope is below 1 per degree
@@ -83,8 +84,9 @@ def test_safety_contours_run_where_the_factor_is_what_they_say(maps):
     ax = maps["chart"].plot(show="safety_factor")
     lines = [c for c in ax.collections if hasattr(c, "levels") and len(c.levels) > 2]
     (contours,) = lines
-    assert set(contours.levels) <= {0.1, 0.2, 0.5, 1, 2, 5, 10}
-    for level, path in zip(contours.levels, contours.get_paths(), strict=True):
+    levels = contours.levels / (1 - contours.levels)  # drawn of k/(k + k_cr)
+    assert levels == pytest.approx([0.1, 0.2, 0.5, 2, 5, 10])
+    for level, path in zip(levels, contours.get_paths(), strict=True):
         angle, k = path.vertices[path.vertices[:, 0] > -40].T
         factor = k * 1e9 / ss.critical_stiffness(rig(), {"contact.angle": np.radians(angle)})
         np.testing.assert_allclose(factor, level, rtol=0.02)
@@ -122,6 +124,9 @@ def test_a_map_of_statuses_alone_has_the_exact_edge(maps, tmp_path):
     coarse = ss.run_map(ss.Map(rig(), grids, ["status"]), tmp_path / "coarse.zarr", workers=1)
     angle, stiffness = edge_of(coarse.plot()).T
     exact = ss.critical_stiffness(rig(), {"contact.angle": np.radians(angle)}) / 1e9
+    slides = np.isfinite(exact)  # the line goes on below the area without steady sliding, which is painted on it
+    assert slides.sum() > 5
+    stiffness, exact = stiffness[slides], exact[slides]
     np.testing.assert_allclose(stiffness, exact, rtol=1e-8)
 
 
@@ -221,7 +226,8 @@ def test_numbers_out_of_range_have_words(tmp_path):
     plan = ss.Map(base, over, ["status", "critical_stiffness"], chunk=4)
     found = ss.run_map(plan, tmp_path / "screw.zarr", workers=1)
     assert found.statistics()["status"]["out of range"] > 0
-    assert "numbers out of the range of floating point" in labels(found.plot())
+    ax = found.plot()
+    assert "numbers out of the range of floating point" in [*labels(ax), *(text.get_text() for text in ax.texts)]
     assert "numbers out of the range of floating point" in labels(found.plot(x="friction.v_stribeck", y=""))
     bare = ss.run_map(ss.Map(base, over, ["critical_stiffness"]), tmp_path / "bare.zarr", workers=1)
     (words,) = (word for word in labels(bare.plot()) if word.startswith("no critical stiffness"))

@@ -15,21 +15,32 @@ from matplotlib.path import Path
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures import regions
 from steadyslip.figures.axis import ChartAxis, chart_axis
-from steadyslip.figures.style import AREAS, CONTOURS, EDGES, HALO, OWN_RIG, SAFETY_LEVELS, add_legend_above, axes_or_new
+from steadyslip.figures.contours import SAFETY_LEVELS, draw_levels, extended, safety_fields
+from steadyslip.figures.style import (
+    AREAS,
+    CONTOURS,
+    EDGES,
+    HALO,
+    OWN_RIG,
+    SAFETY_WORDS,
+    add_legend_above,
+    axes_or_new,
+)  # fmt: skip
+from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.stable_values import safety_factor
-from steadyslip.linear.status import ABSENT, QUIET, STABLE, status as status_of
+from steadyslip.linear.status import ABSENT, QUIET, STABLE, UNDAMPED, UNSTABLE, status as status_of
 from steadyslip.linear.stiffness import eigenvalues
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence
 
-_CONTOUR_POINTS = 61  # along each axis: contours are smooth, and delays cost some 0.1 ms a point (measured)
+_CONTOUR_POINTS_LATE = 61  # along each axis: delays cost some 0.1 ms a point (measured)
+_STEPS = 8  # points of a piece of a line that are kept clear of words (by trial)
 _LETTER, _LINE = (
     0.0105,
     0.045,
 )  # half a letter's width and a line's height with its halo, share of the axes of a new figure
-_ROOM = 24.0  # pixels between a label of a contour and the next line (by trial)
 _SAMPLES = 12  # points at which the reason for no steady sliding is computed: time against missing a reason (by trial)
 
 
@@ -99,30 +110,43 @@ def stability_chart(
         return lambda a, b: status(a, b) == code
 
     reasons = _absence_reasons(rig, first, second, grid)
-    for code, (words, style) in AREAS.items():
-        path = regions.region_path(inside(code), grid == code)
+    absent = ~np.isin(grid, SLIDING)
+    slides, far = regions.carried(grid, absent)
+    for code, (words, style) in AREAS.items():  # the areas of no steady sliding last, on top
+        path = regions.region_path(
+            inside(code), (slides if code in SLIDING else grid) == code, ~absent | (code not in SLIDING)
+        )
         if len(path):
             label = f"{words} ({reasons})" if code == ABSENT and reasons else words
             ax.add_patch(PathPatch(Path(np.column_stack(place(path.vertices)), path.codes), label=label, **style))
-    draw_contours(ax, rig, first, second, grid)
+    within = None
+    if absent.any():
+        path = regions.region_path(lambda a, b: np.isin(status(a, b), SLIDING), ~absent)
+        within = Path(np.column_stack(place(path.vertices)), path.codes)
     gone = regions.edges(inside(ABSENT), grid == ABSENT)
     if np.isfinite(gone).any():
         ax.plot(*place(gone), **EDGES["no steady sliding"], label=f"edge: {reasons}")
-    line = regions.edges(lambda a, b: np.isin(status(a, b), QUIET), np.isin(grid, QUIET), grid == ABSENT)
-    draw_edges(ax, rig, line, vary, place)
+    line = regions.edges(lambda a, b: np.isin(status(a, b), QUIET), np.isin(slides, QUIET), far, ~absent)
+    draw_edges(ax, rig, line, vary, place, within)
     _mark_own(ax, rig, first, second)
-    written = [words for code, (words, _) in AREAS.items() if write_inside(ax, grid == code, words, place)]
+    drawn = [np.column_stack(place(one[np.isfinite(one[:, 0])])) for one in (line, gone)]
+    contours = _draw_contours(ax, rig, first, second, grid, within, [one for one in drawn if len(one)])
+    written = [words for code, (words, _) in AREAS.items() if write_inside(ax, grid == code, words, place, contours)]
     add_legend_above(ax, without=written)
     return ax
 
 
+SLIDING = (STABLE, UNSTABLE, UNDAMPED)
 Place = Callable[[Any], tuple[Any, Any]]  # fractions of the axes, shape (n, 2), to their units
 
 
-def draw_edges(ax: Axes, rig: Slider | Machine, line: Any, vary: Callable[[Any, Any], Any], place: Place) -> None:
+def draw_edges(
+    ax: Axes, rig: Slider | Machine, line: Any, vary: Callable[[Any, Any], Any], place: Place, within: Any = None
+) -> None:
     """Draw the edge of stability, with the style of what begins beyond it: of the least damped disturbance on it.
 
     `line` has its points in fractions of the axes, shape (n, 2), NaN between pieces; `vary` gives the parameters there.
+    It ends at the outline `within`, a path in the units of the axes, if any.
     """
     kinds = np.full(len(line), "", dtype="<U16")
     known = np.flatnonzero(np.isfinite(line[:, 0]))
@@ -133,75 +157,90 @@ def draw_edges(ax: Axes, rig: Slider | Machine, line: Any, vary: Callable[[Any, 
     rates = np.where(np.isfinite(roots), np.abs(roots.real) / sizes, np.inf)
     least = np.take_along_axis(roots, np.argmin(rates, axis=-1)[:, None], axis=-1)[:, 0]
     kinds[known] = np.where(np.abs(least.imag) > np.abs(least.real), "oscillation", "drift")
+    good = known[np.isfinite(roots).any(axis=-1)]
+    if len(good):  # points beyond the outline are of the kind of the nearest one within
+        kinds[known] = kinds[good[np.argmin(np.abs(known[:, None] - good), axis=1)]]
     for kind in ("oscillation", "drift"):
         here = kinds == kind
         here[1:] |= here[:-1] & (kinds[1:] != "")  # up to the next point, so that there is no gap between pieces
         if here.any():
             points = place(np.where(here[:, None], line, np.nan))
-            ax.plot(*points, **EDGES[kind], label=f"edge of stability: {kind}")
+            (drawn,) = ax.plot(*points, **EDGES[kind], label=f"edge of stability: {kind}")
+            if within is not None:
+                drawn.set_clip_path(PathPatch(within, transform=ax.transData))
 
 
-def draw_contours(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) -> None:
-    """Draw contours of k/k_cr over a chart whose statuses are `grid`; none where no stiffness is critical."""
-    share = np.linspace(0, 1, _CONTOUR_POINTS)
+def _draw_contours(
+    ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any, within: Any, edges: Sequence[Any]
+) -> list[Any]:
+    """Draw contours of k/k_cr over a chart whose statuses are `grid`; return their lines, as vertices (n, 2).
+
+    They end at the outline `within` of steady sliding, if any; their labels keep clear of `edges`.
+    """
+    model = operating_point(rig).model
+    late = bool(model.delays)
+    fine = has_closed_form(model)
+    points = 2 * len(grid) - 1 if fine else min(len(grid), _CONTOUR_POINTS_LATE) if late else len(grid)
+    chosen = np.linspace(0, len(grid) - 1, points).round(1 if fine else 0)  # fine: also halfway between grid points
+    share = chosen / (len(grid) - 1)
     a, b = np.meshgrid(share, share)
     vary = {x.name: x.at(a), y.name: y.at(b)}
-    nearest = (share * (len(grid) - 1)).round().astype(int)
-    here = grid[np.ix_(nearest, nearest)]
+    here = status_of(operating_point(rig, vary, scan=True)) if fine else grid[np.ix_(*2 * [chosen.astype(int)])]
     values = None
     with suppress(NotAvailable, ParameterError), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of delays too long to be judged: there are no contours there
-        values = safety_factor(rig, vary)
+        along = rig.parameter_along("stiffness") if late else None  # a late gain is no stiffness
+        values = safety_factor(rig, vary, along=along)
     if values is None or not np.isfinite(values).any():
-        return
-    with np.errstate(divide="ignore"):  # k_cr/k goes to zero where k_cr does, and lines of it end there
-        inverse = np.where(np.isfinite(values) & (here != ABSENT), 1 / values, np.nan)
-    if not float(rig.drive.proportional()):  # beside a gain that is enough alone no stiffness is critical either
-        inverse[np.isnan(values) & (here == STABLE)] = 0.0
-    inverse[~np.isfinite(inverse)] = np.nan
-    shown = [1 / level for level in SAFETY_LEVELS[::-1] if level != 1]
-    shown = [level for level in shown if np.nanmin(inverse) < level < np.nanmax(inverse)]
-    if shown:
-        lines = ax.contour(x.shown(x.at(share)), y.shown(y.at(share)), inverse, levels=shown, **CONTOURS)
-        pieces = [list(map(np.asarray, path.to_polygons(closed_only=False))) for path in lines.get_paths()]
-        longest = [max(several, key=len) for several in pieces if several]
-        own = [(axis, rig.value(axis.name)) for axis in (x, y)]
-        marked = [np.array([[axis.shown(value) for axis, value in own]])] if None not in dict(own).values() else []
-        places = [_apart(ax, one, [*marked, *(other for other in longest if other is not one)]) for one in longest]
-        ax.clabel(lines, fontsize="small", fmt=lambda level: f"{1 / level:g}", manual=places)
-        ax.plot([], [], color=CONTOURS["colors"], linewidth=CONTOURS["linewidths"], label="k/k$_{cr}$")
+        return []
+    absent = ~np.isin(here, SLIDING)
+    status = np.where(np.isnan(values), ABSENT, here) if late else here  # NaN of a delay may be "not known"
+    fields = [extended(one, absent) for one in safety_fields(np.where(absent, np.nan, values), status)]
+    own = [rig.value(axis.name) for axis in (x, y)]
+    marked = [] if None in own else [np.array([[axis.shown(v) for axis, v in zip((x, y), own, strict=True)]])]
+    levels = [level for level in SAFETY_LEVELS if level != 1]
+    lines = draw_levels(
+        ax, x.shown(x.at(share)), y.shown(y.at(share)), fields, [one / (1 + one) for one in levels],
+        [f"{one:g}" for one in levels], within, [*marked, *edges],
+    )  # fmt: skip
+    if lines:
+        ax.plot([], [], color=CONTOURS["colors"], linewidth=CONTOURS["linewidths"], label=SAFETY_WORDS)
+    return lines
 
 
-def _apart(ax: Axes, line: Any, others: Sequence[Any]) -> tuple[float, float]:
-    """Vertex of a line with `_ROOM` between it and other lines, the nearest to its middle; else where there is most."""
-    seen = ax.transData.transform(line)
-    inside = np.all(np.abs(ax.transAxes.inverted().transform(seen) - 0.5) < 0.45, axis=1)
-    beside = [ax.transData.transform(one) for one in others]
-    gaps = [np.linalg.norm(seen[:, None] - one[None], axis=-1).min(axis=1) for one in beside]
-    gap = np.min([np.full(len(seen), _ROOM), *gaps], axis=0)
-    best = np.argmax(np.where(inside, gap, -1.0) - np.abs(np.linspace(-0.5, 0.5, len(seen))))
-    return float(line[best, 0]), float(line[best, 1])
-
-
-def write_inside(ax: Axes, region: Any, words: str, place: Place) -> bool:
+def write_inside(ax: Axes, region: Any, words: str, place: Place, lines: Sequence[Any] = ()) -> bool:
     """Write words into the widest place of a region, upright if there is room for them only so; True if there is room.
 
     `region` is true inside, shape (rows, columns); `place` gives the units of the axes for fractions of them, (n, 2).
+    Words keep clear of `lines`, vertices (n, 2) each, if they can.
     """
     mask, length = region.copy(), _LETTER * len(words)
     rows, columns = np.indices(mask.shape)
     own = [np.asarray(line.get_xydata())[0] for line in ax.lines if line.get_label() == OWN_RIG["label"]]
     others = np.reshape([*(text.get_position() for text in ax.texts), *own], (-1, 2))
-    for x, y in ax.transAxes.inverted().transform(ax.transData.transform(others)):
+    for x, y in _in_axes(ax, others):
         away = np.abs(columns / (mask.shape[1] - 1) - x), np.abs(rows / (mask.shape[0] - 1) - y)
         mask &= (away[0] > 2 * _LETTER) | (away[1] > _LINE)
-    for size, turned in (((length, _LINE), 0), ((_LINE, length), 90)):
-        across, up, room = regions.widest_place(mask, size)
-        if room >= 1:
-            x, y = (float(one[0]) for one in place(np.array([[across, up]])))
-            ax.text(x, y, words, ha="center", va="center", rotation=turned, path_effects=HALO, zorder=4)
-            return True
+    clear = mask.copy()
+    for line in lines:
+        ends = _in_axes(ax, line)
+        steps = np.linspace(0, 1, _STEPS)[:, None, None]
+        crossed = np.clip((1 - steps) * ends[None, :-1] + steps * ends[None, 1:], 0, 1).reshape(-1, 2)
+        across, up = np.rint(crossed * (np.array(mask.shape[::-1]) - 1)).astype(int).T
+        clear[up, across] = False
+    for inside in (clear, mask) if lines else (mask,):
+        for size, turned in (((length, _LINE), 0), ((_LINE, length), 90)):
+            across, up, room = regions.widest_place(inside, size)
+            if room >= 1:
+                x, y = (float(one[0]) for one in place(np.array([[across, up]])))
+                ax.text(x, y, words, ha="center", va="center", rotation=turned, path_effects=HALO, zorder=4)
+                return True
     return False
+
+
+def _in_axes(ax: Axes, points: Any) -> Any:
+    """Points, (n, 2), in fractions of the axes."""
+    return ax.transAxes.inverted().transform(ax.transData.transform(points))
 
 
 def _absence_reasons(rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) -> str:

@@ -19,7 +19,8 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, VERMILION
 from steadyslip.figures import regions
-from steadyslip.figures.chart import absence_reasons, draw_edges
+from steadyslip.figures.chart import SLIDING, absence_reasons, draw_edges, write_inside
+from steadyslip.figures.contours import SAFETY_LEVELS, draw_levels, extended, pieces_of, safety_fields
 from steadyslip.figures.map_axes import (
     KIND_COLOURS,
     LOG_RATIO,
@@ -32,14 +33,17 @@ from steadyslip.figures.map_axes import (
     result_label,
     short_name,
 )
-from steadyslip.figures.style import AREAS, EDGES, OWN_RIG, SAFETY_LEVELS, axis_label, display_unit
-from steadyslip.linear.status import ABSENT, QUIET, STABLE, UNDAMPED, UNSTABLE, status as status_of
+from steadyslip.figures.style import AREAS, EDGES, OWN_RIG, SAFETY_WORDS, axis_label, display_unit
+from steadyslip.linear.status import ABSENT, QUIET, STABLE, UNDAMPED, status as status_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
+
+
+_FINE = 8  # times as many points as a map has, for words in its areas
 
 
 def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
@@ -53,50 +57,67 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
         _share_of_stable(ax, x, y, view)
         line = _edge_of_shares(ax, x, y, view.shares["status"][STABLE])
         name = None if show is None else name
-    elif judged:
-        _areas(ax, found, view, _Refined(found, view, scales))
-    if name is not None and judged:
-        shown = np.where(
-            view.values["status"] == UNDAMPED, np.nan, view.values[name]
-        )  # there a growth rate is rounding
-        _contours(ax, x, y, shown, name, found, missing_note(view, name))
-    elif name is not None:
-        _colours(ax, found, view, x, y, name, scale)
-    if "status" in view.values and not view.shares:
-        line = _edge(ax, view.values["status"], _Refined(found, view, scales))
     ax.set_xlim(x.min(), x.max())
     ax.set_ylim(y.min(), y.max())
+    plane, within = _Refined(found, view, scales), None
+    if judged and not view.shares:
+        within = _areas(ax, found, view, plane)
+    if name is not None and not judged:
+        _colours(ax, found, view, x, y, name, scale)
+    if "status" in view.values and not view.shares:
+        line = _edge(ax, view.values["status"], plane, within)
     _mark_own(ax, found, view, scales, line, with_values=scale is None)
+    drawn = _contours(ax, x, y, view, name, found, (within, line)) if name is not None and judged else []
+    if judged and not view.shares:
+        _words(ax, view.values["status"], plane, [*drawn, *line])
 
 
-def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> None:
-    """Fill the area of each status, its outline refined between the points of the map."""
+def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> Path | None:
+    """Fill the area of each status, its outline refined between the points of the map.
+
+    Return the outline of steady sliding in the units of the axes; None if there is none in the map.
+    """
     status = view.values["status"]
-    for code, (words, style) in AREAS.items():
+    absent = ~np.isin(status, SLIDING)
+    slides, _ = regions.carried(status, absent)
+    for code, (words, style) in AREAS.items():  # the areas of no steady sliding last, on top
         if not (here := status == code).any():
             continue
         label = words + (_absence_reasons(found, view, here) if code == ABSENT else "")
-        path = regions.region_path(refined.has(code), here) if min(here.shape) > 1 else Path(np.empty((0, 2)))
+        path = refined.outline(slides == code if code in SLIDING else here, code, known=~absent | (code not in SLIDING))
         if len(path):
-            path = Path(np.column_stack(refined.place(path.vertices)), path.codes)
             ax.add_patch(PathPatch(path, label=label, **style))
         else:
             add_legend_entry(ax, Patch(label=label, **style))
     if (status < 0).any():
-        add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
+        missing = refined.outline(status < 0, known=False)
+        ax.add_patch(PathPatch(missing, facecolor="white", edgecolor=GREY, label="not computed yet"))
+    return refined.outline(~absent, *SLIDING) if absent.any() else None
 
 
-def _edge(ax: Axes, status: Array, refined: _Refined) -> list[Array]:
+def _words(ax: Axes, status: Array, refined: _Refined, lines: Sequence[Array]) -> None:
+    """Write the word of each status into its area if there is room; the legend needs no entry for it then."""
+    fine = np.repeat(np.repeat(status, _FINE, axis=0), _FINE, axis=1)
+    for code, (words, _) in AREAS.items():
+        if (fine == code).any() and write_inside(ax, fine == code, words, refined.place, lines):
+            for patch in ax.patches:
+                if patch.get_label() == words:
+                    patch.set_label("_" + words)
+
+
+def _edge(ax: Axes, status: Array, refined: _Refined, within: Path | None) -> list[Array]:
     """Draw the edge of stability; return its pieces as vertices of shape (n, 2) in the units of the axes."""
     if min(status.shape) < 2:
         return []
-    quiet = np.isin(status, QUIET)
-    line = regions.edges(refined.has(*QUIET), quiet, ~quiet & (status != UNSTABLE))
+    absent = ~np.isin(status, SLIDING)
+    slides, far = regions.carried(status, absent)
+    line = regions.edges(refined.has(*QUIET), np.isin(slides, QUIET), far, ~absent)
     if refined.rig is not None:
-        draw_edges(ax, refined.rig, line, refined.vary, refined.place)
+        draw_edges(ax, refined.rig, line, refined.vary, refined.place, within)
     elif np.isfinite(line).any():
         ax.plot(*refined.place(line), **EDGES["oscillation"], label="edge of stability")
-    return [np.column_stack(refined.place(piece)) for piece in _pieces(line)]
+    known = regions.edges(refined.has(*QUIET), np.isin(status, QUIET), absent)
+    return [np.column_stack(refined.place(piece)) for piece in _pieces(known)]
 
 
 def _pieces(line: Array) -> list[Array]:
@@ -132,6 +153,12 @@ class _Refined:
         """Convert fractions of the axes, shape (n, 2), to their units."""
         return self.scales[0](self._values(shares[:, 0], 0)), self.scales[1](self._values(shares[:, 1], 1))
 
+    def outline(self, mask: Array, *codes: int, known: Any = True) -> Path:
+        """Outline, in the units of the axes, of the region of these statuses; `mask` has them on the grid."""
+        if min(mask.shape) < 2 or not len(path := regions.region_path(self.has(*codes), mask, known)):
+            return Path(np.empty((0, 2)))
+        return Path(np.column_stack(self.place(path.vertices)), path.codes)
+
     def has(self, *codes: int) -> regions.Predicate:
         """Predicate of the fractions of both axes: whether a rig has one of these statuses."""
 
@@ -166,21 +193,32 @@ def _share_of_stable(ax: Axes, x: Array, y: Array, view: View) -> None:
         ax.clabel(lines, fontsize="small")
 
 
-def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: MapResult, note: str) -> None:
-    good = values[np.isfinite(values)]
+def _contours(
+    ax: Axes, x: Array, y: Array, view: View, name: str, found: MapResult, around: tuple[Path | None, Sequence[Array]]
+) -> list[Array]:
+    """Draw contours of a result and return their lines; `around` has the outline of steady sliding and the edges."""
+    status = view.values["status"]
+    values = np.where(status == UNDAMPED, np.nan, view.values[name])
+    good = values[np.isfinite(values)]  # of an undamped rig a growth rate is rounding
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
-        return
-    if name == "safety_factor":
-        levels, factor = [s for s in SAFETY_LEVELS if good.min() < s < good.max()], 1.0
-        label = "k/k_cr" if found.along(name) is None else result_label(found, name)
-    else:
+        return []
+    levels, fields = [one for one in SAFETY_LEVELS if one != 1 or view.shares], [values]
+    label = SAFETY_WORDS if found.along(name) is None else result_label(found, name)
+    shown = levels
+    if name != "safety_factor":
         factor, shown_unit = display_unit(found.unit(name), float(np.median(np.abs(good))) or 1.0, found.area(name))
-        levels, label = _levels(good / factor), axis_label(result_label(found, name), shown_unit)
-    if not levels:
-        return
-    lines = ax.contour(x, y, values / factor, levels=levels, colors=BLACK, linewidths=0.6, linestyles="--")
-    ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}".replace("-", "−"))
-    add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label + note))
+        shown, label = _levels(good / factor), axis_label(result_label(found, name), shown_unit)
+        fields, levels = [values / factor], shown
+    elif not view.shares:
+        fields, levels = safety_fields(values, status), [one / (1 + one) for one in levels]
+    if not view.shares:
+        fields = [extended(one, ~np.isin(status, SLIDING)) for one in fields]
+    words = [f"{one:g}".replace("-", "−") for one in shown]
+    drawn = draw_levels(ax, x, y, fields, levels, words, around[0], around[1], linestyles="--")
+    if drawn:
+        label += missing_note(view, name)
+        add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label))
+    return drawn
 
 
 def _levels(values: Array) -> list[float]:
@@ -244,8 +282,7 @@ def _edge_of_shares(ax: Axes, x: Array, y: Array, share: Array) -> list[Array]:
         return []
     lines = ax.contour(x, y, share, levels=[0.5], colors=BLACK, linewidths=2)
     add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=2, label="edge of stability"))
-    polygons = [np.asarray(p) for path in lines.get_paths() for p in path.to_polygons(closed_only=False)]
-    return [p for p in polygons if len(p)]
+    return [piece for path in lines.get_paths() for piece in pieces_of(path)]
 
 
 def _mark_own(

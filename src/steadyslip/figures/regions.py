@@ -17,15 +17,15 @@ Predicate = Callable[[Any, Any], Any]  # fractions of the two axes, 0 to 1, to b
 _HALVINGS = 40  # bisection of one grid spacing to 1e-12 of it
 
 
-def region_path(predicate: Predicate, mask: Any) -> Path:
+def region_path(predicate: Predicate, mask: Any, known: Any = True) -> Path:
     """Outline of the region where the predicate is true, in fractions of the axes; empty path if there is none.
 
-    `mask` has its values on a grid over the axes, shape (rows, columns).
+    `mask` has its values on a grid over the axes, shape (rows, columns), or others where they are not `known`.
     """
     generator = contour_generator(z=mask.astype(float), name="serial", fill_type=FillType.OuterOffset)
     vertices, codes = [np.empty((0, 2))], [np.empty(0, np.uint8)]
     for outline, offsets in zip(*generator.filled(0.5, 2.0), strict=True):
-        vertices.append(_bisected(outline, mask, predicate))
+        vertices.append(_bisected(outline, mask, predicate, known))
         code = np.full(len(outline), Path.LINETO, np.uint8)
         code[offsets[:-1]] = Path.MOVETO
         code[offsets[1:] - 1] = Path.CLOSEPOLY
@@ -33,18 +33,32 @@ def region_path(predicate: Predicate, mask: Any) -> Path:
     return Path(np.concatenate(vertices), np.concatenate(codes))
 
 
-def edges(predicate: Predicate, mask: Any, left_out: Any = False) -> Any:
+def edges(predicate: Predicate, mask: Any, left_out: Any = False, known: Any = True) -> Any:
     """Lines along which the predicate changes, shape (n, 2) in fractions of the axes, NaN between lines.
 
-    `mask` has its values on a grid; grid cells with a corner where `left_out` is true are left out.
+    `mask` has its values on a grid, or others where they are not `known`; grid cells with a corner where `left_out` is
+    true are left out.
     """
     z = np.ma.masked_array(mask.astype(float), np.array(np.broadcast_to(left_out, mask.shape)))
     generator = contour_generator(z=z, name="serial", line_type=LineType.Separate, corner_mask=False)
     gap = np.full((1, 2), np.nan)
     lines = [gap]
     for line in generator.lines(0.5):
-        lines += [_bisected(line, mask, predicate), gap]
+        lines += [_bisected(line, mask, predicate, known), gap]
     return np.concatenate(lines)
+
+
+def carried(grid: Any, missing: Any) -> tuple[Any, Any]:
+    """Grid with the nearest known value where it is missing, and where that is further than one grid point away.
+
+    Regions and lines drawn from it reach below the region where values are missing, without a gap at its outline.
+    """
+    from scipy.ndimage import binary_erosion, distance_transform_edt
+
+    if not missing.any() or missing.all():
+        return grid, missing
+    nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+    return grid[tuple(nearest)], binary_erosion(missing, np.ones((3, 3)), border_value=1)
 
 
 def on_grid(function: Predicate, points: int) -> Any:
@@ -67,12 +81,17 @@ def widest_place(mask: Any, size: tuple[float, float]) -> tuple[float, float, fl
     return float(column / (columns - 1)), float(row / (rows - 1)), float(away[row, column])
 
 
-def _bisected(outline: Any, mask: Any, predicate: Predicate) -> Any:
-    """Outline with each point halfway between two grid points moved to where the predicate changes, by bisection."""
+def _bisected(outline: Any, mask: Any, predicate: Predicate, known: Any) -> Any:
+    """Outline with each point halfway between two grid points moved to where the predicate changes, by bisection.
+
+    Points between two whose values are not `known` stay halfway.
+    """
     last = np.array(mask.shape)[::-1] - 1
     low, high = np.floor(outline).astype(int), np.ceil(outline).astype(int)
     start = mask[low[:, 1], low[:, 0]]
+    known = np.broadcast_to(known, mask.shape)
     moves = start != mask[high[:, 1], high[:, 0]]
+    moves &= known[low[:, 1], low[:, 0]] | known[high[:, 1], high[:, 0]]
     result = outline / last
     if not moves.any():
         return result

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib import rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
 from steadyslip.core.areas import outside
@@ -55,10 +55,10 @@ JOURNAL: Any = {
 """Settings of Matplotlib for a figure as wide as one column of a journal: 85 mm, letters of 7 points."""
 _SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are in the file
 _FOOTER = 6.0  # points, size of the letters below a saved figure
-HALO = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
+HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
 """Outline of words that stand on an area."""
-SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""Contours of the safety factor k/k_cr."""
+SAFETY_WORDS = "stiffness over critical $k/k_{\\mathrm{cr}}$"
+"""Name of the safety factor for a legend."""
 CONTOURS: dict[str, Any] = {"colors": BLACK, "linewidths": 0.6}
 EDGES: dict[str, dict[str, Any]] = {
     "oscillation": {"color": BLACK, "linewidth": 2, "linestyle": "-"},

@@ -93,7 +93,7 @@ def safety_factor(rig: Slider | Machine, vary: Vary | None = None, *, along: str
     float, ndarray or xarray.DataArray
         The value over the nearest end of an interval of stable values. Sliding is stable above 1 where the edge is a
         lower limit, as it is of most stiffnesses, and below 1 where it is an upper one; `stable_values` tells. NaN
-        where there is none.
+        where there is none. Without a spring it is the gain over the critical gain.
 
     Raises
     ------

@@ -85,11 +85,17 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
 
 
 def own_safety_factor(point: OperatingPoint) -> Array:
-    """Safety factor (k + kp)/(k_cr + kp) of sliders, with the gain kp of a controller, (...)."""
+    """Safety factor of sliders, (...): stiffness k + kp over its critical value, with the gain kp of a controller.
+
+    The critical value may be below kp, where the gain is more than enough alone; not with a delay, where a gain is no
+    stiffness.
+    """
 
     def kernel(part: OperatingPoint) -> Array:
-        with np.errstate(all="ignore"):
-            return np.asarray((part.named()[STIFFNESS] + part.gain) / (_nearest_edge(part) + part.gain))
+        own = np.asarray(part.named()[STIFFNESS] + part.gain)
+        if part.model.delays:
+            return np.asarray(own / (_nearest_edge(part) + part.gain))
+        return np.asarray(own / _nearest(*_total_ends(part), own))
 
     return in_chunks(point, kernel)
 
@@ -226,6 +232,18 @@ def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
     return stacked(both[:half], point), stacked(both[half:], point)
 
 
+def _total_ends(point: OperatingPoint) -> tuple[Array, Array]:
+    """Lower and upper ends of the stable intervals of the stiffness with a controller's gain in it, (..., m)."""
+    if has_closed_form(point.model):
+        low, high, _, lost = _closed_form_total(point)
+        if not np.any(lost):
+            return np.asarray(low)[..., None], np.asarray(high)[..., None]
+    p, q = stiffness_polynomials(point)
+    gain = np.broadcast_to(np.asarray(point.gain, dtype=float), point.shape)[..., None]
+    intervals = stable_set(p - gain * q, q, spare_powers(point)).intervals
+    return intervals[..., 0], intervals[..., 1]
+
+
 def general_set(point: OperatingPoint, *, edges: bool = False) -> StableSet:
     """Stable set in stiffness from the characteristic equation of any Model; with a delay intervals only.
 
@@ -256,14 +274,19 @@ def _split_function(model: Model) -> ArrayFunction:
 
 def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
     """Lower and upper end (Pa/m) of the one stable interval of stiffness, in closed form, for one memory variable."""
-    exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
-    low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
+    low, high, gain, lost = _closed_form_total(point)
     low, high = cubic.without_gain(low, high, gain)
-    low, high = cubic.unless(exists, low), cubic.unless(exists, high)
-    if np.any(lost := _lost(numerator)):
+    if np.any(lost):
         ends = general_set(point).intervals[..., 0, :]
         low, high = np.where(lost, ends[..., 0], low), np.where(lost, ends[..., 1], high)
     return low, high
+
+
+def _closed_form_total(point: OperatingPoint) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Ends of the interval of the stiffness with a controller's gain in it, that gain, and where digits may be lost."""
+    exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
+    low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
+    return cubic.unless(exists, low), cubic.unless(exists, high), gain, _lost(numerator)
 
 
 def _lost(product: Array) -> NDArray[np.bool_]:
@@ -368,8 +391,11 @@ def interval_ends(point: OperatingPoint, *, edges: bool = False) -> tuple[Array,
 
 def _nearest_edge(point: OperatingPoint) -> Array:
     """Finite positive end of a stable interval (Pa/m) nearest to the rig's own stiffness, (...); NaN without one."""
-    own = point.named()["slider.stiffness"]
-    low, high = interval_ends(point, edges=True)
+    return _nearest(*interval_ends(point, edges=True), point.named()["slider.stiffness"])
+
+
+def _nearest(low: Array, high: Array, own: Array) -> Array:
+    """Finite positive end of intervals, (..., m) each, nearest to the rig's own value, (...); NaN without one."""
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # shortcut for the common case, for speed

@@ -1,0 +1,128 @@
+"""Contours of k/k_cr over a plane of two parameters: smooth, and as far as the edges of steady sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+
+from steadyslip.figures.style import CONTOURS, HALO
+from steadyslip.linear.status import STABLE, UNSTABLE
+
+Array = np.ndarray
+SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Contours of the safety factor k/k_cr."""
+_FALL = (
+    1.7  # ratio of values two and one points away from which on the next may be zero: 2 of straight lines, with room
+)
+_ROUNDING = 1e-6  # of that share at its edge, where the status depends on rounding: 1e10 times that of a double
+_ROOM = 24.0  # pixels between a label of a contour and the next line (by trial)
+_CLOSE = 6.0  # pixels between vertices of a label's line (by trial)
+
+
+def safety_fields(factor: Array, status: Array) -> list[Array]:
+    """Shares k/(k + k_cr) over a plane, (rows, columns), from k/k_cr: of lower limits of stiffness, of upper limits.
+
+    It is bounded, so that contours go on where k_cr is zero or infinite: 1 where sliding is stable at every stiffness
+    and 0 where it is at none. NaN where the nearest limit is of the other kind and where nothing is known.
+    """
+    with np.errstate(invalid="ignore"):
+        share = np.where(np.isinf(factor), 1.0, factor / (1 + factor))
+    known, stable = np.isfinite(share), status == STABLE
+    is_lower = ~known | ((share >= 0.5) == stable) | (np.abs(share - 0.5) < _ROUNDING)
+    lower, upper = (np.where(known & here, share, np.nan) for here in (is_lower, ~is_lower))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends_at_zero, ends_at_infinity = _vanishes(1 / lower - 1), _vanishes(lower / (1 - lower))
+    lower[~known & stable & ends_at_zero] = 1.0
+    lower[~known & (status == UNSTABLE) & ends_at_infinity] = 0.0
+    return [one for one in (lower, upper) if np.isfinite(one).sum() > 1]
+
+
+def extended(field: Array, missing: Array) -> Array:
+    """Field carried on by one grid spacing, in straight lines, into places where it is missing."""
+    sums, count = np.zeros(field.shape), np.zeros(field.shape)
+    for one, two in _neighbours(field):
+        value = np.where(np.isfinite(two), 2 * one - two, one)
+        sums, count = sums + np.nan_to_num(value), count + np.isfinite(value)
+    with np.errstate(invalid="ignore"):
+        return np.where(missing & ~np.isfinite(field), sums / count, field)
+
+
+def _vanishes(field: Array) -> Array:
+    """True where a field is not known nor known nearby, or falls to zero between its nearest point and here."""
+    known, falls = np.zeros(field.shape, bool), np.zeros(field.shape, bool)
+    for one, two in _neighbours(field):
+        known |= np.isfinite(one)
+        falls |= two >= _FALL * one
+    return ~known | falls
+
+
+def _neighbours(field: Array) -> Iterator[tuple[Array, Array]]:
+    """Values one and two grid points away in eight directions, NaN outside."""
+    rows, columns = field.shape
+    padded = np.pad(field, 2, constant_values=np.nan)
+    for step in product((-1, 0, 1), repeat=2):
+        if step != (0, 0):
+            one, two = ([2 + n * part for part in step] for n in (1, 2))
+            yield tuple(padded[i : i + rows, j : j + columns] for i, j in (one, two))  # type: ignore[misc]
+
+
+def draw_levels(
+    ax: Axes, x: Array, y: Array, fields: Sequence[Array], levels: Sequence[float], words: Sequence[str], within: Any,
+    beside: Sequence[Array] = (), **style: Any,
+) -> list[Array]:  # fmt: skip
+    """Draw contours of fields over a plane with a label each; return the lines drawn, as vertices (n, 2).
+
+    They end at the outline `within`, a path in the units of the axes or None. Labels keep clear of the lines `beside`.
+    """
+    drawn, clip = [], None if within is None else PathPatch(within, transform=ax.transData, visible=False)
+    for field in fields:
+        shown = [n for n, level in enumerate(levels) if np.nanmin(field) < level < np.nanmax(field)]
+        if not shown:
+            continue
+        lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **(CONTOURS | style))
+        if clip is not None:
+            lines.set_clip_path(clip)
+        pieces = [pieces_of(path) for path in lines.get_paths()]
+        found = {n: max(several, key=len) for n, several in zip(shown, pieces, strict=True) if several}
+        of = {level: words[n] for n, level in enumerate(levels)}
+        longest = list(found.values())
+        places: list[tuple[float, float]] = []
+        for one in longest:
+            others = [*beside, *(other for other in longest if other is not one)]
+            places.append(_apart(ax, one, others, [np.array([place]) for place in places]))
+        labels = ax.clabel(lines, fontsize="small", fmt=lambda level, of=of: of[level], manual=places)
+        for label in labels:
+            label.set_path_effects(HALO)
+        drawn += [one for several in pieces for one in several]
+    return drawn
+
+
+def pieces_of(path: Path) -> list[Array]:
+    """Pieces of a path of straight lines, vertices (n, 2) each; `Path.to_polygons` would thin them out."""
+    vertices = np.asarray(path.vertices)
+    starts = [0] if path.codes is None else np.flatnonzero(path.codes == Path.MOVETO)
+    return [piece for piece in np.split(vertices, starts[1:]) if len(piece) > 1]
+
+
+def _apart(ax: Axes, line: Array, others: Sequence[Array], labels: Sequence[Array]) -> tuple[float, float]:
+    """Vertex of a line with `_ROOM` to other lines, and twice that to labels; the nearest to its middle if several."""
+    seen = ax.transData.transform(line)
+    inside = np.all(np.abs(ax.transAxes.inverted().transform(seen) - 0.5) < 0.45, axis=1)
+    beside = [(_thinned(ax.transData.transform(one)), 0.0) for one in others]
+    beside += [(ax.transData.transform(one), _ROOM) for one in labels]
+    gaps = [np.linalg.norm(seen[:, None] - one[None], axis=-1).min(axis=1) - size for one, size in beside]
+    gap = np.min([np.full(len(seen), _ROOM), *gaps], axis=0)
+    best = np.argmax(np.where(inside, gap, gap - 10 * _ROOM) - np.abs(np.linspace(-0.5, 0.5, len(seen))))
+    return float(line[best, 0]), float(line[best, 1])
+
+
+def _thinned(line: Array) -> Array:
+    """Vertices of a line that are some `_CLOSE` pixels apart at least, its first and last among them."""
+    gone = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))]) // _CLOSE
+    return np.asarray(line[np.concatenate([[True], np.diff(gone) > 0]) | (np.arange(len(line)) == len(line) - 1)])

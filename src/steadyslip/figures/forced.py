@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
-from steadyslip.figures.style import axis_label, display_unit, new_panels
+from steadyslip.figures.style import AREAS, axis_label, display_unit, new_panels
+from steadyslip.linear.status import UNSTABLE
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import FrequencyResponse, FrozenVerdicts
@@ -121,7 +122,7 @@ def _limits(found: FrequencyResponse, ax: Any) -> None:
 
 
 def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
-    """Plot growth rate over time, with unstable times hatched, and the slip rate of the motion in a second panel.
+    """Plot growth rate over time, with unstable times shaded, and the slip rate of the motion in a second panel.
 
     Parameters
     ----------
@@ -142,8 +143,8 @@ def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
     axes[0].axhline(0.0, color=GREY, linewidth=1)
     for one in axes:
         unstable = one.fill_between(
-            t, 0, 1, where=found.growth_rate > 0, transform=one.get_xaxis_transform(), facecolor="none", hatch="//",
-            edgecolor=VERMILION, linewidth=0, alpha=0.5,
+            t, 0, 1, where=found.growth_rate > 0, transform=one.get_xaxis_transform(), zorder=0,
+            **AREAS[UNSTABLE][1],
         )  # fmt: skip
     unstable.set_label("steady sliding is unstable")
     fastest = max(float(np.max(np.abs(own))) for own in found.slip_rates.values())

@@ -13,15 +13,18 @@ from matplotlib.ticker import NullLocator
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity, typeset
-from steadyslip.core.palette import BLACK, BLUE, GREY, ORANGE, SKY, STABLE, VERMILION
-from steadyslip.figures.style import add_legend_above, axes_or_new, is_narrow, parameter_label
+from steadyslip.core.palette import BLACK, BLUE, ORANGE, SKY, VERMILION
+from steadyslip.figures.style import AREAS, add_legend_above, axes_or_new, is_narrow, parameter_label
 from steadyslip.linear import Modes
 from steadyslip.linear.boundary import Margin
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import Analysis
 from steadyslip.verdict.words import told
 
 _SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
+LOST = ("lock-up", "lift-off", "no solution")
+"""Kinds of edges beyond which sliding is not steady."""
 _MAX_PARAMETERS = 24  # rows of `stable_ranges`, so that the figure fits on a page (by trial)
 
 
@@ -82,17 +85,20 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax, 1.4 + 0.32 * len(margins))
     beside = partial(ax.text, 1.02, va="center", fontsize="small", transform=ax.get_yaxis_transform())
     beside(-0.8, "edge")
+    named: set[int] = set()
     for row, margin in enumerate(margins):
         known = (
             max(margin.searched[0] / margin.value, 1 / _SPAN_FACTOR),
             min(margin.searched[1] / margin.value, _SPAN_FACTOR),
         )
-        ax.barh(row, known[1] - known[0], left=known[0], height=0.62, color="white", edgecolor=GREY, hatch="////",
-                linewidth=0.6, label="_unstable")  # fmt: skip
-        for low, high in _stable_intervals(margin):
+        for low, high, status in _pieces(margin):
             a, b = max(low / margin.value, known[0]), min(high / margin.value, known[1])
             if a < b:
-                ax.barh(row, b - a, left=a, height=0.62, color=STABLE, edgecolor=BLACK, linewidth=0.6, label="_stable")
+                words, style = AREAS[status]
+                label = f"_{words}" if status in named else words
+                ax.barh(row, b - a, left=a, height=0.62, label=label, **style)
+                ax.barh(row, b - a, left=a, height=0.62, color="none", edgecolor=BLACK, linewidth=0.6, label="_outline")
+                named.add(status)
         if margin.edge is not None:
             beside(row, typeset(told(found.rig, margin.parameter, margin.edge.value)))
     ax.axvline(1.0, color=BLACK, linewidth=2.5)
@@ -102,7 +108,8 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     _label_rows(ax, [parameter_label(found.rig, margin.parameter) for margin in margins])
     left = len(undrawn_edges(found))
     more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
-    ax.set_xlabel(f"value over its own, now at 1\nblue: stable, hatched: unstable or none{more}")
+    ax.set_xlabel(f"value over its own, now at 1{more}")
+    add_legend_above(ax, 3, 1.0, fontsize="small")
     return ax
 
 
@@ -127,13 +134,17 @@ def _label_rows(ax: Axes, labels: list[str]) -> None:
         ax.spines[side].set_visible(False)
 
 
-def _stable_intervals(margin: Margin) -> list[tuple[float, float]]:
-    """Stable intervals (low, high) of a parameter with at least one edge, SI units."""
+def _pieces(margin: Margin) -> list[tuple[float, float, int]]:
+    """Intervals (low, high) of a parameter with at least one edge, SI units, and the status in each."""
     edges = sorted(margin.edges, key=lambda edge: edge.value)
     ends = [0.0, *(edge.value for edge in edges), math.inf]
-    stable = [edges[0].stable == "below"]
-    stable += [edge.stable == "above" for edge in edges]
-    return [(low, high) for low, high, good in zip(ends[:-1], ends[1:], stable, strict=True) if good]
+    stable = [edges[0].stable == "below", *(edge.stable == "above" for edge in edges)]
+    lost = [sum(edge.kind in LOST for edge in edges[:n]) for n in range(len(edges) + 1)]
+    own = lost[sum(edge.value < margin.value for edge in edges)]  # the rig itself slides steadily
+    status = [
+        ABSENT if (many - own) % 2 else STABLE if good else UNSTABLE for many, good in zip(lost, stable, strict=True)
+    ]
+    return [(low, high, code) for low, high, code in zip(ends[:-1], ends[1:], status, strict=True) if low < high]
 
 
 def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:

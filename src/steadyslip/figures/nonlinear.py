@@ -14,17 +14,28 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
 from steadyslip.figures.map_axes import is_geometric
-from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
+from steadyslip.figures.style import AREAS, add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
+from steadyslip.linear.status import ABSENT, UNKNOWN, UNSTABLE as UNSTABLE_CODE
+from steadyslip.nonlinear.orbits.ranges import WORDS
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
+    from steadyslip.nonlinear.orbits.cycle import Cycle
 
 _MARKERS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN),
             "branch point": ("v", SKY)}  # fmt: skip
 _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY, "not decided": BLACK}
 _OUTCOME_COLOURS = {"returns": STABLE, "oscillation": UNSTABLE, "blow-up": BLOW_UP, "contact lost": GREEN,
                     "no solution": GREY, "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
-_UNDECIDED_HATCHES = ("xx", "++", "oo")
+_ENDS: dict[str, dict[str, Any]] = {
+    "range": {"marker": "|", "markersize": 12, "markeredgewidth": 1.5},
+    "last cycle": {"marker": "x", "markersize": 7, "markeredgewidth": 1.5},
+    "not located": {"marker": "x", "markersize": 7, "markeredgewidth": 1.5},
+    "edge": {"marker": "o", "markerfacecolor": "white"},
+    "not followed": {"marker": "+", "markersize": 9, "markeredgewidth": 1.5},
+}
+"""Marks of ends of a branch, by kind."""
+_UNDECIDED_HATCHES = ("++", "oo", "..")
 NARROW_RANGE = 1e-3  # relative range of a branch below which its axis is the distance from the onset (by trial)
 LEGEND_WIDTH = 36  # characters of a line of a legend in two columns
 
@@ -33,8 +44,8 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     """Plot a bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
 
     Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin.
-    Diamonds are the cycles of the rig itself, filled if they attract; a cross marks a place from which no cycles were
-    followed.
+    Diamonds are the cycles of the rig itself, filled if they attract. All ends are marked: with a bar at the end of the
+    range, a cross where no cycle could be followed any further, a ring at another edge, a plus where none was followed.
 
     Parameters
     ----------
@@ -85,16 +96,8 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         seen.add(point.kind)
         x = (point.cycle.value - origin) / factor
         ax.plot([x], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
-    reached = [(branch.cycles[i].value, branch.cycles[i].peak_velocity) for i in ((0, -1) if len(branch) else ())]
-    for i, (value, peak) in enumerate(reached):
-        label = "" if i else f"ends of the branch: {branch.end}"
-        style = {"markersize": 12, "markeredgewidth": 1.5, "linestyle": "none", "label": fill(label, LEGEND_WIDTH)}
-        ax.plot([(value - origin) / factor], [peak / speed], "|", color=BLACK, **style)  # type: ignore[arg-type]
+    _draw_ends(branch, ax, (origin, factor), speed, onset_speed)
     _draw_own(branch, ax, (origin, factor), speed)
-    left = [end.cycle for one in (branch, branch.doubled) if one for end, _ in one.not_followed if end.cycle]
-    for i, one in enumerate(left):
-        x, y = (one.value - origin) / factor, one.peak_velocity / speed
-        ax.plot([x], [y], "x", color=BLACK, zorder=3, label="" if i else "not followed from here")
     lowest, highest = (min((one.lowest_velocity for one in branch.cycles), default=0.0),
                        max((one.peak_velocity for one in branch.cycles), default=0.0))  # fmt: skip
     ax.set_yscale("log" if len(branch) and not highest < 2 * lowest else "linear")
@@ -106,7 +109,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(axis_label(along, unit))
     ax.set_ylabel(axis_label(f"highest and lowest velocity{where}", speed_unit))
     ax.grid(color=GREY, linewidth=0.3)
-    ax.legend(fontsize="small")
+    add_legend_above(ax, 2, 1.0, fontsize="small")
     return ax
 
 
@@ -129,6 +132,32 @@ def _draw_velocities(
             velocity = np.array([getattr(cycle, quantity) for cycle in stretch.cycles])
             ax.plot(x, np.where(velocity > 0, velocity, np.nan) / speed, label=name, **style)  # type: ignore[arg-type]
             name = ""
+
+
+def _draw_ends(branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float, steady_speed: float) -> None:
+    """Mark both velocities where parts of the branch and of doubled ones end, by the kind of end, with the reason.
+
+    `axis` and `speed` are those of `_draw_velocities`, `steady_speed` (m/s) that of sliding at the onset.
+    """
+    marked: list[tuple[str, str, float, Cycle | None]] = []
+    for part in filter(None, (branch, branch.doubled)):
+        for n, (begins, stops) in enumerate(part.bounds):
+            why = part.broken[n] if n < len(part.broken) else part.end
+            marked += [(begins.kind, WORDS.get(begins.kind, begins.kind), begins.value, begins.cycle)]
+            marked += [(stops.kind, why if stops.kind in _ENDS else stops.kind, stops.value, stops.cycle)]
+        marked += [("not followed", "not followed from here", end.value, end.cycle) for end, _ in part.not_followed]
+    named: set[str] = set()
+    for kind, words, value, one in marked:
+        if kind not in _ENDS:  # the onset and special cycles have marks of their own
+            continue
+        velocities = np.array([one.peak_velocity, one.lowest_velocity] if one else [steady_speed])
+        known = words in named or kind == "not followed" or words.startswith("end ")
+        label = "" if words in named else fill(words if known else f"end: {words}", LEGEND_WIDTH)
+        named.add(words)
+        ax.plot(
+            len(velocities) * [(value - axis[0]) / axis[1]], np.where(velocities > 0, velocities, np.nan) / speed,
+            color=BLACK, linestyle="none", zorder=3, label=label, **_ENDS[kind],
+        )  # fmt: skip
 
 
 def _draw_own(branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float) -> None:
@@ -243,8 +272,9 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
 def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     """Plot thresholds over two parameters, from `steadyslip.threshold_map` with DataArrays.
 
-    Hatched: steady sliding is unstable. Dotted: no steady sliding. Crossed: the threshold is undecided, with the reason
-    in the legend. White: no kick in the range is large enough.
+    Areas without a threshold look as in a stability chart: orange where steady sliding is unstable, hatched where there
+    is none. Crossed: the threshold is undecided, with the reason in the legend. White: no kick in the range is large
+    enough.
 
     Parameters
     ----------
@@ -281,8 +311,8 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
         lines = ax.contour(x, y, size, colors=BLACK, linewidths=0.7)
         ax.clabel(lines, fontsize="small")
     if np.any(found.values == 0):
-        ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
-        ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="//", label="steady sliding is unstable")
+        ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors=[UNSTABLE])
+        ax.fill_between([], [], label="steady sliding is unstable", **AREAS[UNSTABLE_CODE][1])
     for label, where, hatch in _missing_regions(found):
         ax.contourf(x, y, where, levels=[0.5, 1.5], colors="none", hatches=[hatch])
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch=hatch, label=label)
@@ -301,5 +331,8 @@ def _missing_regions(found: Any) -> list[tuple[str, Any, str]]:
     missing = np.isnan(found.values)
     limit = np.asarray(found["limit"].values) if "limit" in found.coords else np.full(missing.shape, "not known")
     doubts = cycle(_UNDECIDED_HATCHES)
-    hatches = {word: next(doubts) if word.startswith("undecided") else ".." for word in np.unique(limit[missing])}
+    known = {
+        words: AREAS[code][1]["hatch"] for words, code in (("no steady sliding", ABSENT), ("out of range", UNKNOWN))
+    }
+    hatches = {word: known.get(str(word)) or next(doubts) for word in np.unique(limit[missing])}
     return [(fill(str(word), LEGEND_WIDTH), missing & (limit == word), hatch) for word, hatch in hatches.items()]

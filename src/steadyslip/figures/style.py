@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -150,12 +151,14 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
     """Save the figure of Axes with the values of the rig, version and date below it, and with its fonts inside."""
     figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
     width, height = figure.get_size_inches()
-    text = fill(_footer(result), int(width * 72 / (0.55 * _FOOTER)))  # a letter is some .55 of its size wide
+    text = _with_subscripts(
+        fill(_footer(result), int(width * 72 / (0.55 * _FOOTER)))
+    )  # letters: .55 of their size wide
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
     if engine := figure.get_layout_engine():
         engine.set(rect=(0, extra / (height + extra), 1, height / (height + extra)))
-    figure.text(0.01, 0.03 / (height + extra), text, fontsize=_FOOTER, va="bottom", linespacing=1.2, parse_math=False)
+    figure.text(0.01, 0.03 / (height + extra), text, fontsize=_FOOTER, va="bottom", linespacing=1.2)
     for bins in (6, 5, 4, 3):
         _part_ticks(figure, bins)
     with rc_context(_SAVED):
@@ -253,4 +256,14 @@ def parameter_label(rig: Rig, name: str) -> str:
     """
     text, letter = said(rig, name), letter_of(rig, name)
     base, line, below = letter.partition("_")
-    return text.replace(letter, f"${base}_{{\\mathrm{{{below}}}}}$") if line and not below.isdigit() else text
+    return text.replace(letter, _subscript(base, below)) if line and not below.isdigit() else text
+
+
+def _subscript(base: str, below: str) -> str:
+    return f"${base}_{{\\mathrm{{{below}}}}}$"
+
+
+def _with_subscripts(text: str) -> str:
+    """Text for Matplotlib with letters such as d_c set as mathematics, dollar signs as they are."""
+    escaped = text.replace("$", r"\$")
+    return re.sub(r"(?<![^\W_])(\w)_(\w+)", lambda found: _subscript(found[1], found[2]), escaped)

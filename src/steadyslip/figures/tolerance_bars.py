@@ -56,7 +56,7 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
             left=known.min(),
             color="white",
             edgecolor=BLACK,
-            hatch="///",
+            linewidth=1.8,
             label="all together",
         )
     ranges = [

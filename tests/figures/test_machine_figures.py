@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 
 import steadyslip as ss
 from command import run
 from machines import at_random, brake, rate_state, three_bodies, two_blocks, two_mass
 from read_pages import words
 from steadyslip import figures
+from steadyslip.core.palette import STABLE
 from steadyslip.figures.style import parameter_label
 from steadyslip.machine.letters import said
 
@@ -78,7 +80,7 @@ def test_bars_are_the_stable_values():
         for row, label in enumerate(rows):
             full = next(n for n in known if parameter_label(found.rig, n) == label)
             bars = [p for p in ax.patches if abs(p.get_y() + p.get_height() / 2 - row) < 0.01]
-            bars = sorted((p.get_x(), p.get_x() + p.get_width()) for p in bars[1:])
+            bars = sorted((p.get_x(), p.get_x() + p.get_width()) for p in bars if p.get_facecolor() == to_rgba(STABLE))
             try:
                 exact = ss.stable_values(found.rig, full) / known[full].value
             except ss.NotAvailable:
@@ -87,6 +89,24 @@ def test_bars_are_the_stable_values():
             assert np.array(bars) == pytest.approx(np.array(exact), rel=1e-6), (name, full)
             seen += 1
         assert seen > (2 if name != "late" else 0)  # whose other edges are far or not exact
+
+
+def test_hatching_is_where_sliding_is_not_steady():
+    """Beyond an edge at which a contact lifts off, and nowhere in bars of parameters without one."""
+    from steadyslip.figures.machine_verdict import LOST, _pieces
+    from steadyslip.linear.status import ABSENT
+
+    margins = {one.parameter: one for one in analysed("geared-servo").margins if one.edges and one.value > 0}
+    for margin in margins.values():
+        lost = [edge.value for edge in margin.edges if edge.kind in LOST and edge.value > 0]
+        absent = [piece for piece in _pieces(margin) if piece[2] == ABSENT]
+        assert bool(absent) == bool(lost)
+        assert all(not low < margin.value < high for low, high, _ in absent)
+    (beyond,) = [piece for piece in _pieces(margins["contacts.guide.friction.b"]) if piece[2] == ABSENT]
+    assert beyond[0] > 2
+    ax = figures.stable_ranges(analysed("geared-servo"))
+    assert not [patch for patch in ax.patches if patch.get_hatch()]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["stable", "unstable"]
 
 
 def test_what_bars_leave_out_is_said():

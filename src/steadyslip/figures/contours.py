@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
+from steadyslip.core.arrays import Array
 from steadyslip.figures.style import CONTOURS, HALO
 from steadyslip.linear.status import STABLE, UNSTABLE
 
-Array = np.ndarray
 SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Contours of the safety factor k/k_cr."""
 _FALL = (
@@ -45,12 +45,11 @@ def safety_fields(factor: Array, status: Array) -> list[Array]:
 
 def extended(field: Array, missing: Array) -> Array:
     """Field carried on by one grid spacing, in straight lines, into places where it is missing."""
-    sums, count = np.zeros(field.shape), np.zeros(field.shape)
-    for one, two in _neighbours(field):
-        value = np.where(np.isfinite(two), 2 * one - two, one)
-        sums, count = sums + np.nan_to_num(value), count + np.isfinite(value)
+    near = [np.stack(values) for values in zip(*_neighbours(field), strict=True)]
+    straight = 2 * near[0] - near[1]
     with np.errstate(invalid="ignore"):
-        return np.where(missing & ~np.isfinite(field), sums / count, field)
+        ends = [np.nansum(one, axis=0) / np.isfinite(one).sum(axis=0) for one in (straight, near[0])]
+    return np.where(missing & ~np.isfinite(field), np.where(np.isfinite(ends[0]), *ends), field)
 
 
 def _vanishes(field: Array) -> Array:

@@ -42,7 +42,6 @@ from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
-
 _FINE = 8  # times as many points as a map has, for words in its areas
 
 

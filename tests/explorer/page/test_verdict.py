@@ -56,14 +56,15 @@ def explained(visit):
 def test_contours_are_of_what_python_computes(name):
     """The stiffness over the critical one, with the gain of a controller counted in; of machines the growth rate."""
     own = ss.read_rig(f"examples/{name}.toml")
-    for factor in (0.2, 1.0, 3.0):
-        other = own.with_values({"drive.velocity": factor * own.drive.velocity})
+    gains = [{"drive.kp": factor * own.drive.kp} for factor in (3.0, 30.0)] if name == "slow-axis" else []
+    for change in (*({"drive.velocity": factor * own.drive.velocity} for factor in (0.2, 1.0, 3.0)), *gains):
+        other = own.with_values(change)
         point = operating_point(other, None, own.kept_zeros())
         values = list(map(float, point.arguments))
         found = Explored(own).script("linear.set(values).status() && linear.strength()", values=values)
         expected = ss.growth_rate(other)
         if other.default_along is not None:
-            expected = np.log(ss.safety_factor(other))
+            expected = 1 / (1 + 1 / ss.safety_factor(other))
         assert found == pytest.approx(float(expected), rel=1e-9)
 
 
@@ -75,6 +76,15 @@ def test_lines_of_levels_are_where_a_plane_has_them():
     assert len(places) == 2 * len(found["middles"]) > 6
     np.testing.assert_allclose(places[:, 0] / 10 + (4 - places[:, 1] / 10), 3.5, atol=0.02)
     assert places[:, 1].min() >= 10
+
+
+def test_contours_end_at_edges_only():
+    """Numbers are carried on beyond the edge of steady sliding by one point, where lines are cut; jumps have none."""
+    page = Script(page_modules())
+    grid = "[[0, 1, NaN, NaN], [0, 1, NaN, NaN], [0, 1, NaN, NaN]]"
+    np.testing.assert_allclose(np.array(page(f"carried({grid}).map((row) => row.slice(0, 3))")), 3 * [[0, 1, 2]])
+    assert page("line([[0, 3], [0, 3]], 1.5, 60, 40, 1).path") == ""
+    assert page("line([[0, 3], [0, 3]], 1.5, 60, 40).path")
 
 
 def test_contours_are_drawn_while_nothing_moves(browser, file):

@@ -276,7 +276,7 @@ def test_doublings_for_which_no_work_was_left_are_listed_apart(two_doublings, mo
         {"kind": "period doubling", "value": end.value, "why": "the work was used up"}
         for end, _ in doubled.not_followed
     ]
-    drawn_places = [line for line in told.plot().lines if line.get_marker() == "x"]
+    drawn_places = [line for line in told.plot().lines if line.get_marker() == "+"]
     assert [line.get_label() for line in drawn_places if line.get_label()[0] != "_"] == ["not followed from here"]
     assert len(drawn_places) == 2
 

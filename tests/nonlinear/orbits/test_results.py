@@ -135,6 +135,11 @@ def test_files_and_figure(damped, tmp_path):
     ax = damped.plot()
     assert ax.get_xlabel() == "stiffness k (mPa/m)"
     assert "stable cycle" in ax.get_legend_handles_labels()[1]
+    for end in (end for part in damped.bounds for end in part if end.cycle):  # both lines are marked where they end
+        at = {(x, y) for line in ax.lines if line.get_marker() in "|x" for x, y in line.get_xydata()}
+        ends = {(x, y) for line in ax.lines if line.get_linestyle() in "-" for x, y in line.get_xydata()[[0, -1]]}
+        assert len(at & ends) == 2
+        assert end.kind in ("range", "last cycle")
     plain = damped.to_dict()
     assert len(plain["cycles"]) == len(damped)
     assert plain["cycles"][0]["multipliers"][0] == [pytest.approx(1), 0]

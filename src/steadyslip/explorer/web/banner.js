@@ -1,4 +1,5 @@
 // Banner: the verdict, its reason, and a bar with the stable values of one parameter.
+import { inMenu } from "./controls.js";
 import { make, put, svg, tell, unbroken } from "./dom.js";
 import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
@@ -35,7 +36,7 @@ export class Banner {
     this.bar = make("div", { className: "bar", role: "img" }, svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, ...this.paths), this.marks, this.labels);
     this.notice = make("p", { className: "notice", role: "status" });
     if (differs.length) this.notice.textContent = `This browser computes otherwise than Python did (${differs.slice(0, 3).join("; ")}): do not rely on this page.`;
-    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: one.name, textContent: one.title, selected: i === page.rig.bar })));
+    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: one.name, textContent: inMenu(one, this.data.parameters), selected: i === page.rig.bar })));
     this.choice.addEventListener("change", () => page.tell(this.choice.selectedIndex));
     this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar ", this.choice));
     const ask = (kind, textContent = kind) => make("button", { type: "button", textContent, onclick: () => page.guessed(kind) });

@@ -67,15 +67,36 @@ export function regions(status, rows, width, height) {
   return { paths, outline, lost, places: widest(grid, width / columns, height / rows) };
 }
 
-/** SVG path of the line of a level over a grid of numbers, straight within its cells, and the middles of its pieces. @param {number[][]} grid @param {number} at */
-export function line(grid, at, width, height) {
+/** Grid of numbers carried on by one point into NaN, in straight lines. @param {number[][]} grid */
+export function carried(grid) {
+  return grid.map((row, j) => row.map((one, i) => {
+    if (!Number.isNaN(one)) return one;
+    const near = [-1, 0, 1].flatMap((v) => [-1, 0, 1].map((u) => [grid[j + v]?.[i + u], grid[j + 2 * v]?.[i + 2 * u]])).filter(([a]) => Number.isFinite(a));
+    const along = near.filter(([, b]) => Number.isFinite(b)), ends = along.length ? along.map(([a, b]) => 2 * a - b) : near.map(([a]) => a);
+    return ends.reduce((sum, end) => sum + end, 0) / ends.length;
+  }));
+}
+
+const STEEP = 0.15, HALVINGS = 8; // STEEP: difference between neighbours beyond which a crossing is searched for; HALVINGS: of a cell
+
+/**
+ * SVG path of the line of a level over a grid of numbers, straight within its cells, and the middles of its pieces; none in cells with a `jump`.
+ * @param {number[][]} grid @param {number} at @param {((x: number, y: number) => number) | null} [exact] numbers at positions from 0 to 1
+ */
+export function line(grid, at, width, height, jump = Infinity, exact = null) {
   const rows = grid.length - 1, columns = grid[0].length - 1, middles = /** @type {[number, number][]} */ ([]);
   let path = "";
   for (let j = 0; j < rows; j++) {
     for (let i = 0; i < columns; i++) {
-      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]], values = corners.map(([x, y]) => grid[y][x]);
+      if (Math.max(...values) - Math.min(...values) > jump) continue;
       const ends = corners.flatMap(([x, y], k) => {
-        const [u, v] = corners[(k + 1) % 4], a = grid[y][x] - at, b = grid[v][u] - at, t = a / (a - b);
+        const [u, v] = corners[(k + 1) % 4], a = values[k] - at, b = values[(k + 1) % 4] - at;
+        let t = a / (a - b);
+        if (exact && a * b < 0 && Math.abs(a - b) > STEEP) {
+          t = 0.5;
+          for (let n = 2; n <= HALVINGS; n++) t += ((exact((x + t * (u - x)) / columns, (y + t * (v - y)) / rows) - at) * a > 0 ? 1 : -1) / 2 ** n;
+        }
         return a * b < 0 ? [[((x + t * (u - x)) / columns) * width, (1 - (y + t * (v - y)) / rows) * height]] : [];
       });
       if (ends.length !== 2) continue;

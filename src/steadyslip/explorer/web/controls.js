@@ -53,7 +53,7 @@ export class Controls {
     text.addEventListener("input", () => tell(taken, this.taken(i)));
     text.addEventListener("blur", () => tell(taken, ""));
     const about = named(one.doc, one.unit); // left out where it says no more than the title
-    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", { textContent: about.startsWith(one.title.split(" ")[0]) || one.title.endsWith(about) ? "" : about }));
+    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", {}, ...(about.startsWith(one.title.split(" ")[0]) || one.title.endsWith(about) ? [] : subscripted(about))));
     return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
   }
 
@@ -121,10 +121,16 @@ function filled({ from, to, status }) {
   return [`var(--${name}) ${inPercent(from)}`, ...hatches, `var(--${name}) ${inPercent(to)}`];
 }
 
-/** Title of a parameter with its letter, the subscript below the line. @param {any} one @returns {(string | Node)[]} */
-export function lettered({ title, letter }) {
-  const [base, below] = letter.split("_"), words = title.replace(/ (?=\S+$)/, "\u00a0"); // the letter stays with the last word
-  return below && title.includes(letter) ? [words.slice(0, title.indexOf(letter)) + base, make("sub", { textContent: below })] : [words];
+/** Title of a parameter with its letter, the subscript below the line. @param {any} one */
+export const lettered = ({ title }) => subscripted(title.replace(/ (?=\S+$)/, "\u00a0")); // the letter stays with the last word
+
+/** Text with the subscripts of letters, as in v_ref or σ0, below the line. @param {string} text @returns {(string | Node)[]} */
+const subscripted = (text) => text.replace(/(?<![\p{L}\d_])(\p{L})(?=\d)/gu, "$1_").split(/(?<=(?<![\p{L}\d_])\p{L})_([\p{L}\d]+)/u).map((part, n) => (n % 2 ? make("sub", { textContent: part }) : part));
+
+/** Title of a parameter in a menu, which sets no subscripts: in words, if these name no other. @param {any} one @param {any[]} all */
+export function inMenu({ title }, all) {
+  const words = (/** @type {string} */ text) => text.replace(/ ?\S+_\S+$/, ""), own = words(title);
+  return own && all.filter((other) => words(other.title) === own).length === 1 ? own : title;
 }
 
 /** Parts of a track, thin ones widened to be visible, but never over the position of the rig. @param {{from: number, to: number, status: number}[]} parts @param {number} own */

@@ -170,12 +170,16 @@ export class Linear {
     };
   }
 
-  /** What contours show, where there is steady sliding: the logarithm of a slider's stiffness over the critical one, else the growth rate (1/s). */
+  /**
+   * What contours show, where there is steady sliding: of a slider the share k/(k + k_cr), with a controller's gain in both, 0 to 1,
+   * and UPPER more where k_cr is an upper limit; else the growth rate (1/s).
+   */
   strength(branch = 0) {
-    const c = this.ask("coefficients", this.facts.degree + 1);
+    const { degree } = this.facts, c = this.ask("coefficients", degree + 3), stable = c.splice(degree + 1)[0] === 1;
     if (!this.programs.split) return roots(c).reduce((most, { re }) => Math.max(most, re), -Infinity);
-    const { own, gain, intervals, ends } = this.varied(c, branch), { critical } = nearestEnd(intervals, ends, own);
-    return critical === null ? NaN : Math.log((own + gain) / (critical + gain));
+    const { p, q, own, gain, ...known } = this.varied(c, branch), total = own + gain;
+    const { intervals, ends } = gain ? this.stableSet(p.map((v, i) => v - gain * q[i]), q) : known, { critical, side } = nearestEnd(intervals, ends, total);
+    return critical === null ? Number(stable) : total / (total + critical) + (side === "below" ? UPPER : 0);
   }
 
   /** Eigenvalues; empty without steady sliding. */
@@ -300,6 +304,7 @@ export class Linear {
   }
 }
 
+export const UPPER = 2;
 const NOTHING = {
   eigenvalues: /** @type {Complex[]} */ ([]), intervals: /** @type {Interval[]} */ ([]), ends: [], p: [], q: [], critical: null, side: null,
   frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, still: NaN, onEdge: false, held: null,

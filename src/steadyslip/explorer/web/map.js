@@ -1,11 +1,13 @@
 // Stability chart over two parameters with the point of the rig.
-import { CLASSES, line, regions } from "./chart.js";
+import { CLASSES, carried, line, regions } from "./chart.js";
+import { inMenu } from "./controls.js";
 import { make, put, putAt, svg } from "./dom.js";
+import { UPPER } from "./linear.js";
 import { axis, frame } from "./plot.js";
 import { digits, told } from "./quantities.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
-const CELLS = 30, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows, and levels of k/k_cr
+const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows of machines and of sliders, and levels of k/k_cr
 const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
 const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
 const WRITTEN = { stable: "stable", unstable: "unstable", none: "no steady sliding", unknown: "no such rig" }; // words in the areas
@@ -24,7 +26,7 @@ export class Chart {
     const { parameters } = page.rig.data;
     this.choices = [0, 1].map((which) => {
       const select = make("select", { "aria-label": which ? "up: parameter upwards" : "across: parameter across" },
-        ...parameters.map((one) => make("option", { value: one.name, textContent: one.title })));
+        ...parameters.map((one) => make("option", { value: one.name, textContent: inMenu(one, parameters) })));
       select.addEventListener("change", () => {
         this.put(which, select.selectedIndex);
         this.show();
@@ -43,7 +45,7 @@ export class Chart {
     this.key = Object.entries(KEY).map(([name, words]) => make("span", { className: name }, make("i", { className: name }), words));
     this.box = make("section", { className: "map", "aria-label": "chart of stability", tabIndex: -1 }, make("h2", { textContent: "Where is it stable?" }),
       make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys; solid line: edge of stability, dashed: edge of steady sliding" })),
-      this.canvas, make("p", { className: "key" }, ...this.key, make("span", {}, "thin lines: ", ...(page.rig.data.phrases ? ["growth rate, 1/s"] : ["k/k", make("sub", { textContent: "cr" })]))));
+      this.canvas, make("p", { className: "key" }, ...this.key, make("span", {}, "thin lines: ", ...(page.rig.data.phrases ? ["growth rate, 1/s"] : ["stiffness over critical k/k", make("sub", { textContent: "cr" })]))));
   }
 
   /** Put a parameter on an axis; if it is on the other axis, swap the two. @param {number} which @param {number} chosen */
@@ -84,6 +86,7 @@ export class Chart {
       for (const one of this.key) one.hidden = !paths[one.className] && !seen.has(one.className); // no legend for regions that are not in the chart
       put(this.outline, "d", outline);
       put(this.lost, "d", lost);
+      put(this.slides, "d", paths.stable + paths.unstable);
       this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, WRITTEN[name])));
       this.contours(i, x, j, y, places);
     }
@@ -95,18 +98,24 @@ export class Chart {
 
   /** Draw contours, which are left out while a slider moves; labels stand apart from each other and from words, which are some three times as wide as high. @param {{x: number, y: number}[]} words */
   contours(i, x, j, y, words) {
-    const { size: { width, height }, rig, sliding } = this.page, { phrases, facts } = rig.data, columns = Math.round(1.3 * CELLS);
+    const { size: { width, height }, rig, sliding } = this.page, { phrases, facts } = rig.data, cells = phrases ? CELLS : FINE, columns = Math.round(1.3 * cells);
     this.lines.replaceChildren();
     if (sliding || facts.searched.some(Boolean)) return;
-    const grid = Array.from({ length: CELLS + 1 }, (_, b) => Array.from({ length: columns + 1 }, (_, a) => rig.strength(i, x.at(a / columns), j, y.at(b / CELLS))));
+    const exact = (a, b) => rig.strength(i, x.at(a), j, y.at(b));
+    const grid = carried(Array.from({ length: cells + 1 }, (_, b) => Array.from({ length: columns + 1 }, (_, a) => exact(a / columns, b / cells))));
     const top = Math.ceil(Math.log10(Math.max(...grid.flat().map(Math.abs).filter(Number.isFinite)))) - 1;
     const levels = phrases ? [-1, -0.1, 0.1, 1].map((share) => share * 10 ** top) : LEVELS;
-    const drawn = levels.map((level) => line(grid, phrases ? level : Math.log(level), width, height)), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
+    const at = (level) => (phrases ? line(grid, level, width, height) : line(grid, level, width, height, 1, exact)), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
+    const drawn = levels.map((level) => {
+      if (phrases) return at(level);
+      const [lower, upper] = [0, UPPER].map((more) => at(level / (1 + level) + more));
+      return { path: lower.path + upper.path, middles: [...lower.middles, ...upper.middles] };
+    });
     drawn.forEach(({ path, middles }, n) => {
       const beside = [own, ...words.map((one) => [one.x, one.y, 0.3]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))];
       const room = ([u, v]) => Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b, wide = 1]) => Math.hypot(wide * (a - u), b - v)));
       const [u, v] = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
-      this.lines.append(svg("path", { d: path }), ...(room([u, v]) > TIGHT ? [svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))] : []));
+      this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...(room([u, v]) > TIGHT ? [svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))] : []));
     });
   }
 
@@ -123,7 +132,8 @@ export class Chart {
     this.lost = svg("path", { class: "outline lost" });
     this.words = svg("g", {});
     this.lines = svg("g", { class: "contours" });
-    inner.append(stripes, this.hatched, this.lines, this.outline, this.lost, this.words);
+    this.slides = svg("path", {}); // contours end where sliding is not steady
+    inner.append(stripes, svg("clipPath", { id: `${this.stripes}-clip` }, this.slides), this.hatched, this.lines, this.outline, this.lost, this.words);
     this.point = svg("circle", { r: 8, class: "point" });
     this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
     this.canvas.replaceChildren(inner,

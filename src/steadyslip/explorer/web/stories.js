@@ -1,4 +1,5 @@
 // Stories: rigs to begin with, made from the values of the file and their nearest edges.
+import { inMenu } from "./controls.js";
 import { make } from "./dom.js";
 import { STABLE } from "./linear.js";
 import { told } from "./quantities.js";
@@ -12,7 +13,7 @@ export function stories(page) {
   const found = /** @type {[string, number, number][]} */ ([]);
   for (const edge of page.edges().filter((one) => !one.far).slice(0, TALES)) {
     const one = parameters[edge.i], value = edge.beyond === STABLE ? edge.landing : edge.behind;
-    if (inside(one, value)) found.push([`${edge.beyond === STABLE ? "just stable" : "just beyond the edge"}: ${one.title} ${told(one, value)}`, edge.i, value]);
+    if (inside(one, value)) found.push([`${edge.beyond === STABLE ? "just stable" : "just beyond the edge"}: ${inMenu(one, parameters)} ${told(one, value)}`, edge.i, value]);
   }
   for (const [words, times] of /** @type {[string, number][]} */ ([["ten times as fast", 10], ["a tenth of the speed", 0.1]])) {
     if (drive >= 0 && inside(parameters[drive], times * home[drive])) found.push([words, drive, times * home[drive]]);

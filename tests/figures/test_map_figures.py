@@ -108,10 +108,10 @@ def test_curves_bands_and_intervals(maps):
 
 def test_facets_share_axes_and_say_their_value(maps):
     axes = maps["chart"].plot(facet="friction.b", show="critical_stiffness")
-    assert [ax.get_title() for ax in axes.flat] == ["b = 0.016", "b = 0.018", "b = 0.02"]
+    assert [ax.get_title() for ax in axes.flat] == [f"evolution effect b = {b}" for b in (0.016, 0.018, 0.02)]
     assert axes[0, 1].get_ylabel() == ""
     others = maps["chart"].plot(facet="angle")  # which is then on no axis
-    assert others[0, 0].get_title() == "angle = -80 deg"
+    assert others[0, 0].get_title() == "angle ψ = −80 deg"
     assert (others[1, 0].get_xlabel(), others[1, 0].get_ylabel()) == ("stiffness k (GPa/m)", "evolution effect b (1)")
 
 
@@ -200,7 +200,7 @@ def test_refined_points_and_sensitivity_are_drawn(maps, tmp_path):
     over = {"friction.a": (0.010, 0.014), "friction.d_c": (1e-6, 1e-5, "log")}
     bars = ss.sensitivity(rig(), over, points=256).plot()
     assert [ax.get_title() for ax in bars] == ["critical stiffness", "margin"]
-    assert [t.get_text() for t in bars[1].get_yticklabels()] == ["a", "d c"]
+    assert [t.get_text() for t in bars[1].get_yticklabels()] == ["direct effect a", r"slip distance $d_{\mathrm{c}}$"]
     assert bars[0].get_xlabel() == "share of the variance (1)"
 
 

@@ -50,10 +50,18 @@ def short_name(name: str) -> str:
     return " ".join((*before, last)).replace("_", " ")
 
 
+def parameter_words(found: MapResult, name: str) -> str:
+    """Words and letter of a parameter of a map's rig; `short_name` of others, such as times of a protocol."""
+    with suppress(NotAvailable):
+        if name in found.rig.parameters():
+            return stress_name(parameter_label(found.rig, name), found.area(name))
+    return stress_name(short_name(name), found.area(name))
+
+
 def result_label(found: MapResult, name: str) -> str:
     """Name of a result for an axis; results computed along a parameter end in "of" and that parameter."""
     words, along = short_name(name), found.along(name)
-    return words if along is None else f"{words} of {short_name(along)}"
+    return words if along is None else f"{words} of {parameter_words(found, along)}"
 
 
 def drawn_result(found: MapResult, view: View, show: str | None) -> str | None:
@@ -107,10 +115,8 @@ def label_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
         Scale(n, found.unit(n), p, not view.scattered, found.area(n))
         for n, p in zip(view.names, view.places, strict=True)
     ]
-    with suppress(NotAvailable):
-        for name, scale in zip(view.names, scales, strict=True):
-            if name in found.rig.parameters():
-                scale.label = axis_label(stress_name(parameter_label(found.rig, name), found.area(name)), scale.unit)
+    for name, scale in zip(view.names, scales, strict=True):
+        scale.label = axis_label(parameter_words(found, name), scale.unit)
     ax.set_xlabel(scales[0].label)
     ax.set_xscale("log" if scales[0].log else "linear")
     if len(scales) == 2:

@@ -30,8 +30,8 @@ from steadyslip.figures.map_axes import (
     drawn_result,
     label_axes,
     missing_note,
+    parameter_words,
     result_label,
-    short_name,
 )
 from steadyslip.figures.style import AREAS, EDGES, OWN_RIG, SAFETY_WORDS, axis_label, display_unit
 from steadyslip.linear.status import ABSENT, QUIET, STABLE, UNDAMPED, status as status_of
@@ -302,11 +302,13 @@ def _mark_own(
     if nearest is None:
         return
     ax.plot(*zip(at, nearest, strict=True), color=VERMILION, linewidth=1.2, linestyle=":", zorder=4)
-    words = ", ".join(
-        f"{short_name(name)} {format_quantity(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
+    values = [
+        typeset(format_quantity(float(value * scale.factor), found.unit(name), 3, found.area(name))).replace("-", "−")
         for name, value, scale in zip(view.names, nearest, scales, strict=True)
+    ]
+    words = ",\n".join(
+        f"{parameter_words(found, name)} {value}" for name, value in zip(view.names, values, strict=True)
     )
-    words = typeset(words).replace("-", "−")
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
             label=f"nearest edge\n({words})" if with_values else "nearest edge", zorder=5)  # fmt: skip
 

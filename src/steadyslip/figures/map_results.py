@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from steadyslip.core.errors import InternalError, ParameterError, Problem
 from steadyslip.core.palette import BLACK, BLUE, ORANGE
 from steadyslip.figures.map_axes import KIND_COLOURS, add_legend, label_axes, short_name
-from steadyslip.figures.style import axes_or_new, is_narrow, new_panels
+from steadyslip.figures.style import axes_or_new, is_narrow, new_panels, parameter_label
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import Sensitivity
 from steadyslip.maps.view.cut import View, own_value
@@ -88,7 +88,7 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
     -------
     ndarray of matplotlib.axes.Axes
     """
-    results = list(found.first)
+    results, known = list(found.first), found.rig.parameters()
     if ax is None:
         high, many = 0.42 * len(found.parameters) + 1.6, len(results)
         ax = new_panels(many, 1, (4.6, high * many)) if is_narrow() else new_panels(1, many, (4.6 * many, high))
@@ -104,7 +104,9 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
         for label, values, (low, high), colour, shift in parts:
             reach = np.abs(np.stack([values - low, high - values]))[:, rows]
             one.barh(place + shift, values[rows], 0.36, xerr=reach, color=colour, ecolor=BLACK, capsize=2, label=label)
-        one.set_yticks(place, [short_name(name) for name in order])
+        one.set_yticks(
+            place, [parameter_label(found.rig, name) if name in known else short_name(name) for name in order]
+        )
         one.set_xlim(left=min(0.0, one.get_xlim()[0]))
         one.set_xlabel("share of the variance (1)")
         title = result.replace("_", " ")

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.names import resolve
-from steadyslip.figures.map_axes import add_legend, drawn_result, short_name
+from steadyslip.figures.map_axes import add_legend, drawn_result, parameter_words
 from steadyslip.figures.map_curves import draw_curve, draw_scatter
 from steadyslip.figures.map_plane import colour_scale, draw_plane
 from steadyslip.figures.style import axes_or_new, is_narrow, new_panels
@@ -111,10 +111,8 @@ def _draw_facets(found: MapResult, names: Sequence[str], show: str | None, third
     scale = _common_scale(found, views, drawn_result(found, views[0], show))
     for ax, view, value in zip(flat, views, chosen, strict=False):
         _draw(ax, found, view, show, scale)
-        ax.set_title(
-            f"{short_name(third)} = {format_quantity(float(value), found.unit(third), area=found.area(third))}",
-            fontsize="medium",
-        )
+        words = typeset(format_quantity(float(value), found.unit(third), area=found.area(third))).replace("-", "−")
+        ax.set_title(f"{parameter_words(found, third)} = {words}", fontsize="medium")
     for ax in flat[len(chosen) :]:
         ax.set_axis_off()
     for ax in flat:

@@ -82,7 +82,8 @@ def recommendation(result: Hunt) -> Iterator[str]:
 
 def _cures(result: Hunt) -> Iterator[str]:
     """HTML of the changes that were tried, the best first, and of what each leaves."""
-    unit, own, asked = result.unit, _reach(result), getattr(result.rig.drive, "dead_band", None)
+    unit, own, limits = result.unit, _reach(result), result.rig.drive.limits()
+    asked = limits.dead_band if limits else None
     allowed = own if asked is None else float(asked)
     until = LONGER * float(result.time[-1])
     found = [Tried(what, hunt(rig, result.protocol, until=until), least) for what, rig, least in _changed(result)]
@@ -144,4 +145,5 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
 
 
 def _is_gain(rig: Rig, name: str) -> bool:
-    return name in ("drive.kp", "drive.kd", "drive.ki") and bool(rig.parameters()[name].value)
+    one = rig.parameters()[name]
+    return name.startswith("drive.") and one.role.letter in ("k_p", "k_d", "k_i") and bool(one.value)

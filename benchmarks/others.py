@@ -1,4 +1,4 @@
-"""The same three questions put to steadyslip, SciPy and python-control, with errors and times.
+"""The same three questions put to steadyslip, SciPy, python-control and rsfmodel, with errors and times.
 
     python benchmarks/others.py
 
@@ -6,6 +6,8 @@ Prints the table of docs/explanation/comparison.md. Lines are those that a user 
 1. Velocity step of a press under constant normal stress: friction after 80 s, against Radau at rtol 1e-12.
 2. Critical stiffness of the inclined spring, against the closed form of Dupont & Bapna.
 3. d_c of a computed record with noise, against the value that it was computed with.
+
+rsfmodel is on no package index; it is asked where it can be imported, as with its checkout on PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -32,6 +34,11 @@ from scipy.optimize import brentq, least_squares
 
 import steadyslip as ss
 
+try:
+    from rsfmodel import rsf, staterelations
+except ImportError:
+    rsf = None
+
 A, B, D_C, MU, SIGMA, K, V0, V1 = 0.012, 0.015, 1e-5, 0.6, 5e6, 30e9, 1e-6, 3e-6
 """Of the record in examples/data/made_velocity_step.csv."""
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -55,6 +62,16 @@ def slope(t: float, y: np.ndarray, a: float, b: float, d_c: float, mu: float, k:
 def step_by_scipy(rtol: float = 1e-8, method: str = "LSODA") -> float:
     values = (A, B, D_C, MU, K, V1)
     return float(solve_ivp(slope, (20, 80), [MU, 0.0], method, args=values, rtol=rtol, atol=rtol * 1e-2).y[0, -1])
+
+
+def step_by_rsfmodel() -> float:
+    model, state = rsf.Model(), staterelations.RuinaState()
+    model.mu0, model.a, model.vref, model.k = MU, A, V0, K / SIGMA
+    state.b, state.Dc = B, D_C
+    model.state_relations = [state]
+    model.time = np.linspace(0, 80, 801)
+    model.loadpoint_velocity = np.where(model.time < 20, V0, V1)
+    return float(model.solve().friction[-1])
 
 
 # --- 2. critical stiffness --------------------------------------------------------------------------
@@ -138,6 +155,7 @@ def main() -> None:
     rows = [
         ("friction after a velocity step", "steadyslip", step_by_steadyslip, (step_by_steadyslip,), exact),
         ("", "scipy", step_by_scipy, (slope, step_by_scipy), exact),
+        *([("", "rsfmodel", step_by_rsfmodel, (step_by_rsfmodel,), exact)] if rsf else []),
         ("critical stiffness", "steadyslip", edge_by_steadyslip, (edge_by_steadyslip,), closed),
         ("", "scipy", edge_by_scipy, (state_matrix, edge_by_scipy), closed),
         ("", "control", edge_by_control, (state_matrix, edge_by_control), closed),
@@ -147,7 +165,7 @@ def main() -> None:
     print("| question | program | lines | answer | relative error | time |\n|---|---|---|---|---|---|")
     for question, name, call, written, truth in rows:
         found, seconds = timed(call, runs)
-        program = name if name == "steadyslip" else f"{name} {version(name)}"
+        program = name if name in ("steadyslip", "rsfmodel") else f"{name} {version(name)}"
         numbers = f"{found:.6g}", f"{abs(found / truth - 1):.1e}", f"{seconds * 1e3:.3g} ms"
         row = (question, program, lines_of(*written), *numbers)
         print("|", " | ".join(map(str, row)), "|")

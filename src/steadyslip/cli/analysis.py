@@ -10,7 +10,20 @@ from typing import Annotated
 import typer
 
 from steadyslip.cli.answers import formula_data, output_result, print_formula, print_json, print_text
-from steadyslip.cli.options import AsJson, Branch, Changes, Fitted, OtherRigFile, RigFile, outputs, refuse_branch
+from steadyslip.cli.options import (
+    Approval,
+    AsJson,
+    Author,
+    Branch,
+    Changes,
+    Fitted,
+    OtherRigFile,
+    Project,
+    Revision,
+    RigFile,
+    outputs,
+    refuse_branch,
+)  # fmt: skip
 
 
 def analyze(
@@ -141,6 +154,10 @@ def compare(
     changes: Changes = None,
     output: Annotated[list[Path] | None, outputs("write .html")] = None,
     as_json: AsJson = False,
+    project: Project = "",
+    author: Author = "",
+    revision: Revision = "",
+    approval: Approval = "",
 ) -> None:
     """Two rigs beside each other: verdicts, margins, chances, and which of their differences matters."""
     from steadyslip.files.output import check_output
@@ -149,7 +166,8 @@ def compare(
 
     check_output(output or (), (".html",))
     found = compare_files(rig, other, changes or ())
-    output_result(found, output or (), as_json, partial(write_page, kind="Comparison"))
+    block = {"project": project, "author": author, "revision": revision, "approval": approval}
+    output_result(found, output or (), as_json, partial(write_page, kind="Comparison", source=[rig, other], **block))
 
 
 def modes(

@@ -9,7 +9,18 @@ from typing import Annotated, Any
 import typer
 
 from steadyslip.cli.answers import print_text
-from steadyslip.cli.options import Branch, Changes, Fitted, RigFile, pair_of, refuse_branch
+from steadyslip.cli.options import (
+    Approval,
+    Author,
+    Branch,
+    Changes,
+    Fitted,
+    Project,
+    Revision,
+    RigFile,
+    pair_of,
+    refuse_branch,
+)  # fmt: skip
 
 
 def explore(
@@ -53,10 +64,10 @@ def report(
         list[str] | None,
         typer.Option("--chart", metavar="X,Y", help="draw stability over these two, as angle,stiffness; repeatable"),
     ] = None,
-    project: Annotated[str, typer.Option(help="project, for the title block")] = "",
-    author: Annotated[str, typer.Option(help="author, for the title block")] = "",
-    revision: Annotated[str, typer.Option(help="revision, for the title block")] = "",
-    approval: Annotated[str, typer.Option(help="who approved it, for the title block")] = "",
+    project: Project = "",
+    author: Author = "",
+    revision: Revision = "",
+    approval: Approval = "",
 ) -> None:
     """A printable document about a rig: answer, recommendation, inputs, edges, charts, motion, formula, provenance."""
     from steadyslip.files.output import check_output

@@ -50,6 +50,10 @@ Changes = Annotated[
         callback=_add_units,
     ),
 ]
+Project = Annotated[str, typer.Option(help="project, for the title block")]
+Author = Annotated[str, typer.Option(help="author, for the title block")]
+Revision = Annotated[str, typer.Option(help="revision, for the title block")]
+Approval = Annotated[str, typer.Option(help="who approved it, for the title block")]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, in SI units")]
 Until = Annotated[str | None, typer.Option(help="end of the run, such as '200 s'; that of the file unless given")]
 Pieces = Annotated[

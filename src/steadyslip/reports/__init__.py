@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
 from steadyslip.machine.rig import Rig
-from steadyslip.reports import lab  # noqa: F401 -- registers documents of fits
+from steadyslip.reports import lab, two_rigs  # noqa: F401 -- register documents of fits and of comparisons
 from steadyslip.reports.brief import brief
 from steadyslip.reports.document import Report, document_html, source_text
 from steadyslip.reports.results import parts_of
@@ -27,7 +28,7 @@ def report(
     *,
     title: str = "steadyslip report",
     explorer: bool = True,
-    source: str | PathLike[str] | None = None,
+    source: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     project: str = "",
     author: str = "",
     revision: str = "",
@@ -44,8 +45,8 @@ def report(
         Line above the headline.
     explorer : bool, optional
         If True, the explorer of the rig is at the end.
-    source : path, optional
-        File that the result was computed from; the document has its hash.
+    source : path, or sequence of them, optional
+        Files that the result was computed from; the document has their hashes.
     project, author, revision, approval : str, optional
         Entries of the title block, which stands at the top if one of them is given.
     **options
@@ -71,11 +72,12 @@ def report(
     >>> rig = ss.read_rig("examples/inclined-spring.toml")
     >>> ss.report(rig, explorer=False).save("report.html")
     """
-    path = None if source is None else Path(source)
+    given = () if source is None else (source,) if isinstance(source, (str, PathLike)) else source
+    paths = [Path(one) for one in given]
     block = {"project": project, "author": author, "revision": revision, "approval": approval}
     if isinstance(result, Rig | Analysis | Tolerated):
-        options["source"] = source_text(path)
-    return Report(document_html(parts_of(result, **options), title, explorer, path, block), title)
+        options["source"] = source_text(paths[0]) if paths else ""
+    return Report(document_html(parts_of(result, **options), title, explorer, paths, block), title)
 
 
 def _whole(result: Any, **options: Any) -> str:

@@ -90,9 +90,14 @@ class Parts:
 
 
 def document_html(
-    parts: Parts, title: str, explorer: bool, source: Path | None, block: Mapping[str, str] = MappingProxyType({})
+    parts: Parts,
+    title: str,
+    explorer: bool,
+    sources: Sequence[Path] = (),
+    block: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """HTML text of a document; `source` is the file that the result was computed from, `block` its title block."""
+    """HTML text of a document; `sources` are the files that the result was computed from, `block` its title block."""
+    source = sources[0] if sources else None
     live, still = "", ""
     if explorer and parts.rig is not None:
         try:
@@ -105,7 +110,7 @@ def document_html(
         f"{_title_block(block)}"
         f'<p class="kind">{html_text(title)}</p><h1>{html_text(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
-        f"{''.join(parts.body)}{_provenance(_rig_listing(parts, source), source)}{still}"
+        f"{''.join(parts.body)}{_provenance(_listings(parts, sources), sources)}{still}"
         f'<div class="on-screen">{shown}</div></article>\n'
     )
     return document(f"{title} – steadyslip", _DOCUMENT_STYLE + STYLE + (style() if live else ""), article + live)
@@ -127,6 +132,12 @@ def source_text(source: Path | None) -> str:
         return ""
 
 
+def _listings(parts: Parts, sources: Sequence[Path]) -> list[str]:
+    """Texts of the file of the rig, or without one rig of all `sources`."""
+    texts = map(source_text, sources) if parts.rig is None else [_rig_listing(parts, next(iter(sources), None))]
+    return [text for text in texts if text]
+
+
 def _rig_listing(parts: Parts, source: Path | None) -> str:
     """Text of a file of the rig: that of the user, with comments and units, if it has the same rig and protocol."""
     own = source_text(source)
@@ -140,8 +151,8 @@ def _rig_listing(parts: Parts, source: Path | None) -> str:
     return own if same else parts.rig_file
 
 
-def _provenance(text: str, source: Path | None) -> str:
-    """HTML section: versions, date, hash of the source, and the text of the rig file with its hash."""
+def _provenance(texts: Sequence[str], sources: Sequence[Path]) -> str:
+    """HTML section: versions, date, hashes of the sources, and the texts of rig files with their hashes."""
     import numpy as np
     import scipy
     import sympy as sp
@@ -152,8 +163,8 @@ def _provenance(text: str, source: Path | None) -> str:
         f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}, SymPy {sp.__version__}"
     )
     rows = [("steadyslip", __version__), ("with", versions), ("made on", f"{datetime.now(UTC):%Y-%m-%d}")]
-    if source is not None and source.is_file():
-        rows.append((f"SHA-256 of {source.name}", hashlib.sha256(source.read_bytes()).hexdigest()))
-    if text:
-        rows.append(("SHA-256 of the file below", hashlib.sha256(text.encode()).hexdigest()))
-    return heading("Where it came from") + table(rows) + (listing(text) if text else "")
+    for one in sources:
+        if one.is_file():
+            rows.append((f"SHA-256 of {one.name}", hashlib.sha256(one.read_bytes()).hexdigest()))
+    rows += [("SHA-256 of the file below", hashlib.sha256(text.encode()).hexdigest()) for text in texts]
+    return heading("Where it came from") + table(rows) + "".join(map(listing, texts))

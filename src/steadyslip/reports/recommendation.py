@@ -47,13 +47,15 @@ class Order:
 ORDER = Order()
 
 
-def recommendation(analysis: Analysis, order: Order = ORDER, tolerated: Tolerated | None = None) -> Iterator[str]:
+def recommendation(
+    analysis: Analysis, order: Order = ORDER, tolerated: Tolerated | None = None, title: str = "The recommendation"
+) -> Iterator[str]:
     """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
 
     With tolerances a rig is kept only where it is stable with a chance of `SURE`; otherwise stands what `cure` finds.
     """
     adjustable = order.adjustable
-    yield heading("The recommendation")
+    yield heading(title)
     if tolerated is not None and tolerated.share < SURE:
         yield from _made_sure(tolerated, adjustable)
         if analysis.stable:

@@ -40,8 +40,6 @@ from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.recommendation import Order
 from steadyslip.reports.sections import notes_of, references
 from steadyslip.verdict import Analysis, Tolerated, analyze, tolerate
-from steadyslip.verdict.compare import RigComparison
-from steadyslip.verdict.words import headline
 
 MAX_ROWS = 24  # rows of a table of slip events or cycles, so that a document stays short (by trial)
 PHASE_PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
@@ -220,37 +218,6 @@ def _hunt(result: Hunt, source: str = "") -> Parts:
     ]  # fmt: skip
     question = "Does this axis come to rest at the place that it holds, or does it hunt: how far, and how often?"
     return Parts(first.capitalize(), "", question, body, rig, result.protocol)
-
-
-@parts_of.register
-def _comparison(result: RigComparison) -> Parts:
-    rigs: list[Any] = [one.rig for one in result.verdicts]
-    rows = [(said(rigs[0], one.parameter),
-             one.first, one.second, result.part_in_words(one), one.first_with, one.second_with)
-            for one in result.differences]  # fmt: skip
-    a, b = result.names
-    head = ("difference", a, b, f"its part in {result.of}", f"{a} with that of {b}", f"{b} with that of {a}")
-    (label, *names), *sides = result.side_by_side()
-    told = [tuple(_with_words(rigs, cells)) for cells in sides]
-    body = [
-        heading("Side by side"), table(told, (label, *names), caption="The two rigs."),
-        heading("What differs?"), table(rows, head, caption="Differences, the one with the largest part first."),
-        *(paragraph(worded(rigs[0], text)) for text in result.decisive()),
-        *(part for name, rig in zip(result.names, rigs, strict=True)
-          for part in (heading(f"Inputs of {name}"), *rig_section(rig)[1:])),
-        *references(*rigs),
-    ]  # fmt: skip
-    verdicts = [headline(one, capitals=False).partition(":")[0].lower() for one in result.verdicts]
-    question = "Which of the two slides steadily, and which of their differences decides it?"
-    return Parts(f"{a}: {verdicts[0]}; {b}: {verdicts[1]}", "", question, body)
-
-
-def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
-    """Cells of a row about two rigs, with a parameter at the beginning in words instead of by its path."""
-    yield cells[0]
-    for rig, cell in zip(rigs, cells[1:], strict=True):
-        name, _, rest = cell.partition(" ")
-        yield f"{said(rig, name)} {rest}" if name in rig.parameters() else cell
 
 
 @parts_of.register

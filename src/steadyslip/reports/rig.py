@@ -124,11 +124,16 @@ def checks_line(analysis: Analysis) -> Iterator[str]:
         yield paragraph(in_words(analysis.checks), "small")
 
 
+def chart_pairs(analysis: Analysis, order: Order) -> list[tuple[str, str]]:
+    """Pairs of a parameter and the stiffness to draw stability over: what can be changed first, then nearest edges."""
+    stiffness = analysis.rig.stiffness_name()
+    told = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
+    return [(name, stiffness) for name in dict.fromkeys(one.parameter for one in told) if name != stiffness]
+
+
 def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
-    told = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
-    near = [name for name in dict.fromkeys(one.parameter for one in told) if name != stiffness]
-    for x, y in order.charts or [(name, stiffness) for name in near[:2]]:
+    for x, y in order.charts or chart_pairs(analysis, order)[:2]:
         over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
         words = f"Where sliding is stable over {over}; the dot is this rig."
         chart = figure_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words, 6.0)  # type: ignore[misc]

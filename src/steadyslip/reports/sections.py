@@ -83,9 +83,9 @@ def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
             yield from _keys(one, f"{before}{name}.") if isinstance(one, dict) else [before + name]
 
 
-def motion(analysis: Analysis) -> Iterator[str]:
+def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
     """HTML of the motion after a small disturbance: time history and phase plane with the cycle."""
-    yield heading("The motion")
+    yield heading(title)
     rig: Any = analysis.rig
     try:
         branch, unstable = getattr(analysis, "branch", 0), analysis.stable is False

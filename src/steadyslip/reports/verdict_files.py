@@ -10,11 +10,15 @@ from steadyslip import figures
 from steadyslip.files.output import write_by_ending
 from steadyslip.files.standalone import write_page
 from steadyslip.machine.slider import Slider
+from steadyslip.reports.recommendation import Order
+from steadyslip.reports.rig import chart_pairs
 from steadyslip.verdict import Analysis, Tolerated
 
 
 def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source: Path, journal: bool = False) -> None:
-    """Write the verdict on a rig as .html, or as a picture: for sliders the stability chart, for machines its ranges.
+    """Write the verdict on a rig as .html, or as a picture: for machines the ranges, for sliders the stability chart.
+
+    The chart is over what can be changed, as in the document.
 
     Raises
     ------
@@ -28,8 +32,8 @@ def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source:
             if found.rig.in_forces:
                 return found.plot()
             rig: Slider = found.rig
-            stiffness = rig.stiffness_name()
-            near = [one.parameter for one in found.margins if one.edge is not None and one.parameter != stiffness]
-            return figures.stability_chart(rig, near[0], stiffness) if near else figures.root_locus(rig)
+            adjustable = getattr(within.tolerances, "adjust", {}) if within is not None else {}
+            pairs = chart_pairs(found, Order((), adjustable))
+            return figures.stability_chart(rig, *pairs[0]) if pairs else figures.root_locus(rig)
 
     write_by_ending(path, {".html": lambda p: write_page(shown, p, "Verdict", source=source)}, drawn, found)

@@ -157,6 +157,11 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = DEFAUL
     """Check that the law is registered and gives either a load or a steady normal stress, positive.
 
     Compliant surfaces may have zero load, as they carry what the machine presses on them.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_names(contact)
     """
     name = type(contact).name
     require(
@@ -174,7 +179,13 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = DEFAUL
 
 
 def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
-    """Check that the normal stress called with floats equals that in symbols, in and near steady sliding."""
+    """Check that the normal stress called with floats equals that in symbols, in and near steady sliding.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_numbers(contact)
+    """
     symbolic = SymbolicContactLaw(contact)
     sigma = surroundings.steady_stress(contact)
     for factor in (1.0, 1.01, 0.99):
@@ -190,7 +201,13 @@ def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = DEFA
 
 
 def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
-    """Check that the steady normal stress is positive, and equals the normal stress of the law in steady sliding."""
+    """Check that the steady normal stress is positive, and equals the normal stress of the law in steady sliding.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_steady_stress(contact)
+    """
     symbolic = SymbolicContactLaw(contact)
     sigma = surroundings.steady_stress(contact)
     require(sigma > 0, contact, f"the steady normal stress is {sigma!r} Pa, must be > 0")
@@ -212,6 +229,11 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAUL
     """Check B0...B3 (eq. 12) against central differences of the normal stress, at two stiffnesses.
 
     Laws with states or compliant surfaces have no such coefficients: see `check_contact_routes`.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_linearisation(contact)
     """
     from steadyslip.linear.response import contact_coefficients
 
@@ -261,7 +283,13 @@ def _displaced(
 
 
 def check_axis(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
-    """Check, for laws with an axis, that the sliding stiffness is a constant share, at most 1, of the axial one."""
+    """Check, for laws with an axis, that the sliding stiffness is a constant share, at most 1, of the axial one.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_axis(contact)
+    """
     if not contact.has_axis():
         return
     share, tenfold = (float(contact.sliding_stiffness(k)) for k in (1.0, 10.0))
@@ -274,5 +302,11 @@ def check_axis(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUN
 
 
 def check_contact_round_trip(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
-    """Check that a rig with this contact is unchanged after writing it to a rig file and reading it back."""
+    """Check that a rig with this contact is unchanged after writing it to a rig file and reading it back.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_round_trip(contact)
+    """
     round_trip(contact, surroundings.rig(contact))

@@ -31,6 +31,11 @@ def check_contact_states(contact: ContactLaw, surroundings: Surroundings = DEFAU
     """Check that states have names and units, rates that vanish in steady sliding, decay, and change the normal stress.
 
     Rates and steady states called with floats must equal those in symbols.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_states(contact)
     """
     names, units = contact.memory(), contact.memory_units()
     symbolic = SymbolicContactLaw(contact)
@@ -129,6 +134,11 @@ def check_contact_senses(contact: ContactLaw, surroundings: Surroundings = DEFAU
     """Check `is_compliant` and `has_pores` against what the law depends on: separation of surfaces, outside pressure.
 
     The normal stress of compliant surfaces must fall with separation, and resist the rate of separation.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_senses(contact)
     """
     symbolic = SymbolicContactLaw(contact)
     rates = call_with_symbols(contact, "rates", symbolic.copy.rates, symbolic.motion) if contact.memory() else ()
@@ -166,6 +176,11 @@ def check_contact_routes(contact: ContactLaw, surroundings: Surroundings = DEFAU
 
     One-sided differences of the rates of motion at steady sliding must equal the derivatives, and the eigenvalues of
     these the roots of the characteristic polynomial.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_routes(contact)
     """
     from steadyslip.linear.stiffness import eigenvalues as of_polynomial
     from steadyslip.motion.jobs import Options, prepare

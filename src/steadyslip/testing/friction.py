@@ -32,7 +32,13 @@ def _location(v: Any, sigma: Any) -> str:
 
 
 def check_names(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that the law is registered, and that names, units, rates and steady memory agree in number."""
+    """Check that the law is registered, and that names, units, rates and steady memory agree in number.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_names(law)
+    """
     name = type(law).name
     require(
         name and FrictionLaw.registry.get(name) is type(law),
@@ -59,7 +65,13 @@ def check_names(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -
 
 
 def check_symbols(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that equations depend on their arguments only, and that no symbol of the law collides with the Model's."""
+    """Check that equations depend on their arguments only, and that no symbol of the law collides with the Model's.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_symbols(law)
+    """
     from steadyslip.laws.contact import ConstantNormalStress
     from steadyslip.machine.drive import SteadyDrive
     from steadyslip.machine.slider import Slider
@@ -92,7 +104,13 @@ def check_symbols(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS)
 
 
 def check_steady_state(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that rates vanish at `steady_memory` and the strength there is `steady_strength`, over decades of v, σ."""
+    """Check that rates vanish at `steady_memory` and the strength there is `steady_strength`, over decades of v, σ.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_steady_state(law)
+    """
     symbolic = symbolic_law(law)
     values = symbolic.function(*symbolic.rates, symbolic.strength)
     gradients = [symbolic.function(*symbolic.gradient(rate)) for rate in symbolic.rates]
@@ -128,7 +146,13 @@ def check_steady_state(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDIT
 
 
 def check_signs(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that strength and direct effect are positive in steady sliding, and that the memory relaxes."""
+    """Check that strength and direct effect are positive in steady sliding, and that the memory relaxes.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_signs(law)
+    """
     symbolic = symbolic_law(law)
     values = symbolic.function(
         symbolic.strength,
@@ -170,7 +194,13 @@ def check_signs(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -
 
 
 def check_derivatives(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check SymPy's derivatives of strength and rates against central differences, away from steady sliding."""
+    """Check SymPy's derivatives of strength and rates against central differences, away from steady sliding.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_derivatives(law)
+    """
     symbolic = symbolic_law(law)
     expressions = {"strength": symbolic.strength} | {
         f"rate of {n}": r for n, r in zip(law.memory(), symbolic.rates, strict=True)
@@ -200,7 +230,13 @@ def check_derivatives(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITI
 
 
 def check_numbers(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that methods called with floats, and their compiled expressions, equal the symbolic expressions."""
+    """Check that methods called with floats, and their compiled expressions, equal the symbolic expressions.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_numbers(law)
+    """
     symbolic = symbolic_law(law)
     expressions = (symbolic.strength, *symbolic.rates)
     exact, compiled = symbolic.function(*expressions), symbolic.floats(*expressions)
@@ -236,6 +272,11 @@ def check_jumps(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -
     The rates are integrated through a smooth ramp of ever shorter duration: the change of each memory
     variable must vanish with the duration at first order, and the strength at the end must tend to
     strength(v2, σ2, memory before the jump).
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_jumps(law)
     """
     symbolic = symbolic_law(law)
     v, sigma = conditions.velocity, conditions.normal_stress

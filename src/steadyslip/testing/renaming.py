@@ -107,7 +107,13 @@ def _require_equal_equations(law: L, rig: Callable[[L], Slider | Machine]) -> No
 
 
 def check_renaming(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that the equations of a rig with this friction law do not depend on its names."""
+    """Check that the equations of a rig with this friction law do not depend on its names.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_renaming(law)
+    """
     from steadyslip.laws.contact import ConstantNormalStress
     from steadyslip.machine.drive import SteadyDrive
 
@@ -116,5 +122,11 @@ def check_renaming(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS
 
 
 def check_contact_renaming(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
-    """Check that the equations of a rig with this contact law do not depend on its names."""
+    """Check that the equations of a rig with this contact law do not depend on its names.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_contact_renaming(contact)
+    """
     _require_equal_equations(contact, surroundings.rig)

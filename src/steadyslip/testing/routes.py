@@ -17,6 +17,11 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIO
 
     The cubic takes dτ/dv and dτ/dσ in steady sliding from `steady_strength`, the Jacobian everything from `strength`
     and `rates`. They must agree up to a positive factor, with mass, dampings and B0...B3.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_two_routes(law)
     """
     from steadyslip.laws.contact import LinearNormalStress
     from steadyslip.linear import cubic
@@ -66,7 +71,13 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIO
 
 
 def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
-    """Check that a rig with this law is unchanged after writing it to a rig file and reading it back."""
+    """Check that a rig with this law is unchanged after writing it to a rig file and reading it back.
+
+    Examples
+    --------
+    >>> law = ss.laws.RateState(a=0.01, b=0.015, d_c="1 um", mu_ref=0.6, v_ref="1 um/s")
+    >>> ss.testing.check_friction_round_trip(law)
+    """
     from steadyslip.laws.contact import ConstantNormalStress
     from steadyslip.machine.drive import SteadyDrive
 

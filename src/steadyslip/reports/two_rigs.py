@@ -1,0 +1,86 @@
+"""Document about two rigs beside each other: which slides steadily, what decides it, what to change about either."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from steadyslip.machine.letters import said, worded
+from steadyslip.reports.document import Parts
+from steadyslip.reports.elements import heading, paragraph, table
+from steadyslip.reports.recommendation import Order, recommendation
+from steadyslip.reports.results import parts_of, rig_section
+from steadyslip.reports.rig import VALIDITY, edge_table
+from steadyslip.reports.sections import assumptions, motion, references
+from steadyslip.verdict import RigComparison, Tolerated
+from steadyslip.verdict.words import headline
+
+
+@parts_of.register
+def _comparison(result: RigComparison) -> Parts:
+    rigs: list[Any] = [one.rig for one in result.verdicts]
+    of_each = list(zip(result.names, result.verdicts, result.within, strict=True))
+    a, b = result.names
+    (label, *names), *sides = result.side_by_side()
+    told = [tuple(_with_words(rigs, cells)) for cells in sides]
+    first, second = (_assumed(one) for one in result.verdicts)
+    body = [
+        *(part for name, one, within in of_each
+          for part in recommendation(one, _order(within), within, f"The recommendation for {name}")),
+        *first, *(part for part in second if part not in first),
+        heading("Side by side"), table(told, (label, *names), caption="The two rigs."),
+        heading("What differs?"), *_differences(result),
+        *(part for name, one, _ in of_each
+          for part in (heading(f"How far is the edge of {name}?"), *edge_table(one),
+                       *motion(one, f"The motion of {name}"), heading(f"Inputs of {name}"), *rig_section(one.rig)[1:])),
+        *references(*rigs),
+    ]  # fmt: skip
+    verdicts = [headline(one, capitals=False).partition(":")[0].lower() for one in result.verdicts]
+    question = "Which of the two slides steadily, and which of their differences decides it?"
+    return Parts(f"{a}: {verdicts[0]}; {b}: {verdicts[1]}", _answer(result), question, body)
+
+
+def _assumed(analysis: Any) -> list[str]:
+    return list(assumptions(analysis.rig, analysis.warnings, VALIDITY))
+
+
+def _order(within: Tolerated | None) -> Order:
+    return Order((), {} if within is None else getattr(within.tolerances, "adjust", {}))
+
+
+def _answer(result: RigComparison) -> str:
+    """Sentences on what decides: differences that change the verdict alone, or the one with the largest part."""
+    rig: Any = result.verdicts[0].rig
+    if decisive := [worded(rig, text) for text in result.decisive()]:
+        return f"{'; '.join(decisive)}."
+    if not result.differences:
+        return "They have the same equations and numbers."
+    one = result.differences[0]
+    name = said(rig, one.parameter)
+    part = f", by {result.part_in_words(one)} of {result.of}" if result.measure else ""
+    return f"No difference decides, as the verdict is the same; most of what differs comes from {name}{part}."
+
+
+def _differences(result: RigComparison) -> Iterator[str]:
+    """HTML table of the differences, with what each is worth, and what a part is."""
+    rig: Any = result.verdicts[0].rig
+    a, b = result.names
+    rows = [
+        (said(rig, one.parameter), one.first, one.second, result.part_in_words(one), one.first_with, one.second_with)
+        for one in result.differences
+    ]
+    head = ("difference", a, b, f"its part in {result.of}", f"{a} with that of {b}", f"{b} with that of {a}")
+    yield table(rows, head, caption="Differences, the one with the largest part first.")
+    if result.measure:
+        of = "the factor of k/k_cr" if result.measure == "safety" else "the change of the growth rate"
+        yield paragraph(f"A part is {of} in the mean over all orders of making the changes.", "small")
+    else:
+        yield paragraph("No parts are told, since some rig between the two has no growth rate.", "small")
+
+
+def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
+    """Cells of a row about two rigs, with a parameter at the beginning in words instead of by its path."""
+    yield cells[0]
+    for rig, cell in zip(rigs, cells[1:], strict=True):
+        name, _, rest = cell.partition(" ")
+        yield f"{said(rig, name)} {rest}" if name in rig.parameters() else cell

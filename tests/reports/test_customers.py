@@ -150,6 +150,15 @@ def test_tolerances_are_kept_for_the_document_of_a_verdict_within_them():
     assert "up to" not in text[text.index("The recommendation") : text.index("Assumptions")]
 
 
+def test_a_small_margin_is_told():
+    """A telescope 5 % beside its edge was to be kept as it is, without a word on that."""
+    text = words("".join(recommendation(ss.analyze(ss.read_rig("examples/machines/telescope.toml")))))
+    assert "Keep it as it is" in text
+    assert "The edge of worm gear i is 5.33 % away, where 20 % are recommended: know the value more closely" in text
+    wide = words("".join(recommendation(ss.analyze(ss.read_rig("examples/machines/feed-axis.toml")))))
+    assert "are recommended" not in wide
+
+
 def test_a_motion_says_how_it_ends():
     """A slip event before a run-away does not hide that; a stable rig comes back."""
     assert "slips" in (text := words("".join(motion(ss.analyze(ss.read_rig("examples/triaxial.toml"))))))

@@ -64,6 +64,8 @@ def recommendation(
     if analysis.stable:
         yield paragraph("Keep it as it is.")
         yield paragraph(_what_to_hold(analysis, adjustable))
+        if tolerated is None and (near := _small_margin(analysis)):
+            yield paragraph(near)
         return
     able = [one for one in changeable(analysis, adjustable) if not adjustable or one.parameter in adjustable]
     rows = [row for one in able if (row := _change(analysis, one, adjustable.get(one.parameter)))][:_ROWS]
@@ -160,6 +162,18 @@ def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:
     if chosen is None:
         return f"{text} Nothing that can be set has one within range."
     return f"{text} Of what can be set, the nearest is that of {_side(analysis, chosen)}."
+
+
+def _small_margin(analysis: Analysis) -> str:
+    """Sentence on a nearest edge that is nearer than what is recommended of other values; empty for one that is not."""
+    nearest = next((one for one in analysis.margins if one.edge is not None and one.value), None)
+    if nearest is None or nearest.unit == "rad" or abs(nearest.relative) >= BEYOND_EDGE:
+        return ""
+    name, away, wanted = said(analysis.rig, nearest.parameter), abs(nearest.relative), format_percent(BEYOND_EDGE)
+    return (
+        f"The edge of {name} is {format_percent(away)} away, where {wanted} are recommended: know the value more "
+        "closely than that, or move away from its edge."
+    )
 
 
 def _side(analysis: Analysis, margin: Margin) -> str:

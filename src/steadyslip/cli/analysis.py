@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -166,7 +166,7 @@ def compare(
 
     check_output(output or (), (".html",))
     found = compare_files(rig, other, changes or ())
-    block = {"project": project, "author": author, "revision": revision, "approval": approval}
+    block: dict[str, Any] = {"project": project, "author": author, "revision": revision, "approval": approval}
     output_result(found, output or (), as_json, partial(write_page, kind="Comparison", source=[rig, other], **block))
 
 

@@ -19,7 +19,9 @@ from steadyslip.verdict.words import headline
 @parts_of.register
 def _comparison(result: RigComparison) -> Parts:
     rigs: list[Any] = [one.rig for one in result.verdicts]
-    of_each = list(zip(result.names, result.verdicts, result.within, strict=True))
+    of_each: list[tuple[str, Any, Tolerated | None]] = list(
+        zip(result.names, result.verdicts, result.within, strict=True)
+    )
     a, b = result.names
     (label, *names), *sides = result.side_by_side()
     told = [tuple(_with_words(rigs, cells)) for cells in sides]

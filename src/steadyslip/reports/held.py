@@ -140,7 +140,7 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
         names = ", ".join(said(rig, name) for name in gains)
         yield f"a stiffer controller, all gains times {STIFFER:g} ({names})", rig.with_values(gains), 0.0
     for name, one in known.items():
-        if name.startswith("drive.") and one.role.adds_state and one.value:
+        if one.role.letter == "k_i" and one.value:
             yield f"no integral ({said(rig, name)} = 0)", rig.with_values({name: 0.0}), 0.0
 
 

@@ -296,6 +296,8 @@ FITS = {
     "smoothed": ({}, lab.STEP, {"drive": "smoothed"}, None),
     "protocol": ({}, lab.STEP, {"protocol": lab.STEP}, None),
     "servo": ({}, None, {}, None),
+    "creep": ({}, None, {}, None),
+    "stick": ({}, None, {}, None),
 }
 """Kinds of fits by name: the laws, what was done, options of the fit, and what is made of the record first."""
 
@@ -308,7 +310,8 @@ def fits(random, folder):
     if protocol is None:
         law = {"slip": ss.laws.Slip(), "aging": ss.laws.Aging()}[evolution]
         lag, seed = float(random.uniform(0.1, 0.4)), int(random.integers(10**6))
-        record, _ = asked(servo_records.record, seed, lag, 0.15, law, noise)
+        way = kind if kind in servo_records.WAYS else None
+        record, _ = asked(servo_records.record, seed, lag, 0.15, law, noise, way=way)
     else:
         source = lab.two_states() if "states" in laws else lab.rig(alpha=0.3 if "normal_memory" in laws else None)
         record = lab.record(source, protocol, int(random.integers(10**6)), noise, count=int(random.integers(400, 900)))

@@ -149,15 +149,20 @@ def find_minimum(
     else:
         found = search.refine_best() if search.any_followed else Minima.none(len(search.whole.space))
     if not search.any_followed:
-        raise NotAvailable(
-            "the model cannot follow these records from any start; are law and drive those of the experiment?"
-        )
+        raise NotAvailable(f"the model cannot follow these records from any start; {_suspects(plan)}")
     found = first_computable(search.whole, found)
     found = first_computable(search.whole, search.nested(found, {} if known is None else known))
     if not np.isfinite(found.ssq[0]):
-        raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
+        raise NotAvailable(f"the model cannot follow these records; {_suspects(plan)}")
     best, ssq = with_states_sorted(search.whole, found)
     return SearchResult(best, ssq, search.whole, search.summary(found), (search.low, search.high))
+
+
+def _suspects(plan: Plan) -> str:
+    """What to look up where a model cannot follow records."""
+    if plan.protocol is None:
+        return "are law and drive those of the experiment?"
+    return "are the protocol (its rates, units, and times on the clock of the records) and the law the experiment's?"
 
 
 class _Search:

@@ -18,6 +18,7 @@ from steadyslip.experiments.loading.servo import GAIN, settling
 from steadyslip.experiments.numerics.noise import describe
 
 LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which nothing else changes; chosen by trial
+SPARED = 14.0  # decrease of chi squared that a level of the sensor or half a run is worth which a servo makes needless
 AROUND = 3.0  # times in which a servo settles that count as around a change
 NEAR = 30.0  # samples on each side of a change that are kept one by one
 PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
@@ -98,7 +99,7 @@ def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) ->
             continue
         inflation = inflation or _inflation(servo, time, values)
         spared = len(lines.levels) - len(levels) + 2 * (len(lines.meets) - len(kinks.meets))
-        gain = (at_once.misfit - servo.misfit) / inflation + spared * GAIN
+        gain = (at_once.misfit - servo.misfit) / inflation + spared * SPARED
         if gain > most:
             most, best = gain, replace(servo, covariance=inflation * servo.covariance)
         if np.all(np.diff(servo.times) > settling(servo.lag, servo.damping)):

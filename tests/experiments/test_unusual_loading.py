@@ -8,6 +8,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from servo_records import record as servo_record
+from steadyslip.experiments.fitting.fit import _as_it_follows
 from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.kinks import load_course
 
@@ -43,6 +44,17 @@ def test_a_servo_does_not_look_like_the_fault():
     for seed in range(3):
         assert spring(servo_record(seed, 0.5)[0]) is None
         assert spring(servo_record(seed, 0.75, 0.35)[0]) is None
+
+
+def test_pieces_follow_the_load_point_and_not_the_fault():
+    """Driven by pieces that followed the fault, a fit no longer said that it cannot show a servo."""
+    found, source = servo_record(11)
+    stretched = found.friction * found.normal / source.value("slider.stiffness")
+    columns = {name: getattr(found, name) for name in ("time", "friction", "normal")}
+    across = ss.record_from_arrays(**columns, displacement=found.displacement - stretched)
+    for one, follows in ((across, False), (servo_record(11, way="creep")[0], True)):
+        assert one.loading.load.otherwise is not None
+        assert any(change.pieces for change in _as_it_follows(one).loading.load.changes) == follows
 
 
 @pytest.mark.campaign

@@ -26,6 +26,7 @@ from steadyslip.experiments.fitting.search import (
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
+from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.loading import as_followed
 from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
@@ -177,13 +178,12 @@ def search_fit(
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
     if plan.follows and any(one.load and one.load.otherwise for one in plan.loading):
         many = records if isinstance(records, (list, tuple)) else (records,)
-        followed, commanded = (
-            [replace(one, commanded=as_followed(one.loading, pieces)) for one in many] for pieces in (True, False)
-        )
-        fits = [search_fit(rig, followed, free, **search, **options)]
-        if fits[0].whiteness.p < STRUCTURE:
-            fits += [search_fit(rig, commanded, free, **search, **options)]
-        return min(fits, key=lambda one: one.rms)
+        commanded = [replace(one, commanded=as_followed(one.loading, False)) for one in many]
+        one = search_fit(rig, list(map(_as_it_follows, many)), free, **search, **options)
+        in_pieces = any(change.pieces for loading in one.plan.loading for _, _, change in loading.changes)
+        if not in_pieces or one.whiteness.p >= STRUCTURE:
+            return one
+        return min(one, search_fit(rig, commanded, free, **search, **options), key=operator.attrgetter("rms"))
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
@@ -203,6 +203,15 @@ def search_fit(
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
     return fit_with_errors(Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+
+
+def _as_it_follows(record: Record) -> Record:
+    """Record whose load point moves in pieces where its displacement, not across the fault, is beside the command."""
+    load, displacement = record.loading.load, record.displacement
+    if load is None or load.otherwise is None or displacement is None:
+        return record
+    across = yielding(record.time, displacement, record.friction, load) is not None
+    return replace(record, commanded=as_followed(record.loading, not across))
 
 
 def _without_outliers(plan: Plan, found: SearchResult) -> tuple[Record, ...]:

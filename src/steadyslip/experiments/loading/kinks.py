@@ -52,7 +52,9 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     lines = _Lines(time, displacement, runs)
     if max(lines.inflation) > LASTING:  # noise that looks like slips and glitches of the sensor
         lasting = max(size * float(np.sqrt(many)) for size, many in zip(lines.strays, lines.inflation, strict=True))
-        if _piecewise_linear(others := straight_runs(time, displacement, lasting), time):
+        others = straight_runs(time, displacement, lasting)
+        same = [one.members for one in others] == [one.members for one in lines.runs]
+        if not same and _piecewise_linear(others, time):
             lines = _Lines(time, displacement, others)
     if not any(one.tells for one in lines.kinks):
         return lines.course(None, blurred)

@@ -214,13 +214,14 @@ def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
 
     Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs the one of order 8 is
     faster at tight tolerances (`benchmarks/methods.py`), but takes minutes to compile if balances are solved in each of
-    its stages.
+    its stages, or with the many variables of late signals.
     """
     kinds = [one.variable.kind for one in reduction.slidings if one.variable is not None]
     free = "loading" in reduction.model.inputs  # without a spring to stop it the block slides fast, which is stiff
     if any(one.inertial for one in reduction.model.coordinates) or "linear" in kinds or free:
         return "rodas4"
-    return "dop853" if rtol <= TIGHT_RTOL and not reduction.unknowns else "tsit5"
+    quick = not reduction.unknowns and not reduction.model.late_signals  # to compile
+    return "dop853" if rtol <= TIGHT_RTOL and quick else "tsit5"
 
 
 def prepare(

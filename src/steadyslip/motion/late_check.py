@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from steadyslip.motion.result import History
+from steadyslip.motion.status import BLOWN_UP
 
 LATE_TOLERANCE = 0.01
 """Largest relative change of slips, their peaks and the times between, or of the range of velocity."""
@@ -17,9 +18,11 @@ def late_error(run: History, finer: History) -> float:
     """Relative difference of two histories in slip events and range of velocity; infinite if they differ in kind."""
     if run.status != finer.status:
         return np.inf
-    first, second = _extremes(run), _extremes(finer)
-    moving = np.maximum(np.ptp(first, axis=1), STILL * np.abs(first).max(axis=1))
-    found = [float(np.max(np.abs(first - second) / moving[:, None]))]
+    found = [abs(run.end - finer.end) / run.end]
+    if run.status != BLOWN_UP:  # where the highest velocity is that of the last step
+        first, second = _extremes(run), _extremes(finer)
+        moving = np.maximum(np.ptp(first, axis=1), STILL * np.abs(first).max(axis=1))
+        found.append(float(np.max(np.abs(first - second) / moving[:, None])))
     events, others = run.slip_events, finer.slip_events
     if abs(len(events) - len(others)) > 1:  # one may begin or end with the run
         return np.inf

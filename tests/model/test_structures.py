@@ -77,6 +77,15 @@ def test_verdict_on_the_reed_is_checked():
     assert "becomes stable" in str(found)
 
 
+@pytest.mark.parametrize(("coupling", "said"), [(8e4, True), (1e4, False)])
+def test_a_structure_that_gives_way_by_itself_is_told_so(coupling, said):
+    """The lowest eigenvalue of its stiffness is 3e4 N/m less the coupling."""
+    load, stiffness = ss.laws.ConstantNormalStress(preload=90.0), np.array([[3e4, coupling], [coupling, 3e4]])
+    found = ss.analyze(held_structure(np.eye(2), np.zeros((2, 2)), stiffness, {0: load}))
+    assert not found.stable
+    assert ("gives way without any contact" in " ".join(found.warnings)) is said
+
+
 # --- limits that are known machines -----------------------------------------------------------------
 
 

@@ -121,13 +121,25 @@ class StructureData(Displayed):
         return f"StructureData({self.source or 'matrices'}, {self.size} degrees of freedom)"
 
     @cached_property
-    def rigid_motions(self) -> Array:
-        """Motions (n, k) that stretch nothing, k = 0 for a structure that its own stiffness holds."""
+    def _own_modes(self) -> tuple[Array, Array]:
+        """Squared angular frequencies (n,), rising, rad²/s², and shapes (n, n) by mass and symmetric stiffness."""
         from scipy.linalg import eigh  # slow to import
 
         squares, shapes = eigh(0.5 * (self.stiffness + self.stiffness.T), self.mass)
+        return squares, shapes
+
+    @cached_property
+    def rigid_motions(self) -> Array:
+        """Motions (n, k) that stretch nothing, k = 0 for a structure that its own stiffness holds."""
+        squares, shapes = self._own_modes
         found: Array = shapes[:, np.abs(squares) <= _FREE * np.max(np.abs(squares), initial=0.0)]
         return found
+
+    @property
+    def gives_way(self) -> bool:
+        """True if the stiffness is negative in some direction, so that nothing holds the structure without contact."""
+        squares = self._own_modes[0]
+        return bool(squares[0] < -_FREE * np.max(np.abs(squares)))
 
 
 @dataclass(frozen=True)

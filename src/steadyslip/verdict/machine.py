@@ -11,6 +11,7 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND
+from steadyslip.machine.structures import StructureBody
 from steadyslip.model.numeric import by_matrices, has_response, has_structure
 from steadyslip.model.point import operating_point
 from steadyslip.model.steady_results import SteadyMachine
@@ -106,7 +107,7 @@ def _sliding(steady: SteadyMachine) -> str:
 
 
 def warnings(analysis: Findings, states: Sequence[SteadyMachine]) -> Iterator[str]:
-    """Warnings: contacts whose friction is not positive, and those whose law has no memory."""
+    """Warnings: friction that is not positive, laws without memory, structures that give way by themselves."""
     contacts = states[0].contacts
     for name, one in contacts.items():
         if one.friction <= 0:
@@ -119,3 +120,9 @@ def warnings(analysis: Findings, states: Sequence[SteadyMachine]) -> Iterator[st
             f"the friction {which} no memory of sliding, so that whether {'it judders' if alone else 'they judder'} at "
             "low speed is not predicted; use a law with memory"
         )
+    for name, body in analysis.rig.bodies.items():
+        if not analysis.stable and isinstance(body, StructureBody) and body.data.gives_way:
+            yield (
+                f"the stiffness matrix of {name} is negative in some direction, so that the structure gives way "
+                "without any contact; check its signs and supports"
+            )

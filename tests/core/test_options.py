@@ -154,7 +154,7 @@ LEFT = {  # parameters that their functions check themselves, with words of thei
     "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick", "precision", "rtol",
     "amplitude", "amplitudes", "periods", "doublings", "most_points", "method", "points", "result",
     "pore_pressure", "calibrated", "tolerances", "names", "kept", "sure", "table", "load", "loop", "hold",
-    "errors", "intervals", "records",
+    "errors", "intervals", "records", "source",
 }  # fmt: skip
 PUBLIC = {
     name: thing for name, thing in public().items()

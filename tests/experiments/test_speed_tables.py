@@ -132,6 +132,16 @@ def test_two_columns_of_friction_are_two_directions(tmp_path):
     assert found.friction.tolist() == [50, 40, 33, 55, 44, 36]
 
 
+def test_a_column_that_is_named_settles_which_of_two_it_is(tmp_path):
+    """A load of a joint in N m looks like its torque."""
+    path = tmp_path / "joint.csv"
+    rows = ((1, 20), (2, 18), (5, 15), (10, 13), (20, 12), (50, 11.5), (100, 12))
+    text = "".join(f"{speed};{torque};100\n" for speed, torque in rows)
+    path.write_text("speed [1/min];Drehmoment [Nm];Last [Nm]\n" + text, encoding="utf-8")
+    assert "say which with torque=NAME" in command("fit", path, "--law", "coulomb").stderr
+    assert "mu_coulomb" in command("fit", path, "--law", "coulomb", "--set", "torque=Drehmoment").stdout
+
+
 BAD = {
     "speed [rpm],force [N]\n1,5\n2,4\n3,3\n": "got speeds in rpm and a force",
     "a,b\n1,5\n2,4\n3,3\n": "has no column for it",

@@ -277,5 +277,8 @@ def test_functions_of_the_driver_can_stand_side_by_side():
                 name = node.name if isinstance(node, ast.FunctionDef) else node.targets[0].id
                 assert owners.setdefault(name, path.stem) == path.stem
             elif isinstance(node, ast.ImportFrom):
-                assert node.module in ("__future__", "steadyslip.kernels.layout") or driver_text.is_driver(node.module)
+                types = "steadyslip.core.arrays"
+                assert node.module in ("__future__", "steadyslip.kernels.layout", types) or driver_text.is_driver(
+                    node.module
+                )
     assert all(owners[name] == module.__name__.rpartition(".")[2] for name, (module, _) in build.ENTRIES.items())

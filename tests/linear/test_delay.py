@@ -9,7 +9,6 @@ from scipy.optimize import fsolve
 from scipy.special import lambertw
 
 import steadyslip as ss
-from command import run
 from delays import apart, lagging, late_axis, some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
 from steadyslip.linear import quasipolynomial as quasi, windows
@@ -17,10 +16,8 @@ from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.spectrum import outgrown, unstable_roots
 from steadyslip.linear.waves import Waves
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
-from steadyslip.model import build_model
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import quasipolynomial as operating_quasi
-from steadyslip.model.reducing import reduce_model
 
 
 def servo(gain, delay, mass=0.0):
@@ -388,17 +385,8 @@ def test_all_that_a_controller_does_is_late():
         assert values[-1] < 1e-9 * values[0]
 
 
-def test_what_is_not_offered_with_delay_says_so(tmp_path):
-    text = ss.rig_to_text(late_axis("0.1 s"))
-    assert ss.rig_from_text(text) == late_axis("0.1 s")
-    path = tmp_path / "late.toml"
-    path.write_text(text)
-    done = run("simulate", str(path), "--until", "1 s")
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "delay" in done.stderr
-    with pytest.raises(ss.NotAvailable, match="motion with a delay is not offered"):
-        reduce_model(build_model(late_axis("0.1 s")))
+def test_a_delay_is_kept_in_files_and_is_never_negative():
+    assert ss.rig_from_text(ss.rig_to_text(late_axis("0.1 s"))) == late_axis("0.1 s")
     with pytest.raises(ss.ParameterError, match="delay"):
         ss.machine.PositionPD(velocity=1.0, body="motor", kp=1.0, delay=-0.1)
 

@@ -209,16 +209,9 @@ def test_pore_fluid_under_a_slider_follows_in_motion():
 @pytest.mark.parametrize("kind", ["late pd", "lag"])
 def test_what_a_delay_does_not_offer_is_said(kind):
     slider, _ = short(kind)
-    for ask in (
-        lambda: ss.simulate(slider, until=1.0),
-        lambda: ss.simulate_many(slider, {"mass": [1e4, 2e4]}, until=1.0),
-        lambda: ss.threshold(slider),
-        lambda: ss.cycles(slider, along="stiffness"),
-        lambda: ss.state_space(slider),
-        lambda: ss.formula(slider),
-    ):
-        with pytest.raises(ss.NotAvailable, match=r"delay|no oscillatory edge"):
-            ask()
+    for ask in (ss.state_space, ss.formula):
+        with pytest.raises(ss.NotAvailable, match="delay"):
+            ask(slider)
 
 
 def test_stable_stiffnesses_of_late_friction_are_the_windows_of_theory():

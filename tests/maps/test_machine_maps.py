@@ -93,8 +93,8 @@ edge = {{ along = "{name}" }}
     assert "kN" in str(found)
     assert "Pa" not in str(found)
     axes = found.plot(show="edge")
-    assert axes.get_xlabel() == "first preload σ₀ (kN)"
-    assert axes.get_ylabel() == "edge of first preload (kN)"
+    assert axes.get_xlabel() == "contact first preload σ₀ (kN)"
+    assert axes.get_ylabel() == "edge of contact first preload σ₀ (kN)"
 
 
 @pytest.mark.parametrize(

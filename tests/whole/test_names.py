@@ -1,5 +1,7 @@
 """What users call parameters, memories and states changes no bit of an answer; what has two meanings is refused."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -54,8 +56,10 @@ def test_two_observables_of_one_name_are_refused():
         def observables(self, v, sigma, memory, tau):
             return {"age": (memory[0] ** 2, "1")}
 
+    own = renamed().friction
+    given = {one.name: getattr(own, one.name) for one in fields(own)}
     with pytest.raises(ss.ParameterError, match="age: is the name of two observables"):
-        build_model(ss.Slider(friction=Seen(**vars(renamed().friction)), contact=renamed().contact, stiffness=1e9,
+        build_model(ss.Slider(friction=Seen(**given), contact=renamed().contact, stiffness=1e9,
                               drive=ss.machine.SteadyDrive(1e-6)))  # fmt: skip
 
 

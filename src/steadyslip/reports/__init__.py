@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from steadyslip.core.errors import ParameterError, Problem, repr_short
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
 from steadyslip.machine.rig import Rig
@@ -63,7 +64,7 @@ def report(
     Raises
     ------
     ParameterError
-        If `result` is neither a rig nor a result.
+        If `result` is neither a rig nor a result, or `source` no path.
     NotAvailable
         If the numbers of the rig leave the range of floating point.
 
@@ -73,7 +74,11 @@ def report(
     >>> ss.report(rig, explorer=False).save("report.html")
     """
     given = () if source is None else (source,) if isinstance(source, (str, PathLike)) else source
-    paths = [Path(one) for one in given]
+    try:
+        paths = [Path(one) for one in given]
+    except TypeError as error:
+        message = f"got {repr_short(source)}; allowed: a path, or a sequence of paths"
+        raise ParameterError([Problem("source", message)]) from error
     block = {"project": project, "author": author, "revision": revision, "approval": approval}
     if isinstance(result, Rig | Analysis | Tolerated):
         options["source"] = source_text(paths[0]) if paths else ""

@@ -63,7 +63,7 @@ DIMENSIONLESS = frozenset(
     """relative size bracket searched damping_ratio amplitude trivial multipliers ratio share ssq rtol steps rejected
     routh characteristic_polynomial characteristic_terms growth_slope f1 mu B0 B2 B3 friction precision rise scale noise
     safety level points outcome fold status_code kind stable exists survived is_edge doubt details criteria predicted
-    residuals contact closing returned
+    residuals contact closing returned late_error
     seen worth errors first second first_interval total_interval total missing spacing edge correlation
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
     sides conditions amplitudes speeds links steady characteristic_terms gain gains phase phases shift

@@ -218,7 +218,8 @@ def read_loop(path: str | PathLike[str], **columns: Any) -> PreslidingLoop:
 
 def is_loop(path: str | PathLike[str]) -> bool:
     """True if a table has a column of displacement and none of speed."""
-    found, _ = _roles(Path(path), {})
+    table = _table(Path(path))
+    found = {_guess(*_head(name, apart)) for name, apart in zip(table.names, table.units, strict=True)}
     return "displacement" in found and "speed" not in found
 
 

@@ -252,6 +252,15 @@ def test_bristles_that_creep_to_the_target_settle():
     assert found.settled_at == found.time[-1] < 60.0
 
 
+def test_an_axis_that_friction_holds_where_it_is_is_told_so():
+    """A limit of 1 N below friction at rest of 1.5 N: "SETTLES within 1 m after 0 s" was told."""
+    law = ss.laws.Coulomb(mu_coulomb=1.0, mu_static=1.5)
+    rig = replace(ss.read_rig(EXAMPLES / "hunting-axis.toml", ["drive.force_limit=1 N"]), friction=law)
+    found = ss.hunt(rig)
+    assert found.hunts is False
+    assert found.sentence == "DOES NOT MOVE: friction at rest holds it 1 m from the target"
+
+
 def test_bristles_without_an_integral_slide_before_they_rest():
     """At a step of the target all speeds are zero, which was told as rest: "SETTLES within 1 m after 0 s"."""
     found = ss.hunt(ss.read_rig(EXAMPLES / "hunting-axis.toml", ["drive.ki=0 N/(m s)"]))

@@ -114,6 +114,8 @@ class Hunt(ReadOnly):
         if np.isfinite(self.settled_at):
             there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # the rest is when it was stopped
             where = "on the target" if there else f"within {size} of the target"
+            if not self.strokes and not there:
+                return f"DOES NOT MOVE: friction at rest holds it {size} from the target"
             return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
 

@@ -30,7 +30,7 @@ MISTAKES = {
     "a word that begins with inf": ('"12 ± 20 % N/um"', '"infinite"', "'infinite' is not a quantity in N/m"),
     "a key in the wrong table": ("area =", 'preload = "3 kN"\narea =', "it is a key of [contact]"),
     "a word for two tables": ("[contact]", "[guide]", "unknown table 'guide'; allowed"),
-    "a place held by a load point": ('"0.5 mm/min"', "0", "a controller, pd or pid, may hold a place"),
+    "a place held by a load point": ('"0.5 mm/min"', "0", "0 to hold a place with control = 'pid'"),
     "a force for a coefficient": (
         'mu_coulomb = "0.11 ± 20 %"',
         'mu_coulomb = "350 N"',

@@ -35,7 +35,9 @@ class Domain:
 
 _INF = math.inf
 positive = Domain(0, _INF, False, True, "a finite number > 0")
-moving = Domain(0, _INF, False, True, "a finite number > 0 (a controller, pd or pid, may hold a place, at 0)")
+moving = Domain(
+    0, _INF, False, True, "a finite number > 0, or 0 to hold a place with control = 'pid' (steadyslip hunt)"
+)
 speed = Domain(0, _INF, False, True, "a finite number > 0, or 0 to hold a place", apart=0.0)
 nonnegative = Domain(0, _INF, True, True, "a finite number >= 0")
 real = Domain(-_INF, _INF, True, True, "a finite number")

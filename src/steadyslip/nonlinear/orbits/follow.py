@@ -32,8 +32,7 @@ from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, Tracer, orb
 
 SMALLEST = 1e-12  # smallest amplitude of ln v: some thousand roundings of the velocity
 FINER, FINEST = 1e-2, 1e-13  # factor of rtol for recomputed cycles, and the smallest rtol above rounding
-MOST_REPEATED = 20  # largest number of recomputed cycles: where more fail, the user should ask for a smaller rtol,
-REPEATED_SHARE = 0.1  # and of steps spent on them, as a share of those of a branch
+MOST_REPEATED = 40  # largest number of recomputed cycles: where more fail, the user should ask for a smaller rtol
 LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes of ln v to begin with where smaller cycles cannot be followed
 
 
@@ -74,7 +73,7 @@ def cycles(
     doublings : int, optional
         Number of successive period doublings to follow onto the branch of twice the period.
     most_points : int, optional
-        Limit of cycles on a branch. Two million steps of integration are the limit of work on it, and as many on its
+        Limit of cycles on a branch. Four million steps of integration are the limit of work on it, and as many on its
         cycles of twice the period, shared by the doublings: cycles found until then are kept, and ``end`` gives this
         reason; ``not_followed`` lists doublings for which nothing was left.
     rtol : float, optional
@@ -159,7 +158,6 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
         finer = Tracer(
             Flow(flow.rig, flow.name, flow.branch, rtol, tracer.onset.contact), tracer.onset, tracer.limits, tracer.most
         )
-        finer.last_step = int(REPEATED_SHARE * finer.last_step)
         for i in failing:
             if finer.is_spent:
                 break

@@ -19,5 +19,5 @@ def test_fits_of_records_at_random_hold_the_truth(kind):
     assert np.max(z) < 4.5
     if kind.endswith("ideal"):
         assert not any(own.servo for own in found)
-    elif "," in kind and "brief" not in kind:
+    elif "," in kind and "brief" not in kind and "curve" not in kind:  # a smooth curve is followed as a ramp
         assert any(own.servo for own in found)

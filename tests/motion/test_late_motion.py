@@ -119,6 +119,22 @@ def test_what_is_not_resolved_is_said(monkeypatch):
     assert list(many.status) == ["delay not resolved"] * 2
 
 
+def test_irregular_stick_slip_is_not_blamed_on_the_delay():
+    """A slide with bristles, an encoder's scale and 2 ms of dead time: its slips part by any change of accuracy."""
+    rig = ss.Slider(
+        friction=ss.laws.LuGre(mu_coulomb=0.1, mu_static=0.16, v_stribeck=5e-3, bristle_stiffness=5e4, viscous=0.5),
+        contact=ss.laws.ConstantNormalStress(preload=4e5), area=2e-3, mass=2e4,
+        drive=ss.machine.PD(2e-3, kp=1.5e9, kd=1e6, delay=2e-3),
+    )  # fmt: skip
+    step = ss.protocol.VelocityStep(at=0.1, to=2.1e-3)
+    run = ss.simulate(rig, step, until=1.5)
+    assert (run.status, run.late_error) == ("done", np.inf)
+    assert "the motion is irregular" in str(run)
+    short = ss.simulate(rig, step, until=0.35)
+    assert len(short.slip_events) > 3
+    assert short.late_error < 1e-3
+
+
 def test_runs_that_differ_are_told_apart():
     own = slider("aging", k=0.02, kp=0.1).rig
     one, other = (ss.simulate(own.with_values({"drive.kp": kp}), until=60.0, initial={"v": PUSH}) for kp in (0.1, 0.11))

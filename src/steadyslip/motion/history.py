@@ -48,7 +48,8 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
         contact.
     late_error : float
         With a delay: relative change of slips, peaks and recurrences, and of the range of velocity, by a finer history
-        of what acts late; NaN without, and of loaded files.
+        of what acts late; NaN without, and of loaded files. Infinite where slips agree at first and then part, as they
+        do by a smaller `rtol` too: the motion is irregular, and no two runs of it repeat each other.
     version : str
         Version of the program that computed it.
     """

@@ -11,6 +11,9 @@ from steadyslip.motion.status import BLOWN_UP
 
 LATE_TOLERANCE = 0.01
 """Largest relative change of slips, their peaks and the times between, or of the range of velocity."""
+NAMES = ("slip", "peak_velocity", "recurrence")
+FEWEST = 3
+"""Slips that must agree before runs part: a slip, and two times between slips."""
 STILL = 1e-6  # range of velocity over the largest below which a motion counts as steady: ten times the default rtol
 
 
@@ -27,9 +30,29 @@ def late_error(run: History, finer: History) -> float:
     if abs(len(events) - len(others)) > 1:  # one may begin or end with the run
         return np.inf
     for one, other in zip(events, others, strict=False):
-        names = ("slip", "peak_velocity", "recurrence")
-        found += [float(_apart(getattr(one, name), getattr(other, name))) for name in names]
+        found += [float(_apart(getattr(one, name), getattr(other, name))) for name in NAMES]
     return max(found)
+
+
+def parts_anyway(run: History, finer: History, closer: History) -> bool:
+    """True if single slips cannot be repeated, as in chaotic motion, whatever is done about the delay.
+
+    `finer` has more variables of every late signal, `closer` a smaller rtol. The first slips agree with both; with the
+    former for half as long, at least, as with the latter.
+    """
+    alike = _alike(run, finer)
+    own = min(len(run.slip_events), len(closer.slip_events))
+    return alike >= FEWEST and _alike(run, closer) < own and 2 * alike >= _alike(run, closer)
+
+
+def _alike(run: History, other: History) -> int:
+    """How many slip events from the first on are known within the tolerance."""
+    count = 0
+    for one, two in zip(run.slip_events, other.slip_events, strict=False):
+        if max(float(_apart(getattr(one, name), getattr(two, name))) for name in NAMES) > LATE_TOLERANCE:
+            break
+        count += 1
+    return count
 
 
 def late_errors(events: Mapping[str, np.ndarray], finer: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -96,9 +96,13 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             lines.append("drive           pulls with a force of its own; its motion does not hold anything back")
         if self.protocol.lets_go:
             lines.append("drive           is let go for some time, and pulls then with a force of its own (creep = 1)")
-        if np.isfinite(self.late_error):
-            told = max(self.late_error, self.rtol)
-            lines.append(f"delay           slips, peaks, times between and velocities are known within {told:.1g}")
+        if np.isinf(self.late_error):
+            lines.append(
+                "delay           resolved; single slips part with any change of accuracy, as the motion is irregular"
+            )
+        elif np.isfinite(self.late_error):
+            told = 100 * max(self.late_error, self.rtol)
+            lines.append(f"delay           slips, peaks, times between and velocities are known within {told:.1g} %")
         if self.undisturbed:
             at, unit = format_quantity(NUDGED * self.end, "s"), self.rig.parameters()["drive.velocity"].role.unit
             to = format_quantity(FASTER * float(self.rig.drive.velocity), unit)

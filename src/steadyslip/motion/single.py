@@ -26,13 +26,14 @@ from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import AnyEvent, event_of, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
-from steadyslip.motion.late_check import LATE_TOLERANCE, late_error
+from steadyslip.motion.late_check import LATE_TOLERANCE, late_error, parts_anyway
 from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.result import History
 from steadyslip.motion.status import BLOWN_UP, LOST, UNRESOLVED, WORDS, ending_contact, remedy
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
+CLOSER = 0.1  # of rtol, by which a motion is run once more that a finer history of late signals changes
 OWN_STEPS = 500_000
 """Most steps of a run that records them all: a point takes some hundred bytes, and order 8 records four per step."""
 
@@ -114,8 +115,14 @@ def simulate(
     run, order = _simulated(rig, plan, until, times, initial, events, options, branch, progress)
     if not order or run.status == "interrupted":
         return run
-    finer = replace(options, order=finer_order(order))
-    error = late_error(run, _simulated(rig, plan, until, times, initial, True, finer, branch)[0])
+
+    def again(**changed: Any) -> History:
+        return _simulated(rig, plan, until, times, initial, True, replace(options, **changed), branch)[0]
+
+    finer = again(order=finer_order(order))
+    error = late_error(run, finer)
+    if error > LATE_TOLERANCE and run.status == finer.status and parts_anyway(run, finer, again(rtol=CLOSER * rtol)):
+        return replace(run, late_error=math.inf)
     return replace(run, late_error=error, status=UNRESOLVED if error > LATE_TOLERANCE else run.status)
 
 

@@ -8,7 +8,6 @@ import xarray as xr
 
 import steadyslip as ss
 from kicked_rigs import heavy, tilted
-from kicks_at_random import KINDS, drawn, outcome_of
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Options, prepare
@@ -427,28 +426,7 @@ def test_doubt_has_a_colour_and_a_reason():
     assert words[1:] == ["returns", "blow-up", f"undecided: {DOUBTS[0]}"]
 
 
-# -- a fixed part of benchmarks/kicks.py
-
-
-FEW = ("slip massless tilted", "lugre mass level", "nagata massless level")
-
-
-@pytest.mark.parametrize("kind", FEW)
-@pytest.mark.campaign
-def test_random_kicks_equal_scipy(kind):
-    """Of a few kinds here, that kernels are compiled for anyway; the others by hand."""
-    from kicks_by_scipy import Reference  # compiled by numba, which takes long to import
-
-    assert kind in KINDS
-    random = np.random.default_rng(11)
-    told = 0
-    for _ in range(4):
-        case = drawn(random, (kind,))
-        found, truth = outcome_of(case), Reference(case).outcome(limit=2.0)
-        assert found in (truth, "undecided") or truth == "?", str(case)
-        told += found == truth
-    assert told >= 2
-
+# -- folds and ends of the range
 
 CLOSE_TO_A_FOLD = ss.Slider(
     friction=ss.laws.LuGre(mu_coulomb=0.30885889, mu_static=0.4471462411, v_stribeck=3.173016221e-4,

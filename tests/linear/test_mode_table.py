@@ -263,5 +263,5 @@ def test_the_command_tells_modes(tmp_path):
     assert "modes 1 and 2 meet at 746.5 Hz" in done.stdout
     assert "growth rate of mode 1, to first order, for 1 % more of" in done.stdout
     assert names[0].read_text().startswith("number,frequency (Hz),growth (1/s),damping ratio,amplitude of pad,")
-    assert "modes 1 and 2 meet at 746.5 Hz" in names[1].read_text()
+    assert "modes 1 and 2 meet at 746.5 Hz" in names[1].read_text(encoding="utf-8").replace("\xa0", " ")
     assert names[2].stat().st_size > 0

@@ -1,7 +1,11 @@
-"""The first line and the reason on the page of a slider are those of Python, letter by letter."""
+"""Sentences on the page of a rig are those of Python, letter by letter, and are written in Python alone."""
 
+import ast
+import re
+from collections import defaultdict
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +13,8 @@ import pytest
 import steadyslip as ss
 from explored_edges import Edges, other_edges, written
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
+from steadyslip.motion.status import remedy
+from steadyslip.verdict import machine as machine_words, slider as slider_words
 
 BRISTLES = ss.laws.LuGre(
     mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
@@ -126,3 +132,73 @@ def test_of_contacts_that_press_on_each_other_a_page_names_the_one_that_python_n
             assert written(told) == written(f"{why[0].upper()}{why[1:]}.")
             kinds.add((absent.condition, absent.contact))
     assert kinds == {(kind, contact) for kind in ("lock-up", "lift-off") for contact in "cd"}
+
+
+@pytest.mark.parametrize(("name", "many"), [("plain", 1), ("axial", 2), ("integrated", 0)])
+def test_the_critical_value_is_told_as_in_the_rows_of_a_verdict(name, many):
+    rows = dict(slider_words.stability_rows(ss.analyze(RIGS[name])))
+    told = page(name).script("(rig.values = values, besides(rig.assess(), data))", values=list(page(name).home))
+    expected = [f"{label.capitalize()}: {rows[label]}." for label in ("along the axis", "at the edge") if label in rows]
+    assert written(told) == written("".join(f" {one}" for one in expected))
+    assert len(expected) == many
+
+
+def test_the_end_of_a_motion_is_told_as_in_a_run_of_python():
+    """Its cause, with forces where the rig has an area; and what the verdict stable leaves open."""
+    for name in ("plain", "area"):
+        there = page(name)
+        assert there.script("data.means") == slider_words.MEANS
+        for status in ("contact lost", "stuck", "no velocity", "blow-up"):
+            course = {"events": [], "status": status, "end": 2.0, "at": 1.0, "contacts": [{"v": [1.0], "floor": 0.0}]}
+            told = there.script("outcome(course, data)", course=course)
+            (cause,) = re.fullmatch(r".+? (?:the disturbance, )?at .+?: (.+)\.", told).groups()
+            assert remedy(status, RIGS[name]).startswith(f"{cause}; ")
+    assert "an oscillation." in machine_words.MEANS
+
+
+SOURCE = Path(ss.__file__).parent
+MANY = 5  # words in a row that make a sentence
+NAMES = {
+    "of the normal force at", "push of the load point", "step of the normal force", "step of the normal stress",
+    "stiffness over critical k k", "a number with a unit", "in the unit that its",
+}  # fmt: skip
+"""Names of things, which both may have, and turns of phrase."""
+
+
+def phrases(text):
+    """All of its runs of `MANY` words that no punctuation parts."""
+    words = re.findall(r"[A-Za-z']+|[.;:,]", text)
+    runs = [words[i : i + MANY] for i in range(len(words) - MANY + 1)]
+    return {" ".join(run).lower() for run in runs if all(word[0].isalpha() for word in run)} - NAMES
+
+
+def strings_of_python(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    docs = {id(one.value) for one in ast.walk(tree) if isinstance(one, ast.Expr)}
+    texts = (one for one in ast.walk(tree) if isinstance(one, ast.Constant) and id(one) not in docs)
+    return [one.value for one in texts if isinstance(one.value, str)]
+
+
+def strings_of_a_page(path):
+    code = re.sub(r"/\*.*?\*/|(?<![:\"'`])//[^\n]*", "", path.read_text(encoding="utf-8"), flags=re.S)
+    texts = re.findall(r'"([^"\n]*)"|`([^`]*)`', code)
+    return [part for plain, template in texts for part in re.split(r"\$\{[^}]*\}", plain or template)]
+
+
+def test_no_sentence_is_written_in_python_and_again_in_the_modules_of_a_page():
+    known = defaultdict(set)
+    for path in SOURCE.rglob("*.py"):
+        for text in strings_of_python(path):
+            for phrase in phrases(text):
+                known[phrase].add(path.relative_to(SOURCE).as_posix())
+    web = list((SOURCE / "explorer" / "web").glob("*.js"))
+    twice = {
+        (path.name, phrase, *known[phrase])
+        for path in web
+        for text in strings_of_a_page(path)
+        for phrase in phrases(text)
+        if phrase in known
+    }
+    assert len(known) > 5e3
+    assert len(web) > 20
+    assert not twice, "pass it as page data, as `page_reasons` is passed"

@@ -45,11 +45,11 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.steady_results import ABSENT
 from steadyslip.motion.sentence import JUDDERS
-from steadyslip.verdict.machine import PHRASES
+from steadyslip.motion.status import causes
+from steadyslip.verdict import machine as machine_words, slider as slider_words
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import page_reasons
-from steadyslip.verdict.slider import numbers_of
-from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES
+from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES, PACE
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
@@ -63,7 +63,7 @@ DEFAULTS = {
     "factor": 1.0, "low": 0, "high": None, "lowAllowed": False, "highAllowed": True, "whole": False,
     "allowed": "a finite number > 0",
 }  # fmt: skip
-"""Entries of a parameter that a page leaves out; `web/rig.js` has the same defaults."""
+"""Entries that the data of a parameter leave out where they are these, which a page has once."""
 WORKER_MODULES = ("motion",)
 """Modules of the worker, which also gets the runtime and the driver, as text from the page."""
 MOTION_KEYS = ("layout", "routines", "segments")
@@ -204,12 +204,15 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "toml": file.pieces,
         "stiffness": ways_of(rig).compared(rig, names),
         **ways_of(rig).further(rig, facts),
-        "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
+        "headlines": {kind: words for kind, words in HEADLINES.items() if kind != "undecided"},
         "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints]},
         "remote": REMOTE,
         "written": _written_units(rig),
         "beyond": BEYOND | EDGE_WORDS,
+        "pace": PACE,
         "judders": JUDDERS,
+        "ends": causes(rig),
+        "usual": DEFAULTS,
         "checks": _checks(rig, names, branch),
     }
 
@@ -235,7 +238,7 @@ def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
 
 def _slider_data(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Page data of sliders only: sentences with the reasons of a verdict."""
-    return {"reasons": page_reasons(rig)}
+    return {"reasons": page_reasons(rig) | slider_words.AT_EDGE, "means": slider_words.MEANS}
 
 
 def _stiffness(rig: Slider, names: list[str]) -> str | None:
@@ -249,7 +252,8 @@ def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
-        "phrases": {name: words for name, words in PHRASES.items() if name not in BEYOND},
+        "phrases": {name: words for name, words in machine_words.PHRASES.items() if name not in BEYOND},
+        "means": machine_words.MEANS,
     }
 
 
@@ -339,7 +343,7 @@ def _nearest_edge(rig: Machine, point: OperatingPoint, name: str | None) -> floa
 
 
 def _judged_slider(rig: Slider, point: OperatingPoint, name: str | None) -> tuple[float | None, Sequence[complex]]:
-    numbers = numbers_of(rig, point)
+    numbers = slider_words.numbers_of(rig, point)
     return numbers.get("critical_stiffness"), numbers["eigenvalues"]
 
 

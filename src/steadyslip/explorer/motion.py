@@ -31,6 +31,7 @@ from steadyslip.model.reducing import EVERYWHERE, reduce_model
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.weights import LEAST_WEIGHT, eliminable
 from steadyslip.motion.jobs import Options, automatic_method
+from steadyslip.motion.status import NEEDS_MASS, THROUGH_DASHPOT
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep
 from steadyslip.protocol.segments import pack
 
@@ -92,6 +93,7 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
     text = f"(() => {{\n{functions}return {{ {own}, segments: {{ {several} }}, ...{kernel_text} }};\n}})()"
     facts = _facts(reduction, kernel, set(rig.kept_zeros()) - set(kept))
     facts |= {"shares": shares.places(), "behind": len(shares.symbols)}
+    facts["refused"] = {"push": f"a push of the load point {THROUGH_DASHPOT}", "blow": f"a blow {NEEDS_MASS}"}
     return text, facts | {"segments": max(len(one.stores) for one in segments) // facts["segment"]}
 
 

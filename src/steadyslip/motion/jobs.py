@@ -32,6 +32,7 @@ from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales, shortest_time
 from steadyslip.model.start import guesses, initial_values
 from steadyslip.model.weights import eliminable, slip_rates
+from steadyslip.motion.status import THROUGH_DASHPOT
 from steadyslip.motion.targets import NOTHING, Targets, targets
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.creep import FREE
@@ -268,9 +269,8 @@ def prepare(
     segments = pack(plan, point.drive, final, acting.channels)
     if np.any(segments.jump) and any(one.damping and LOAD_POINT in one.senses for one in rig.mechanism().elements):
         raise ParameterError(
-            [Problem("protocol", "a displacement step through a dashpot (slider.damping, of a link, a kd) is "
-                     "an infinite force; use a short velocity step instead")]
-        )  # fmt: skip
+            [Problem("protocol", f"a displacement step {THROUGH_DASHPOT}; use a short velocity step instead")]
+        )
     eliminate = eliminable(point)
     order = options.order or (order_for(point) if point.model.delays else USUAL_ORDER)
     reduction = reduce_model(point.model, eliminate, acting.pushes, acting.presses, order)

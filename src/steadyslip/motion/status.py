@@ -15,22 +15,34 @@ from steadyslip.model.weights import slip_rates
 UNRESOLVED = "delay not resolved"
 """Status of runs with a delay that a finer late signal changes (`steadyslip.motion.late_check`)."""
 WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range", UNRESOLVED)
+NEEDS_MASS = "needs a mass: without it the block takes any velocity at once"
+THROUGH_DASHPOT = "acts through a dashpot (damping, of a link, a kd) as an infinite force"
+"""What is told of a blow without mass, and of a step of the load point; pages say both too."""
 LOST, BLOWN_UP = "contact lost", "blow-up"
+
+CAUSES = {
+    "contact lost": "the normal {stress} fell to zero",
+    "blow-up": "the massless model reaches infinite velocity",
+    "too many steps": "the limit of steps is used up",
+    "stuck": "no step is small enough: the equations have no solution beyond this point, or change faster than "
+    "floating point can follow",
+    "no velocity": "no velocity that floating point can hold balances the forces",
+    "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off)",
+}
+"""Why a run ended early, by status; pages say the same."""
 
 REMEDIES = {
     "done": "",
-    "contact lost": "the normal {stress} fell to zero; press harder (preload), or change what takes the load off",
-    "blow-up": "the massless model reaches infinite velocity; give {mass} to follow the motion further",
-    "too many steps": "the limit of steps is used up; shorten the run (--until), loosen --rtol, or report at given "
-    "times (--samples, in Python times), for which more steps are allowed; in Python most_steps raises the limit",
-    "stuck": "no step is small enough: the equations have no solution beyond this point (without mass, friction that "
-    "falls at once when the block speeds up; or a normal {stress} that answers too strongly to acceleration), or "
-    "change faster than floating point can follow (a mass near zero, say); give {mass}, or check the contact law",
-    "no velocity": "no velocity that floating point can hold balances the forces after a jump of the inputs (or at the "
-    "start); make the jump smaller, give {mass}, or look for a parameter that is too small or too large by orders of "
-    "magnitude",
+    "contact lost": "press harder (preload), or change what takes the load off",
+    "blow-up": "give {mass} to follow the motion further",
+    "too many steps": "shorten the run (--until), loosen --rtol, or report at given times (--samples, in Python "
+    "times), for which more steps are allowed; in Python most_steps raises the limit",
+    "stuck": "it may be friction that falls at once when a block without mass speeds up, a normal {stress} that "
+    "answers too strongly to acceleration, or a mass near zero; give {mass}, or check the contact law",
+    "no velocity": "if the inputs jump, make the jump smaller; give {mass}, or look for a parameter that is too small "
+    "or too large by orders of magnitude",
     "interrupted": "stopped by the user; run it again for the rest",
-    "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off); see steadyslip.steady_state",
+    "no steady sliding": "see steadyslip.steady_state",
     "ill-posed": "without mass, friction falls at once when the block speeds up (or the normal {stress} answers too "
     "strongly to acceleration): the smallest lag left out decides the motion; give {mass}",
     "out of range": "numbers of the rig or of its motion leave the range of floating point (1e308), or are so far "
@@ -43,8 +55,15 @@ REMEDIES = {
 
 
 def remedy(word: str, rig: Rig) -> str:
-    """Advice for a status in the words of the rig, with forces if it has an area; empty if done."""
-    return REMEDIES[word].format(mass=rig.words["mass"], stress=stress_name(rig.result_name("stress"), rig.area))
+    """Cause of a status and advice, in the words of the rig, with forces if it has an area; empty if done."""
+    text = f"{CAUSES[word]}; {REMEDIES[word]}" if word in CAUSES else REMEDIES[word]
+    return text.format(mass=rig.words["mass"], stress=stress_name(rig.result_name("stress"), rig.area))
+
+
+def causes(rig: Rig) -> dict[str, str]:
+    """Why a run of a rig ended early, by status, in the words of the rig."""
+    stress = stress_name(rig.result_name("stress"), rig.area)
+    return {word: text.format(stress=stress) for word, text in CAUSES.items()}
 
 
 def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any) -> np.ndarray:

@@ -17,7 +17,7 @@ from steadyslip.reports.recommendation import ORDER, Order, recommendation
 from steadyslip.reports.sections import assumptions, motion, notes_of, references, tolerances_of
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.whole_text import facts
-from steadyslip.verdict.words import headline, told
+from steadyslip.verdict.words import PACE, headline, told
 
 _MAX_ROOTS = 12  # rows of the table of eigenvalues, so that it fits half a page (by trial)
 
@@ -83,5 +83,5 @@ def _eigenvalue_row(s: complex) -> tuple[str, str, str]:
     return (
         f"{s.real:.4g} 1/s",
         period,
-        f"{'doubles' if s.real > 0 else 'halves'} in {format_quantity(log(2) / abs(s.real), 's')}",
+        PACE["grows" if s.real > 0 else "decays"].format(time=format_quantity(log(2) / abs(s.real), "s")),
     )

@@ -18,10 +18,13 @@ from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.verdict.causes import why_delay_is_ill_posed
 from steadyslip.verdict.measured import response_facts
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
-from steadyslip.verdict.words import BEYOND, QUIET, beyond, instead, told
+from steadyslip.verdict.words import BEYOND, QUIET, STABLE_MEANS, beyond, instead, told
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
+
+MEANS = STABLE_MEANS.format(what="an oscillation")
+"""What the verdict "stable" leaves open of a machine."""
 
 
 def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
@@ -55,7 +58,7 @@ def meaning(analysis: Findings) -> list[str]:
     """Lines on the limits of a decided verdict "stable", and on what to ask next of an unstable machine."""
     if not analysis.stable:
         return [] if analysis.growth_rate == math.inf or has_structure(analysis.rig) else [instead(analysis)]
-    return ["Stable means: small disturbances die out. A large enough kick may still start an oscillation."]
+    return [MEANS]
 
 
 PHRASES = {

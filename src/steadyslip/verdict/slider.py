@@ -20,11 +20,15 @@ from steadyslip.verdict.checks import critical_check
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import in_stiffness
 from steadyslip.verdict.support import support_stiffness
-from steadyslip.verdict.words import instead
+from steadyslip.verdict.words import STABLE_MEANS, instead
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
 
+MEANS = STABLE_MEANS.format(what="an oscillation or a run-away")
+"""What the verdict "stable" leaves open of a slider."""
+AT_EDGE = {"at the edge": "oscillation with period {period}", "along the axis": "critical stiffness {critical}"}
+"""Rows on the critical stiffness, label and text; pages say them too."""
 MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text; chosen by trial, length against completeness
 
 
@@ -80,9 +84,9 @@ def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
     """Rows (label, text) on stable stiffnesses and the critical one."""
     rows = [("stable for", _stable_set(analysis))]
     if beta := analysis.critical_angular_frequency:
-        rows.append(("at the edge", f"oscillation with period {format_quantity(2 * math.pi / beta, 's')}"))
+        rows.append(("at the edge", AT_EDGE["at the edge"].format(period=format_quantity(2 * math.pi / beta, "s"))))
     if (axial := analysis.critical_axial_stiffness) is not None:
-        rows.append(("along the axis", f"critical stiffness {in_stiffness(analysis, axial)}"))
+        rows.append(("along the axis", AT_EDGE["along the axis"].format(critical=in_stiffness(analysis, axial))))
     return rows
 
 
@@ -131,8 +135,7 @@ def _stable_set(analysis: Findings) -> str:
 def meaning(analysis: Findings) -> list[str]:
     """Lines on the limits of a decided verdict: large kicks if stable, growth without bound if unstable."""
     if analysis.stable:
-        kicked = "A large enough kick may still start an oscillation or a run-away."
-        lines = [f"Stable means: small disturbances die out. {kicked}"]
+        lines = [MEANS]
         if not analysis.kicks:
             lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
         return lines if analysis.onset is not None or analysis.kicks else lines[:1]

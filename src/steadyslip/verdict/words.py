@@ -46,8 +46,15 @@ EDGE_WORDS = {
     "unstable": "slides steadily, but unstable",
     "here": "on the edge",
     "beside": "on the edge, stable {side} it",
+    "far": "further off than a factor of {remote}",
 }
 """Phrases of the table of nearest edges beside those in `BEYOND`; pages use both."""
+
+PACE = {"grows": "doubles in {time}", "decays": "halves in {time}"}
+"""Phrases on how fast a disturbance changes; pages and reports use the same."""
+
+STABLE_MEANS = "Stable means: small disturbances die out. A large enough kick may still start {what}."
+"""What the verdict "stable" leaves open, with a hole for what a large kick may start; pages say it too."""
 
 QUIET = "no disturbance grows"
 """Phrase on the quiet side of an edge of an undamped rig."""
@@ -190,9 +197,9 @@ def disturbance(analysis: Findings) -> str:
     if analysis.on_edge:
         text = "neither grows nor dies" + ("" if analysis.undamped else ", to within rounding")
     elif analysis.time_to_double is not None:
-        text = f"doubles in {format_quantity(analysis.time_to_double, 's')}"
+        text = PACE["grows"].format(time=format_quantity(analysis.time_to_double, "s"))
     elif analysis.time_to_halve is not None:
-        text = f"halves in {format_quantity(analysis.time_to_halve, 's')}"
+        text = PACE["decays"].format(time=format_quantity(analysis.time_to_halve, "s"))
     else:  # the sign of the leading root is known, its size is lost in rounding
         return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
     if not analysis.eigenvalues:
@@ -222,7 +229,7 @@ def margin_table(analysis: Findings) -> list[str]:
     remote = [one.remote for one in analysis.margins if one.edge is not None]
     lines += [line for line, far in zip(table, remote, strict=True) if not far]
     if any(remote):
-        lines += [f"  further off than a factor of {REMOTE}:"]
+        lines += [f"  {EDGE_WORDS['far'].format(remote=REMOTE)}:"]
         lines += [line for line, far in zip(table, remote, strict=True) if far]
     if without:
         lines += textwrap.wrap(

@@ -33,7 +33,7 @@ def test_the_page_says_what_python_says_and_asks_for_nothing(browser, file):
 
 def explained(visit):
     """What a reader who had never seen the page did not understand is said on it."""
-    assert "At the critical stiffness a small disturbance oscillates" in visit.reason()
+    assert "At the edge: oscillation with period" in visit.reason()
     bar = visit.page.locator(".bar").inner_text()
     for words in ("stiffness now 9 GPa/m", "stable from", "10 GPa/m", "100 GPa/m"):
         assert words in bar

@@ -4,7 +4,7 @@ import { make, put, svg, tell, unbroken } from "./dom.js";
 import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
 import { digits, shown, told, unitFor } from "./quantities.js";
-import { asStiffness, besides, beyondWords, headline, kindOf, reason } from "./words.js";
+import { asStiffness, besides, beyondWords, headline, kindOf, kindWords, reason } from "./words.js";
 
 const DECADE = Math.log(10); // natural logarithm of ten: margin of the bar beyond its outermost marks
 const ASUNDER = 1e3; // largest ratio of marks that are written in one unit
@@ -39,8 +39,8 @@ export class Banner {
     this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: one.name, textContent: inMenu(one, this.data.parameters), selected: i === page.rig.bar })));
     this.choice.addEventListener("change", () => page.tell(this.choice.selectedIndex));
     this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar ", this.choice));
-    const ask = (kind, textContent = kind) => make("button", { type: "button", textContent, onclick: () => page.guessed(kind) });
-    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ask("unstable"), " ", ask("none", "no steady sliding"));
+    const ask = (kind) => make("button", { type: "button", textContent: kindWords(kind, this.data), onclick: () => page.guessed(kind) });
+    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ask("unstable"), " ", ask("none"));
     this.box = make("section", { className: "verdict", "aria-label": "verdict", tabIndex: -1 }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice, guess);
   }
 

@@ -183,7 +183,7 @@ export class Course {
   refusal() {
     const { answer, rig } = this.page, { motion, parameters, facts } = rig.data;
     const own = (name) => rig.values[parameters.findIndex((one) => one.name === name)];
-    if (answer.status === ABSENT || answer.status === UNKNOWN) return "there is no steady sliding to start from";
+    if (answer.status === ABSENT || answer.status === UNKNOWN) return this.page.rig.data.ends["no steady sliding"];
     const added = motion.missing.find((name) => own(name) > 0);
     if (added) return `the rig of the file has no ${added}; write it there, and make the page anew`;
     const model = Array.from(rig.set(rig.values).R);

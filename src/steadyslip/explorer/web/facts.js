@@ -4,7 +4,7 @@ import { lettered } from "./controls.js";
 import { BESIDE } from "./edges.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Locus } from "./locus.js";
-import { words } from "./modes.js";
+import { fill, words } from "./modes.js";
 import { digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
 import { NEXT_TO_IT, beyondWords, named, quantity } from "./words.js";
@@ -65,7 +65,7 @@ export class Facts {
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
-      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
+      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", fill(rig.data.pace[s.re > 0 ? "grows" : "decays"], { time })];
       return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // no line break between number and unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
@@ -87,7 +87,7 @@ export class Facts {
     this.near.replaceChildren(...rows(found.filter((edge) => !edge.far)));
     this.far.hidden = !far.length;
     if (far.length === found.length) this.far.open = true;
-    tell(this.far.firstChild, `${far.length} further off than a factor of ${page.rig.data.remote}`);
+    tell(this.far.firstChild, `${far.length} ${fill(page.rig.data.beyond.far, page.rig.data)}`);
     this.far.lastChild.replaceChildren(...rows(far));
   }
 }

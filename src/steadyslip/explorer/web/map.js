@@ -5,12 +5,11 @@ import { make, put, putAt, svg } from "./dom.js";
 import { UPPER } from "./linear.js";
 import { axis, frame } from "./plot.js";
 import { digits, told } from "./quantities.js";
+import { kindWords } from "./words.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
 const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows of machines and of sliders, and levels of k/k_cr
 const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
-const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
-const WRITTEN = { stable: "stable", unstable: "unstable", none: "no steady sliding", unknown: "no such rig" }; // words in the areas
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Chart {
@@ -42,7 +41,7 @@ export class Chart {
     this.canvas.addEventListener("pointermove", (event) => this.canvas.hasPointerCapture(event.pointerId) && this.drag(event, true));
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => page.rest());
     this.canvas.addEventListener("keydown", (event) => this.nudge(event));
-    this.key = Object.entries(KEY).map(([name, words]) => make("span", { className: name }, make("i", { className: name }), words));
+    this.key = ["stable", "unstable", "none", "unknown"].map((name) => make("span", { className: name }, make("i", { className: name }), kindWords(name, page.rig.data)));
     this.box = make("section", { className: "map", "aria-label": "chart of stability", tabIndex: -1 }, make("h2", { textContent: "Where is it stable?" }),
       make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys; solid line: edge of stability, dashed: edge of steady sliding" })),
       this.canvas, make("p", { className: "key" }, ...this.key, make("span", {}, "thin lines: ", ...(page.rig.data.phrases ? ["growth rate, 1/s"] : ["stiffness over critical k/k", make("sub", { textContent: "cr" })]))));
@@ -87,7 +86,7 @@ export class Chart {
       put(this.outline, "d", outline);
       put(this.lost, "d", lost);
       put(this.slides, "d", paths.stable + paths.unstable);
-      this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, WRITTEN[name])));
+      this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, kindWords(name, this.page.rig.data))));
       this.contours(i, x, j, y, places);
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));

@@ -58,8 +58,7 @@ export class Motion {
 
   /** Reason why the run is impossible at these values; empty if it is possible. @param {string} disturbance */
   refusal(disturbance) {
-    if (this.infinite(disturbance)) return "a sudden push through a dashpot is an infinite force";
-    if (disturbance === "blow" && !Object.keys(this.facts.shares.blow).length) return "a blow needs a mass: without it the block takes any velocity at once";
+    if (this.infinite(disturbance) || (disturbance === "blow" && !Object.keys(this.facts.shares.blow).length)) return this.facts.refused[disturbance];
     if (!this.scales.posed) return "the equations of this page do not hold at these values, as where a mass is set to zero; steadyslip simulate writes them anew";
     if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";
     return "";

@@ -12,7 +12,7 @@ import { Rig, inside, nearestOf, rangeOf, scaleOf } from "./rig.js";
 import { changes } from "./search.js";
 import { stories } from "./stories.js";
 import { all, choose, chosen, chosenIn } from "./view.js";
-import { kindOf } from "./words.js";
+import { kindOf, kindWords } from "./words.js";
 
 /** Boxes of the chart axes on a narrow and a wide page, SVG units; letters have one size on both. */
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
@@ -21,7 +21,6 @@ const OTHERS = 40; // values of the bar parameter at which eigenvalues are drawn
 const SOUGHT = 1e3; // factor beyond a slider range within which it is widened to reach a change of status
 const OPENED = { values: "values", chart: "chart", motion: "motion", numbers: "numbers" }; // parts of a narrow page, shown one at a time
 const SAID = 4000, NAMED = 4; // SAID: ms for which a notice is shown; NAMED: most parts of a refused link that it lists
-const WORDS = { stable: "stable", unstable: "unstable", edge: "on the edge", none: "no steady sliding", unknown: "no such rig" };
 const DRAWN = 1e150; // larger numbers, and those below its inverse, are on no scale
 
 export class Page {
@@ -194,7 +193,7 @@ export class Page {
   foot() {
     const many = this.rig.data.checks.length;
     const words = this.differs.length ? "" : `This browser agrees with ${many} answers of Python that came with the page. `;
-    return make("footer", {}, `${words}Everything is computed here; the page asks for nothing from outside. The verdict is on small disturbances: a large kick may still start an oscillation.`);
+    return make("footer", {}, `${words}Everything is computed here; the page asks for nothing from outside. ${this.rig.data.means}`);
   }
 
   scale(i) {
@@ -354,7 +353,7 @@ export class Page {
     this.banner.show(this.answer);
     const kind = kindOf(this.answer);
     put(this.word.parentElement ?? this.word, "data-kind", kind);
-    this.word.textContent = WORDS[kind];
+    this.word.textContent = kindWords(kind, this.rig.data);
   }
 
   /** Text of a link with the values and choices of the page. */

@@ -13,14 +13,13 @@ import { exactly, tellIn } from "./quantities.js";
  */
 
 export const NEW = /** @type {[string, number, string]} */ (["", 1, ""]); // source of a parameter that the user's file leaves out
-const USUAL = { own: NEW, factor: 1, low: 0, high: null, lowAllowed: false, highAllowed: true, whole: false, allowed: "a finite number > 0" }; // entries that the data of a parameter leave out
 
 export class Rig {
   /** @param {Data} data @param {any} programs */
   constructor(data, programs) {
     this.data = data;
     tellIn(data.written);
-    for (const one of data.parameters) Object.assign(one, { ...USUAL, ...one });
+    for (const one of data.parameters) Object.assign(one, { own: NEW, ...data.usual, ...one });
     data.facts.parameters = data.places.map((at) => (typeof at === "string" ? at : data.parameters[at].name));
     this.linear = new Linear(programs, data.facts);
     this.values = data.parameters.map((one) => one.value);

@@ -27,18 +27,23 @@ export function kindOf(answer) {
   return answer.onEdge ? "edge" : answer.status === STABLE ? "stable" : "unstable";
 }
 
+/** Text that begins with a capital letter. @param {string} text */
+const begun = (text) => text[0].toUpperCase() + text.slice(1);
 const UNFIT = "A number leaves its range, or breaks a condition that several obey together.";
 export const NEXT_TO_IT = 1e-6; // relative distance from the edge that counts as on it; as in steadyslip/verdict/reasons.py, whose phrases are used here
 
 /** Headline of the verdict. @param {string} speed velocity with its preposition, "at" or "of" */
-export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)] ?? "Numbers outside what a rig can have", { speed });
+export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)]?.join("") ?? "Numbers outside what a rig can have", { speed });
+
+/** Words for a kind of answer, such as those in the areas of the chart. @param {string} kind @param {any} data */
+export const kindWords = (kind, { headlines }) => (headlines[kind]?.[0] ?? "No such rig").toLowerCase();
 
 /** Reason for the verdict, with the phrases of Python. @param {any} answer @param {any} data @param {any} [edge] nearest edge of a machine */
 export function reason(answer, data, edge) {
   if (answer.status === UNKNOWN) return UNFIT;
   const { phrases, reasons } = data, words = phrases ?? reasons;
   const text = answer.status === ABSENT ? absence(answer, data) : answer.illPosed ? words["are ill-posed"] : phrases ? ofMachine(answer, data, edge) : ofSlider(answer, data);
-  return text[0].toUpperCase() + text.slice(1) + ".";
+  return `${begun(text)}.`;
 }
 
 /** Reason why there is no steady sliding. */
@@ -65,11 +70,11 @@ function ofSlider({ onEdge, eigenvalues, stiffness, gain, held, intervals, criti
   return text + (alone ? fill(reasons["one edge"], { side }) : reasons.several) + (onEdge ? `; ${reasons["on edge"]}` : "");
 }
 
-/** Reason for the verdict on a slider at its critical value. */
-export function besides({ critical, illPosed, frequency, gain, stiffness, share }, data) {
+/** Sentences on the critical value of a slider. */
+export function besides({ critical, illPosed, frequency, gain, share }, data) {
   if (critical === null || illPosed) return "";
-  const by = gain && !stiffness ? "gain" : "stiffness", along = data.axial >= 0 ? ` Along the axis the critical stiffness is ${told(asStiffness(data), (critical + gain) / share)}.` : "";
-  return along + (frequency ? ` At the critical ${by} a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / frequency, "s")}.` : "");
+  const rows = [["along the axis", data.axial >= 0, { critical: told(asStiffness(data), (critical + gain) / share) }], ["at the edge", frequency, { period: shown((2 * Math.PI) / frequency, "s") }]];
+  return rows.filter(([, there]) => there).map(([label, , holes]) => ` ${begun(label)}: ${fill(data.reasons[label], holes)}.`).join("");
 }
 
 /** Reason for the verdict on a machine: growth or decay, and the nearest edge. */
@@ -104,20 +109,15 @@ export function beyondWords({ i, at, gap, stable, beyond, behind }, page) {
 /** Text of a ratio, with enough digits to differ from 1. */
 const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math.log10(Math.abs(many - 1) || 1)))));
 
-/** Phrases for the early end of a motion, by status of the driver. @type {Record<string, string>} */
-const ENDED = {
-  "no velocity": "no velocity balances the forces", "contact lost": "the contact is lost, its normal force has fallen to zero",
-  stuck: "no step is small enough, as the equations have no solution beyond", "too many steps": "more steps than a page takes; ask for a shorter time, or steadyslip simulate, which takes more",
-};
-
 /** Text of a velocity; "0 (stuck)" below the floor. @param {number} v @param {number} floor */
 export const slow = (v, floor) => (Math.abs(v) < floor ? "0 (stuck)" : shown(v, "m/s", 3));
 
 /** Sentence on the result of a motion. @param {any} course @param {any} data */
-export function outcome({ events, status, end, contacts, at }, { area, phrases, judders }) {
-  if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: neither mass nor damping limits the velocity.`;
-  const ended = status === "done" ? "" : ` It ends ${end === at ? "with the disturbance, " : ""}at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;
-  if (!(end > 0) || !contacts[0].v.length) return `No motion: it ends as it begins, as ${ENDED[status] ?? status}.`;
+export function outcome({ events, status, end, contacts, at }, { area, phrases, judders, ends }) {
+  const cause = `${ends[status] ?? status}${status === "too many steps" ? "; ask for a shorter time, or steadyslip simulate, which takes more" : ""}`;
+  if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: ${cause}.`;
+  const ended = status === "done" ? "" : ` It ends ${end === at ? "with the disturbance, " : ""}at ${shown(end, "s")}: ${cause}.`;
+  if (!(end > 0) || !contacts[0].v.length) return `No motion: it ends as it begins: ${cause}.`;
   if (!events.length) {
     const ranges = contacts.map(({ name, v, floor }) => {
       const [least, most] = extent(v);

@@ -22,6 +22,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
+from steadyslip.motion.status import NEEDS_MASS
 from steadyslip.motion.targets import Targets
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
@@ -169,8 +170,7 @@ class Kicked:
         values = operating_point(rig, vary, branch=branch)
         if kick == "impulse" and not at and "slider.mass" not in values.named():
             raise NotAvailable(
-                "an impulse needs a mass: without it the block takes any velocity at once; use a displacement or "
-                "normal-stress kick, or give the slider a mass"
+                f"an impulse {NEEDS_MASS}; use a displacement or normal-stress kick, or give the slider a mass"
             )
         if values.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no steady sliding to return to")

@@ -18,6 +18,7 @@ from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.jobs import Jobs
+from steadyslip.motion.status import THROUGH_DASHPOT
 from steadyslip.nonlinear.kicks.rest import Rest
 
 
@@ -42,8 +43,8 @@ def refuse_jump(rig: Slider | Machine) -> None:
     """Raise NotAvailable if the load point acts through a dashpot: its step would be an infinite force."""
     if isinstance(rig, Machine) and any(e.damping and LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
-            "a displacement step of the drive acts through a dashpot (of a link, a kd) as an infinite force; kick a "
-            "body instead, with at='NAME' (--at NAME; --kick 'displacement at NAME' of analyze), or by another kick"
+            f"a displacement step of the drive {THROUGH_DASHPOT}; kick a body instead, with at='NAME' (--at NAME; "
+            "--kick 'displacement at NAME' of analyze), or by another kick"
         )
 
 

@@ -114,7 +114,7 @@ def format_with_error(value: float, error: float, si_unit: str, area: float | No
     return f"{number} ± {_few(error / factor, 2)} {name}".rstrip()
 
 
-def format_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:
+def format_range(low: float, high: float, si_unit: str, area: float | None = None, digits: int = 4) -> str:
     """Format a range, both values in the unit chosen for the second.
 
     >>> format_range(8.52e-6, 1.195e-5, "m")
@@ -122,10 +122,10 @@ def format_range(low: float, high: float, si_unit: str, area: float | None = Non
     """
     factor, si_unit = outside(si_unit, area)
     low, high = low * factor, high * factor
-    number, _, name = format_quantity(high, si_unit).partition(" ")
+    number, _, name = format_quantity(high, si_unit, digits).partition(" ")
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
-        return f"{format_quantity(low, si_unit)} to {format_quantity(high, si_unit)}"
-    return f"{_few(low * float(number) / high, 4)} to {number} {name}".rstrip()
+        return f"{format_quantity(low, si_unit, digits)} to {format_quantity(high, si_unit, digits)}"
+    return f"{_few(low * float(number) / high, digits)} to {number} {name}".rstrip()
 
 
 def format_growth(low: float, high: float | None = None) -> str:

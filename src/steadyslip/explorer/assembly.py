@@ -248,12 +248,13 @@ def _stiffness(rig: Slider, names: list[str]) -> str | None:
 
 
 def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Page data of machines only: indices of the areas of contacts, phrases."""
+    """Page data of machines only: indices of the areas of contacts, phrases, names of what pulls at contacts."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
         "phrases": {name: words for name, words in machine_words.PHRASES.items() if name not in BEYOND},
         "means": machine_words.MEANS,
+        "pulls": {name: " and ".join(rig.pulls_at(name)) for name in rig.contacts},
     }
 
 

@@ -355,6 +355,13 @@ class Machine(Rig):
             for name, one in self.contacts.items()
         }
 
+    def pulls_at(self, contact: str) -> tuple[str, ...]:
+        mechanism = self.mechanism()
+        port = next(one for one in mechanism.contacts if one.name == contact)
+        sliding = set(port.slip) - {LOAD_POINT}
+        names = [one.name for one in mechanism.pulling(port) if sliding & set(one.acts)]
+        return tuple(dict.fromkeys(name.removeprefix("links.") or "the controller" for name in names))
+
     def area_of(self, name: str) -> float | None:
         kind, _, rest = name.partition(".")
         if kind != "contacts":

@@ -176,3 +176,14 @@ class Mechanism:
     axial_share: Any = None
     structures: tuple[StructurePart, ...] = ()
     limits: Limits | None = None
+
+    def pulling(self, port: ContactPort) -> list[Element]:
+        """Elements whose forces are the pull T at a contact.
+
+        Unless one is named these are all but those to the ground; those to the ground alone for a body that lies on the
+        moving load point.
+        """
+        if port.loaded_by:
+            return [one for one in self.elements if one.name == port.loaded_by]
+        belt = LOAD_POINT in port.slip
+        return [one for one in self.elements if not (LOAD_POINT in one.senses if belt else one.grounded)]

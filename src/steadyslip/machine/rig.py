@@ -128,6 +128,10 @@ class Rig(FrozenRecord, Keeper):
         """Laws of each contact by its name in the Model, which is empty for a slider's."""
         raise NotImplementedError
 
+    def pulls_at(self, contact: str) -> tuple[str, ...]:
+        """Names of the links, and ``the controller``, whose forces are the pull at a contact; none for a slider."""
+        return ()
+
     @property
     def holds(self) -> bool:
         """True if a controller holds a place: the velocity of the drive is 0, and there is no steady sliding."""

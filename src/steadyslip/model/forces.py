@@ -413,10 +413,8 @@ class Forces:
         """Motion passed to a contact law; also defines T, the pull at the body per area of the contact."""
         port, body = site.port, next(name for name in site.port.slip if name != LOAD_POINT)
         belt = LOAD_POINT in port.slip  # the body slides on the moving load point and is held by links to the ground
-        elements = self.mechanism.elements
-        pulling = [one for one in elements if not (LOAD_POINT in one.senses if belt else one.grounded)]
+        pulling = self.mechanism.pulling(port)
         if port.loaded_by:
-            pulling = [one for one in self.mechanism.elements if one.name == port.loaded_by]
             body = next(name for name in port.slip if name in pulling[0].acts)
         lever, integral = port.slip[body] * port.area, not (belt or port.loaded_by)
         steady = self._steady_slider_pull() if self.single else self._steady_pull(body, pulling, integral) / lever

@@ -20,7 +20,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
 from steadyslip.motion.events import AnySlip, ContactSlip, Event, SlipEvent, slip_events
 from steadyslip.motion.history import HistoryData
-from steadyslip.motion.sentence import sentences
+from steadyslip.motion.sentence import joined, sentences
 from steadyslip.motion.status import remedy
 
 NUDGED, FASTER = 0.1, 1.1  # when (share of a run) and by what factor a step of the drive's velocity is suggested
@@ -58,12 +58,12 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     @cached_property
     def sentence(self) -> str:
         """What the rig does, by its slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ..."."""
-        return "; ".join(f"{name} {words}" if name else words for name, words in self._sentences.items())
+        return joined(self._sentences)
 
     @cached_property
     def _sentences(self) -> dict[str, str]:
         """Sentence of each contact, by name."""
-        return sentences(self.events, self.slip_events, self.rig.area)
+        return sentences(self.rig, self.events, self.slip_events)
 
     def summary(self) -> str:
         """Summary in a few lines."""
@@ -89,6 +89,14 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         still = all(high - low <= STEADY_SPREAD * abs(high) for low, high in known)
         return not acts and still and self.status == "done"
 
+    @property
+    def nudge(self) -> tuple[str, str]:
+        """Pieces of a protocol, as text: the drive is faster by a tenth for a tenth of the run, then as before."""
+        value, unit = self.rig.told("drive.velocity", float(self.rig.drive.velocity))
+        begin, end = (format_quantity(share * self.end, "s") for share in (NUDGED, 2 * NUDGED))
+        faster = format_quantity(FASTER * value, unit)
+        return f"velocity-step at='{begin}' to='{faster}'", f"velocity-step at='{end}' to='{value!r} {unit}'"
+
     def _caveats(self) -> list[str]:
         """Lines that warn of easily misread runs."""
         lines = []
@@ -104,11 +112,9 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             told = 100 * max(self.late_error, self.rtol)
             lines.append(f"delay           slips, peaks, times between and velocities are known within {told:.1g} %")
         if self.undisturbed:
-            at, unit = format_quantity(NUDGED * self.end, "s"), self.rig.parameters()["drive.velocity"].role.unit
-            to = format_quantity(FASTER * float(self.rig.drive.velocity), unit)
             lines += [
                 "disturbance     none: steady sliding goes on, were it unstable too; analyze tells, or disturb it:",
-                f"                --protocol \"velocity-step at='{at}' to='{to}'\"",
+                f'                --protocol "{self.nudge[0]}"',
             ]
         return lines
 

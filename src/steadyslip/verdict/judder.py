@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.format import format_quantity
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
-from steadyslip.motion.events import AnySlip
-from steadyslip.motion.sentence import DIGITS
+from steadyslip.motion.events import AnyEvent, AnySlip
+from steadyslip.motion.sentence import DIGITS, joined, sentences
+from steadyslip.motion.status import BLOWN_UP, LOST
 from steadyslip.protocol import VelocityStep
 
 STEP = 1.1  # factor by which the drive is faster for a while: small, yet above what rounding makes of steady sliding
@@ -21,6 +24,22 @@ LONGER = 4.0  # length of a run over that of the run before
 MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
 BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
+FEWEST = 8  # events in the second half of a run from which it is told that they have no trend
+TURNS = 0.25  # share of these, by trial, at which slips of irregular events turn from growing to shrinking or back
+GROWS = {True: "oscillates more and more", False: "leaves steady sliding"}
+"""What a disturbance that grows does, by whether it oscillates."""
+ENDINGS = {LOST: ", until contact is lost after {time}", BLOWN_UP: ", until it runs away after {time}"}
+"""How a motion ends, by its status, with the time since the disturbance."""
+ON = ": after {time} between {speeds}, and still growing"
+"""A motion whose growth has no end within the work that `MOST_STEPS` allows."""
+
+
+def _first(eigenvalues: Sequence[complex]) -> float:
+    """Length of the first run, s; NaN without a rate of disturbances."""
+    leading = next((s for s in eigenvalues if s.imag > 0), next(iter(eigenvalues), None))
+    if leading is None or not 0 < abs(leading) < math.inf:
+        return math.nan
+    return PERIODS * (2 * math.pi / leading.imag if leading.imag else 1 / abs(leading.real))
 
 
 def motion_after(
@@ -35,15 +54,14 @@ def motion_after(
     SteadyslipError
         If the rig cannot be simulated.
     """
-    leading = next((s for s in eigenvalues if s.imag > 0), next(iter(eigenvalues), None))
-    if leading is None or not 0 < abs(leading) < math.inf:
+    first = _first(eigenvalues)
+    if not math.isfinite(first):
         return None
-    first = PERIODS * (2 * math.pi / leading.imag if leading.imag else 1 / abs(leading.real))
     speed = float(rig.value("drive.velocity") or 0.0)
     pieces = [VelocityStep(at=BEGIN * first, to=STEP * speed), VelocityStep(at=END * first, to=speed)]
     until = first
     run = simulate(rig, pieces, until=until, branch=branch, most_steps=MOST_STEPS)
-    rate = max(leading.real, 0.0)
+    rate = max(0.0, *(s.real for s in eigenvalues))
     while repeated and run.status == "done" and LONGER * run.steps < MOST_STEPS:
         if repeats(run) or swings(run, rate):
             break
@@ -77,8 +95,7 @@ def swings(run: History, rate: float) -> dict[str, tuple[float, float, float]]:
         return {}
     found = {}
     for name in dict.fromkeys(one.contact for one in run.events):
-        late = [one for one in run.events if one.contact == name and one.time > half]
-        peaks, troughs = ([one for one in late if one.kind == f"velocity {kind}"] for kind in ("peak", "trough"))
+        peaks, troughs = _extremes(run, name)
         sizes = [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
         if len(sizes) > 1 and max(sizes) < BEATS * min(sizes):
             period = (peaks[-1].time - peaks[0].time) / (len(peaks) - 1)
@@ -93,19 +110,72 @@ def _alike(events: list[AnySlip]) -> bool:
     )  # fmt: skip
 
 
+def is_irregular(run: History) -> bool:
+    """True if slips of each contact that slips go on in the last half of the run and vary without a trend.
+
+    That is if they become larger and smaller by turns, and no larger in its last quarter than in the one before.
+    """
+    end = float(run["t"][-1])
+    late = [one for one in run.slip_events if one.slip > 0 and one.begin > 0.5 * end]
+    for name in {one.contact for one in run.slip_events if one.slip > 0}:
+        own = [one for one in late if one.contact == name]
+        sizes = np.array([one.slip for one in own])
+        if len(sizes) < FEWEST:
+            return False
+        turns = np.mean(np.diff(np.sign(np.diff(sizes))) != 0)
+        before, after = ([one.slip for one in own if (one.begin > 0.75 * end) is last] for last in (False, True))
+        if turns < TURNS or not before or not after or max(after) > BEATS * max(before):
+            return False
+    return bool(late)
+
+
 def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0) -> str:
-    """Sentence on the slip events of an unstable rig; empty where they were not found to repeat."""
+    """Sentence on what an unstable rig does after a small disturbance; empty where that is not known.
+
+    That is its slip events, if they repeat or vary without a trend, an oscillation that goes on, or how it ends.
+    """
     try:
         run = motion_after(rig, eigenvalues, branch, repeated=True)
     except SteadyslipError:
         return ""
-    if run is None or run.status != "done":
+    if run is None:
+        return ""
+    fastest = max(eigenvalues, key=lambda one: one.real)
+    grows, since = GROWS[fastest.imag != 0], run.end - BEGIN * _first(eigenvalues)
+    if run.status in ENDINGS:
+        ends = ENDINGS[run.status].format(time=format_quantity(since, "s", DIGITS))
+        return f"{run.contact} {grows}{ends}".strip()
+    if run.status not in ("done", "too many steps"):
         return ""
     if repeats(run):
         return run.sentence
-    growing = max((s.real for s in eigenvalues), default=0.0)
-    told = []
-    for name, (period, *ends) in swings(run, growing).items():
-        low, high = (format_quantity(end, "m/s", DIGITS) for end in ends)
-        told.append(f"{name} oscillates: every {format_quantity(period, 's', DIGITS)} between {low} and {high}".strip())
-    return "; ".join(told)
+    if is_irregular(run):
+        return joined(sentences(rig, run.events, run.slip_events, 0.5 * float(run["t"][-1])))
+    if steady := swings(run, fastest.real):
+        return joined({
+            name: f"oscillates: every {format_quantity(period, 's', DIGITS)} between {_speeds(*ends)}"
+            for name, (period, *ends) in steady.items()
+        })  # fmt: skip
+    time, found = format_quantity(since, "s", DIGITS), _last_swings(run)
+    return joined({name: grows + ON.format(time=time, speeds=_speeds(*ends)) for name, ends in found.items()})
+
+
+def _last_swings(run: History) -> dict[str, tuple[float, float]]:
+    """Last trough and peak of the velocity (m/s) of each contact, by name, that swings more than half a run before."""
+    found = {}
+    for name in dict.fromkeys(one.contact for one in run.events):
+        peaks, troughs = ([one.velocity for one in several] for several in _extremes(run, name))
+        if min(len(peaks), len(troughs)) > 1 and peaks[-1] - troughs[-1] > peaks[0] - troughs[0]:
+            found[name] = troughs[-1], peaks[-1]
+    return found
+
+
+def _extremes(run: History, name: str) -> tuple[list[AnyEvent], list[AnyEvent]]:
+    """Peaks and troughs of the velocity of a contact in the last half of a run."""
+    late = [one for one in run.events if one.contact == name and one.time > 0.5 * float(run["t"][-1])]
+    peaks, troughs = ([one for one in late if one.kind == f"velocity {kind}"] for kind in ("peak", "trough"))
+    return peaks, troughs
+
+
+def _speeds(low: float, high: float) -> str:
+    return f"{format_quantity(low, 'm/s', DIGITS)} and {format_quantity(high, 'm/s', DIGITS)}"

@@ -10,7 +10,6 @@ from steadyslip.core.format import format_quantity
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
-from steadyslip.machine.mechanism import GROUND
 from steadyslip.machine.structures import StructureBody
 from steadyslip.model.numeric import by_matrices, has_response, has_structure
 from steadyslip.model.point import operating_point
@@ -47,11 +46,7 @@ def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
     controlled = machine.drive.driven() == surface.held
     if len(at) + controlled < 2 or not surface.contact.follows_spring():
         return []
-    inside = [surface.loaded_by] if surface.loaded_by else [
-        link for link in at if GROUND not in machine.links[link].between
-    ]  # fmt: skip
-    parts = [*inside, *["the controller"] * (controlled and not surface.loaded_by)]
-    return [("the pull T", f"the normal force of {name} follows T, the pull of {' and '.join(parts)}")]
+    return [("the pull T", f"the normal force of {name} follows T, the pull of {' and '.join(machine.pulls_at(name))}")]
 
 
 def meaning(analysis: Findings) -> list[str]:

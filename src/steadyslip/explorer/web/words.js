@@ -113,7 +113,7 @@ const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math
 export const slow = (v, floor) => (Math.abs(v) < floor ? "0 (stuck)" : shown(v, "m/s", 3));
 
 /** Sentence on the result of a motion. @param {any} course @param {any} data */
-export function outcome({ events, status, end, contacts, at }, { area, phrases, judders, ends }) {
+export function outcome({ events, status, end, contacts, at }, { area, phrases, judders, ends, pulls }) {
   const cause = `${ends[status] ?? status}${status === "too many steps" ? "; ask for a shorter time, or steadyslip simulate, which takes more" : ""}`;
   if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: ${cause}.`;
   const ended = status === "done" ? "" : ` It ends ${end === at ? "with the disturbance, " : ""}at ${shown(end, "s")}: ${cause}.`;
@@ -130,7 +130,7 @@ export function outcome({ events, status, end, contacts, at }, { area, phrases, 
   const counts = contacts.map(({ name }) => [events.filter((one) => one.contact === name).length, name]).filter(([many]) => many);
   const where = phrases ? ` (${counts.map(([many, name]) => (counts.length > 1 ? `${many} of ${name}` : name)).join(", ")})` : "";
   const drop = `${phrases || area !== null ? "force" : "stress"} drop ${phrases ? shown(last.drop, "N") : quantity(last.drop, "Pa", area)}`;
-  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => (phrases ? shown(value, "N", 3) : quantity(value, "Pa", area, 3)))).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
+  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => (phrases ? fill(judders.pull, { drop: shown(value, "N", 3), links: pulls[name] }) : quantity(value, "Pa", area, 3)))).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
   return `${events.length} slip event${events.length > 1 ? "s" : ""}${where}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, ${drop}; ${told.join("; ")}.${ended}`;
 }
 

@@ -266,16 +266,14 @@ class _Assembler:
 
         As in `steadyslip.model.forces`.
         """
-        body, elements = next(name for name in port.slip if name != LOAD_POINT), self.mechanism.elements
+        body, pulling = next(name for name in port.slip if name != LOAD_POINT), self.mechanism.pulling(port)
         if body not in {one.name for one in self.mechanism.coordinates}:
             raise NotAvailable(
                 f"contacts.{port.name}: the normal force of this law follows the pull of a spring, which a structure "
                 "does not have; write law = 'compliant' or 'constant'"
             )
         belt = LOAD_POINT in port.slip
-        pulling = [one for one in elements if not (LOAD_POINT in one.senses if belt else one.grounded)]
         if port.loaded_by:
-            pulling = [one for one in elements if one.name == port.loaded_by]
             body = next(name for name in port.slip if name in pulling[0].acts)
             return body, pulling, pulling, False
         behind = [one for one in pulling if (one.grounded if belt else LOAD_POINT in one.senses)]

@@ -1,0 +1,125 @@
+"""What an unstable rig is told to do instead of sliding steadily, and whose force drops."""
+
+import re
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from command import run as cli
+from steadyslip.motion import ContactSlip
+from steadyslip.verdict.judder import is_irregular, motion_after
+
+GUIDE_AND_SEAL = """
+[bodies.carriage]
+mass = "35 kg"
+[links.belt]
+between = ["drive", "carriage"]
+stiffness = "0.35 N/um"
+damping = "40 N s/m"
+[contacts.guide]
+body = "carriage"
+contact = { law = "constant", preload = "500 N" }
+friction.law = "lugre"
+friction.mu_coulomb = 0.08
+friction.mu_static = 0.13
+friction.v_stribeck = "4 mm/s"
+friction.viscous = "0.5 s/m"
+friction.bristle_stiffness = "8 N/um at 500 N"
+[contacts.seal]
+body = "carriage"
+contact = { law = "constant", preload = "60 N" }
+friction.law = "lugre"
+friction.mu_coulomb = 0.3
+friction.mu_static = 0.55
+friction.v_stribeck = "10 mm/s"
+friction.viscous = "4 s/m"
+friction.bristle_stiffness = "0.4 N/um at 60 N"
+[drive]
+velocity = "2 mm/s"
+"""
+
+
+def told(pattern, text):
+    """Numbers of a sentence."""
+    found = re.fullmatch(pattern, text)
+    assert found is not None, text
+    return [float(one) for one in found.groups()]
+
+
+def test_slips_that_alternate_are_told_by_their_ranges():
+    """Every other slip of this carriage is longer; a run from another disturbance stays within what is told."""
+    rig = ss.rig_from_text(GUIDE_AND_SEAL)
+    sentence, other = ss.analyze(rig).judders.split("; ")
+    number = r"([\d.]+)"
+    low, high, least, most, *_, drop = told(
+        rf"guide judders: every {number} to {number} ms it sticks, then slips {number} to {number} um within "
+        rf"{number} to {number} ms, a drop of {number} to {number} N in the pull of belt",
+        sentence,
+    )
+    assert other == sentence.replace("guide", "seal")
+    push = [ss.protocol.VelocityStep(at=0.01, to=3e-3), ss.protocol.VelocityStep(at=0.1, to=2e-3)]
+    run = ss.simulate(rig, push, until=12.0)
+    late = [one for one in run.slip_events if one.contact == "guide" and one.begin > 6.0]
+    assert len(late) > 20
+    assert 1e3 * np.array([one.recurrence for one in late]) == pytest.approx((low + high) / 2, abs=0.51 + high - low)
+    assert [1e6 * end([one.slip for one in late]) for end in (min, max)] == pytest.approx([least, most], rel=5e-3)
+    assert max(one.force_drop for one in late) == pytest.approx(drop, rel=5e-3)
+
+
+class MadeRun(dict):
+    def __init__(self, slip_events):
+        super().__init__(t=np.array([0.0, 100.0]))
+        self.slip_events = slip_events
+
+
+@pytest.mark.parametrize("trend", [1.0, 1.02])
+def test_slips_that_grow_are_not_irregular(trend):
+    """Made events: of alternating size, and the same with a trend."""
+    sizes = [trend**i * (1 + 0.1 * (i % 2)) for i in range(100)]
+    events = [ContactSlip("guide", i, i + 0.1, 0.1, one, 1.0, 1.0, i, 1.0, 0, np.nan) for i, one in enumerate(sizes)]
+    assert is_irregular(MadeRun(events)) is (trend == 1.0)
+
+
+def test_an_oscillation_that_grows_until_contact_is_lost_is_told_so():
+    """The pad that squeals; the time is that of the run's own last event after the disturbance."""
+    found = ss.analyze(ss.read_rig("examples/machines/brake-pad.toml"))
+    (time,) = told(r"disc oscillates more and more, until contact is lost after ([\d.]+) ms", found.judders)
+    run = motion_after(found.rig, found.eigenvalues)
+    assert (run.status, run.contact) == ("contact lost", "disc")
+    assert time == pytest.approx(1e3 * (run.end - run.protocol.pieces[0].at), abs=6e-3)
+    assert f"{found.judders} (simulated, after a small disturbance)" in " ".join(str(found).split())
+    assert found.to_dict()["judders"] == found.judders
+
+
+def test_what_still_grows_is_told_with_its_size():
+    """Just beyond the edge, where growth takes longer than the work that is allowed."""
+    rig = ss.read_rig("examples/stick-slip.toml")
+    edge = next(one for one in ss.boundary(rig, "stiffness") if one.kind == "oscillatory")
+    found = ss.analyze(rig.with_values({"stiffness": 0.9999 * edge.value}))
+    assert re.fullmatch(
+        r"oscillates more and more: after .* between .* nm/s and .* um/s, and still growing", found.judders
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "contact", "pulls"),
+    [
+        ("examples/machines/geared-servo.toml", "mesh", ("teeth",)),
+        ("examples/machines/geared-servo.toml", "guide", ("teeth",)),
+        ("examples/machines/feed-axis.toml", "guide", ("screw",)),
+        ("examples/machines/brake-pad.toml", "disc", ("arm", "caliper")),
+        ("examples/slow-axis.toml", "", ()),
+    ],
+)
+def test_what_pulls_at_a_contact_is_named(path, contact, pulls):
+    assert sorted(ss.read_rig(path).pulls_at(contact)) == sorted(pulls)
+
+
+def test_an_unstable_rig_that_nothing_disturbs_is_disturbed_on_the_command_line(tmp_path):
+    """Steady sliding would go on for ever; of a stable rig it does."""
+    (tmp_path / "rig.toml").write_text(GUIDE_AND_SEAL, encoding="utf-8")
+    for speed, judders in (("2 mm/s", True), ("0.1 mm/s", False)):
+        done = cli("simulate", tmp_path / "rig.toml", "--until", "4 s", "--set", f"drive.velocity={speed}")
+        assert done.returncode == 0
+        assert ("judders" in done.stdout) is ("nothing disturbs this unstable rig" in done.stderr) is judders

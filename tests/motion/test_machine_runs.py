@@ -106,7 +106,7 @@ def test_runs_of_machines_in_files(tmp_path):
             "pieces.1.on: missing; name the body that disturbance-step acts on",
         ),
         ([ss.protocol.NormalStressStep(at=1, by=1.0, on="belt")], "unknown contact 'belt'"),
-        ([ss.protocol.DisplacementStep(at=1, by=1.0)], "a displacement step through a dashpot"),
+        ([ss.protocol.DisplacementStep(at=1, by=1.0)], "a displacement step acts through a dashpot"),
     ],
 )
 def test_what_cannot_be_done_to_a_machine(pieces, said):

@@ -11,7 +11,7 @@ from scipy.special import lambertw
 import steadyslip as ss
 from delays import apart, lagging, late_axis, some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
-from steadyslip.linear import quasipolynomial as quasi, windows
+from steadyslip.linear import quasipolynomial as quasi, rightmost as late_roots, windows
 from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.spectrum import outgrown, unstable_roots
 from steadyslip.linear.waves import Waves
@@ -43,7 +43,7 @@ def test_a_first_order_loop_bears_a_quarter_of_its_turn(gain):
     tau = 0.8 / gain
     found = ss.eigenvalues(servo(gain, tau, mass=0.0))
     assert found[0] == pytest.approx(lambertw(-gain * tau, 0) / tau, rel=1e-12)
-    several = quasi.rightmost(np.array([[0.0, 1.0], [gain, 0.0]]), np.array([0.0, tau]), apart(2), 7)
+    several = late_roots.rightmost(np.array([[0.0, 1.0], [gain, 0.0]]), np.array([0.0, tau]), apart(2), 7)
     expected = [lambertw(-gain * tau, k) / tau for k in range(-4, 4)]
     for one in several:
         assert np.min(np.abs(one - expected)) < 1e-10 * abs(one)
@@ -82,7 +82,7 @@ def test_a_root_of_what_nothing_late_acts_on_is_found(terms):
     post, block = np.array([100.0, 0.02, 1.0]), np.array([5.0, 10.0, 5.0])
     late = [np.array([one, 0.0, 0.0]) for one in (0.3, 0.2)][: terms - 1]
     c = np.array([np.convolve(post, one) for one in (block, *late)])
-    found = quasi.rightmost(c, np.array([0.0, 0.05, 4.0])[:terms], apart(terms), 2)
+    found = late_roots.rightmost(c, np.array([0.0, 0.05, 4.0])[:terms], apart(terms), 2)
     assert found == pytest.approx(np.roots(post[::-1]), rel=1e-9)
 
 
@@ -99,7 +99,7 @@ def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms
             continue
         assert int(quasi.count_right(c, h, apart(len(c)))) == np.sum(found.real > 0), seed
         assert int(count_by_argument(c[None], h[None], apart(len(c)))[0]) == np.sum(found.real > 0), seed
-        for one in quasi.rightmost(c, h, apart(len(c)), 3):
+        for one in late_roots.rightmost(c, h, apart(len(c)), 3):
             assert np.min(np.abs(found - one)) < 1e-6 * max(1.0, abs(one)), seed
 
 
@@ -225,7 +225,7 @@ def test_edges_under_a_delay_are_judged_by_counts_without_eigenvalues(monkeypatc
     right = ss.eigenvalues(machine, {"drive.kp": (gains := np.geomspace(1.0, 300.0, 9))}).real[:, 0]
     assert 0 < np.sum(right > 0) < len(gains)
     assert np.array_equal(outgrown(operating_point(machine, {"drive.kp": gains}), False, 1e-9), right > 0)
-    monkeypatch.setattr(quasi, "rightmost", lambda *_: pytest.fail("all eigenvalues, which take seconds"))
+    monkeypatch.setattr(late_roots, "rightmost", lambda *_: pytest.fail("all eigenvalues, which take seconds"))
     edges = ss.boundary(machine, "drive.kp")
     at_edges = operating_point(machine, {"drive.kp": np.array([edge.value for edge in edges])})
     assert edges
@@ -342,7 +342,7 @@ def test_roots_that_crowd_at_the_axis_under_long_delays_are_found(delay):
     found = ss.eigenvalues(machine)
     c, h = operating_quasi(operating_point(machine))
     for k, s in enumerate(found):
-        assert abs(quasi.value(c, h, s)) < 1e-8 * quasi._size(c, h, s)
+        assert abs(quasi.value(c, h, s)) < 1e-8 * quasi.size_of_terms(c, h, s)
         assert int(quasi.count_right(c, h, apart(len(c)), s.real * (1 + 1e-6) + 1e-12)) <= k + 1
     assert np.all(np.diff(found.real) <= 1e-9)
     assert ss.analyze(machine).unstable_roots > delay / 10

@@ -11,7 +11,7 @@ import pytest
 import steadyslip as ss
 from delays import apart, lagging, late_axis
 from machines import surface
-from steadyslip.linear import neutral, quasipolynomial as quasi
+from steadyslip.linear import neutral, quasipolynomial as quasi, rightmost as late_roots
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import quasipolynomial as operating_quasi
 
@@ -114,10 +114,12 @@ def test_edges_that_take_too_long_are_named(monkeypatch):
 def test_a_root_off_the_line_that_was_counted_is_not_taken(monkeypatch):
     """Newton's method may end at a root further left or right; the list ends before it."""
     c, h = operating_quasi(operating_point(late_axis("0.1 s")))
-    found = quasi.rightmost(c, h, apart(len(c)), 3)
+    found = late_roots.rightmost(c, h, apart(len(c)), 3)
     assert np.all(np.isfinite(found))
-    monkeypatch.setattr(quasi, "_root_on", lambda c, h, sets, real, known: complex(real - 0.01, 1.0))
-    assert np.all(np.isnan(quasi.rightmost(c, h, apart(len(c)), 3)))
+    monkeypatch.setattr(late_roots, "_by_ratios", lambda c, h, sets, count: np.full((len(c), count), np.nan + 0j))
+    assert late_roots.rightmost(c, h, apart(len(c)), 3) == pytest.approx(found, rel=1e-9)
+    monkeypatch.setattr(late_roots, "_root_on", lambda c, h, sets, real, known: complex(real - 0.01, 1.0))
+    assert np.all(np.isnan(late_roots.rightmost(c, h, apart(len(c)), 3)))
 
 
 def late_twice(kd):

@@ -87,10 +87,10 @@ def _roots_of_degree(c: Array) -> ComplexArray:
         return (-c[:, :1] / c[:, 1:]).astype(complex)
     if d == 2:
         return _quadratic(c)
-    return _polished(c, _of_companion(c))
+    return _polished(c, companion_eigenvalues(c))
 
 
-def _of_companion(c: Array) -> ComplexArray:
+def companion_eigenvalues(c: Array) -> ComplexArray:
     """Eigenvalues of the companion matrices; small ones beside very large ones are rounding."""
     d = c.shape[-1] - 1
     companion = np.zeros((len(c), d, d))
@@ -155,7 +155,7 @@ def _roots_by_size(c: Array) -> ComplexArray:
     found = np.zeros((len(c), n), dtype=complex)
     for (first, last, bottom, top), members in alike.items():
         own = np.array([one for _, _, one in members])
-        inner = _of_companion(own[:, bottom : top + 1])
+        inner = companion_eigenvalues(own[:, bottom : top + 1])
         inner = np.take_along_axis(inner, np.argsort(-np.abs(inner), axis=-1, kind="stable"), axis=-1)
         skip = first - (n - top)  # larger roots that are among these
         rows, units = [row for row, _, _ in members], np.array([unit for _, unit, _ in members])

@@ -7,7 +7,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.questions import question
-from steadyslip.linear import crossing, quasipolynomial as with_delays
+from steadyslip.linear import crossing, quasipolynomial as with_delays, rightmost as late_roots
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.digits import precise_eigenvalues
 from steadyslip.linear.polynomials import columns, damping_measures, is_hurwitz
@@ -29,7 +29,7 @@ def spectrum(point: OperatingPoint) -> ComplexArray:
     """
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else _of_state_matrix(point)
-    return _rightmost(point)
+    return _rightmost(point, quasipolynomial(point)[0].shape[-1] - 1)
 
 
 @quietly
@@ -39,21 +39,21 @@ def growth(point: OperatingPoint) -> Array:
     With a delayed highest derivative there may be no rightmost eigenvalue: infinitely many come as near as one likes to
     a line, whose real part is given then.
     """
-    found = spectrum(point).real
+    found = (_rightmost(point, 1) if point.model.delays else spectrum(point)).real
     rate = np.max(np.where(np.isnan(found), -np.inf, found), axis=-1)
     if point.model.delays and np.any(none := np.isneginf(rate)):
         c, h = quasipolynomial(point)
         rate = np.array(rate)
         for at in np.argwhere(none & np.all(np.isfinite(c), axis=(-2, -1))):
-            rate[*at] = with_delays.rate_of_many(c[*at], h[*at], delays_in_terms(point.model))
+            rate[*at] = late_roots.rate_of_many(c[*at], h[*at], delays_in_terms(point.model))
     return np.asarray(np.where(np.isneginf(rate), np.nan, rate))
 
 
 @question
-def _rightmost(point: OperatingPoint) -> ComplexArray:
+def _rightmost(point: OperatingPoint, count: int) -> ComplexArray:
     c, h = quasipolynomial(point)
     c = np.where(late_on_springs(point)[..., None, None], np.nan, c)
-    return with_delays.rightmost(c, h, delays_in_terms(point.model), c.shape[-1] - 1)
+    return late_roots.rightmost(c, h, delays_in_terms(point.model), count)
 
 
 @question
@@ -166,7 +166,7 @@ def crossing_frequency(point: OperatingPoint) -> float:
     """Imaginary part (rad/s) of the root nearest to the axis, of a single rig on an edge; 0 without oscillation."""
     if point.model.delays:
         c, h = quasipolynomial(point)
-        return with_delays.nearest_to_axis(
+        return late_roots.nearest_to_axis(
             c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0], delays_in_terms(point.model)
         ).imag
     found = spectrum(point).ravel()

@@ -59,7 +59,7 @@ def test_phase_plane_shows_the_run_and_steady_states(spiral):
     steady = lines(ax)["steady states"]
     slope = np.polyfit(steady.get_xdata(), steady.get_ydata(), 1)[0]
     assert slope == pytest.approx(-0.005, rel=1e-9)  # (a − b) σ
-    assert ax.get_xlabel() == "ln(v/v0) (1)"
+    assert ax.get_xlabel() == "ln($v/v_0$) (1)"
     with pytest.raises(ss.NotAvailable, match="history"):
         spiral.plot("orbit")
 

@@ -14,14 +14,22 @@ import numpy as np
 from matplotlib import pyplot as plt, rc_context
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.figures.style import JOURNAL
 
 MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
+_LEAST = 640.0  # pixels across a figure, so that one column is sharp on a screen of two per CSS pixel (by trial)
 _SVG_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "steadyslip",
     "font.family": "sans-serif",
     "path.simplify_threshold": 0.5,
 }
+
+
+def column_html(make: Callable[[], Any], words: str) -> str:
+    """HTML of a figure one journal column wide, of which two stand beside each other on paper; as `figure_html`."""
+    with rc_context(JOURNAL):
+        return figure_html(make, words)
 
 
 def figure_html(make: Callable[[], Any], words: str, width: float | None = None) -> str:
@@ -58,11 +66,11 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
 
 
 def _png_base64(found: Any) -> str:
-    """Base64 text of a figure as PNG with a palette of 48 colours, 100 dots per inch."""
+    """Base64 text of a figure as PNG with a palette of 48 colours, 100 dots per inch and `_LEAST` across or more."""
     from PIL import Image
 
     many, few = io.BytesIO(), io.BytesIO()
-    found.savefig(many, format="png", dpi=100)
+    found.savefig(many, format="png", dpi=max(100.0, _LEAST / found.get_figwidth()))
     Image.open(many).convert("RGB").quantize(48, dither=Image.Dither.NONE).save(few, format="png", optimize=True)
     return base64.b64encode(few.getvalue()).decode()
 

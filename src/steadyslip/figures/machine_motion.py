@@ -116,7 +116,7 @@ def leaves(run: History, rates: np.ndarray, steady: float) -> np.ndarray:
 
 def drawn_up_to(left: np.ndarray) -> str:
     """Words for a title on what is left out of a figure; empty if that is nothing."""
-    return f", drawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
+    return f",\ndrawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
 
 
 def _most_varying_contact(run: History, rig: Machine) -> str:

@@ -211,7 +211,7 @@ def phase_plane(
     add_arrowheads(ax, x, y, color)
     if not ax.get_xlabel():
         _draw_steady_states(run, run.rig, ax, x, factor)
-        ax.set_xlabel("ln(v/v0) (1)")
+        ax.set_xlabel("ln($v/v_0$) (1)")
         ax.set_ylabel(axis_label(stress_name("spring stress", area), unit))
     ax.legend(fontsize="small")
     return ax

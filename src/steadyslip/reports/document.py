@@ -40,9 +40,11 @@ body { background: #fff; }
   .report.steadyslip-told { padding: 0; font-size: 13px; max-width: none; }
   .report.steadyslip-told h2 { margin-top: 16px; }
   .report.steadyslip-told p { margin: 7px 0; }
-  .report figure svg:not(.sketch), .report figure img { max-height: 100mm; width: auto !important; }
+  .report figure > svg:not(.sketch), .report figure > img { max-height: 78mm; width: auto !important; }
+  .report.steadyslip-told .pair { grid-template-columns: 1fr 1fr; gap: 0 6mm; }
+  .report .pair > figure > :is(svg, img) { max-height: none; width: 100% !important; }
   .report.steadyslip-told .wide, .report.steadyslip-told .formula { overflow: visible; }
-  .report pre { font-size: 10px !important; }
+  .report pre { font-size: 10px !important; orphans: 8; widows: 8; }
   .steadyslip-root, .on-screen { display: none !important; }
 }
 """

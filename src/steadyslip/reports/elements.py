@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import sympy as sp
@@ -23,6 +24,7 @@ _EXPONENT, _SUPERSCRIPTS = (
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
 _NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])")  # space between a number and its unit, or what it counts
 _LONG = 30  # characters of a word that may be broken, for it is none
+_NARROW = 3  # columns that fit on a telephone (by trial, at 360 px)
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
@@ -48,6 +50,10 @@ STYLE = """
 .steadyslip-told .wide { overflow-x: auto; max-width: 100%; }
 .steadyslip-told figure { margin: 10px 0; break-inside: avoid; }
 .steadyslip-told figure svg, .steadyslip-told figure img { max-width: 100%; height: auto; }
+.steadyslip-told .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(320px, 100%), 1fr));
+  gap: 0 18px; align-items: start; }
+.steadyslip-told .pair > figure { max-width: 430px; }
+.steadyslip-told .pair svg, .steadyslip-told .pair img { width: 100% !important; }
 .steadyslip-told figcaption, .steadyslip-told .small { color: #566173; font-size: 13px; }
 .steadyslip-told .warning { background: #fff3d6; border-left: 5px solid #d97f12; padding: 6px 12px; margin: 8px 0; }
 .steadyslip-told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
@@ -55,6 +61,13 @@ STYLE = """
 .steadyslip-told sub { line-height: 0; }
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
 @media print { .steadyslip-told .formula math { font-size: 12px; } }
+@media screen and (max-width: 600px) {
+  .steadyslip-told .stacks thead { position: absolute; clip-path: inset(50%); }
+  .steadyslip-told .stacks tr { display: block; border-bottom: 1px solid #d5dae1; padding: 4px 0; }
+  .steadyslip-told.steadyslip-told .stacks :is(th, td) { display: inline-block; border: 0; padding: 0 14px 0 0; }
+  .steadyslip-told.steadyslip-told .stacks :is(th:first-child, td:first-child) { display: block; }
+  .steadyslip-told .stacks td[data-head]::before { content: attr(data-head) " "; color: #566173; font-size: 13px; }
+}
 @supports not (-moz-appearance: none) { .steadyslip-told msub > :last-child { transform: translateY(.18em); } }
 .steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 6px 0; padding: 4px 0 10px; }
 """  # style sheet for elements inside one of class "steadyslip-told"
@@ -103,18 +116,25 @@ def heading(text: str, level: int = 2) -> str:
 def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = True, caption: str = "") -> str:
     """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of a row is its header.
 
-    Tables with a caption are numbered by the style sheet of a document, as figures are.
+    Tables with a caption are numbered by the style sheet of a document, as figures are. On a narrow screen the rows of
+    one with more than `_NARROW` columns become blocks, with the name of its column before each cell.
     """
     above = f"<caption>{html_text(caption)}</caption>" if caption else ""
     top = f"<thead><tr>{''.join(f'<th scope=col>{html_text(cell)}</th>' for cell in head)}</tr></thead>" if head else ""
+    stacked = len(head) > _NARROW
+    names = [f' data-head="{html_text(cell)}"' if cell else "" for cell in head[1:]] if stacked else []
     lines = []
     for row in rows:
         first, *rest = [cell if isinstance(cell, Markup) else html_text(cell) for cell in row]
         side = f"<th scope=row>{_breakable(first)}</th>" if left else f"<td>{first}</td>"
-        cells = (f"<td{_width_class(cell)}>{cell}</td>" for cell in rest)
+        cells = (
+            f"<td{_width_class(cell)}{name if cell else ''}>{cell}</td>"
+            for cell, name in zip_longest(rest, names[: len(rest)], fillvalue="")
+        )
         lines.append(f"<tr>{side}{''.join(cells)}</tr>")
+    kind = ' class="stacks"' if stacked else ""
     return (
-        f'<div class="wide" tabindex="0"><table>{above}{top}<tbody>{"".join(lines)}</tbody></table></div>'
+        f'<div class="wide" tabindex="0"><table{kind}>{above}{top}<tbody>{"".join(lines)}</tbody></table></div>'
         if lines
         else ""
     )
@@ -192,6 +212,12 @@ def figure(drawing: str, caption: str = "") -> str:
     """HTML figure of a drawing with a caption; empty if the drawing is empty."""
     below = f"<figcaption>{html_text(caption)}</figcaption>" if caption else ""
     return f"<figure>{drawing}{below}</figure>" if drawing else ""
+
+
+def beside(figures: Iterable[str]) -> str:
+    """HTML of figures of one column, two in a row where there is room; empty if all are."""
+    found = [one for one in figures if one]
+    return f'<div class="pair">{"".join(found)}</div>' if found else ""
 
 
 def listing(text: str) -> str:

@@ -17,7 +17,7 @@ from steadyslip.core.records import Address
 from steadyslip.core.roles import PARAMETER_KINDS
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
-from steadyslip.figures.inline import figure_html
+from steadyslip.figures.inline import column_html, figure_html
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
 from steadyslip.machine.letters import letter_of, said, worded, words_of
@@ -27,7 +27,16 @@ from steadyslip.model.build import build_model
 from steadyslip.model.numeric import by_matrices
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import equation as equation_html, figure, heading, inline_math, paragraph, table, why
+from steadyslip.reports.elements import (
+    beside,
+    equation as equation_html,
+    figure,
+    heading,
+    inline_math,
+    paragraph,
+    table,
+    why,
+)
 from steadyslip.reports.recommendation import ORDER, Order, changeable, recommendation
 from steadyslip.reports.sections import (
     assumptions,
@@ -133,17 +142,19 @@ def chart_pairs(analysis: Analysis, order: Order) -> list[tuple[str, str]]:
 
 def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
+    drawn = []
     for x, y in order.charts or chart_pairs(analysis, order)[:2]:
         over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
         words = f"Where sliding is stable over {over}; the dot is this rig."
-        chart = figure_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words, 6.0)  # type: ignore[misc]
-        yield figure(chart, words)
+        chart = column_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words)  # type: ignore[misc]
+        drawn.append(figure(chart, words))
     if analysis.stable is not None:
-        locus = figure_html(lambda: figures.root_locus(rig), "root locus", 6.0)
-        yield figure(
-            locus,
-            f"Eigenvalues of small disturbances as {said(rig, stiffness)} varies; to the right of the axis they grow.",
+        words = (
+            f"Eigenvalues of small disturbances as {said(rig, stiffness)} varies; to the right of the axis they grow."
         )
+        drawn.append(figure(column_html(lambda: figures.root_locus(rig), "root locus"), words))
+    if charts := beside(drawn):
+        yield charts
 
 
 def formula_section(analysis: Analysis) -> Iterator[str]:

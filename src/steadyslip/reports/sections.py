@@ -17,7 +17,7 @@ from steadyslip.core.areas import outside, stress_name
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.records import records_in
-from steadyslip.figures.inline import figure_html
+from steadyslip.figures.inline import column_html
 from steadyslip.linear.formula import MEANINGS
 from steadyslip.machine.letters import letter_of
 from steadyslip.machine.machine import Machine
@@ -28,11 +28,12 @@ from steadyslip.model.legend import legend, letters_in
 from steadyslip.model.numeric import has_structure
 from steadyslip.motion import History
 from steadyslip.motion.status import BLOWN_UP
-from steadyslip.reports.elements import figure, heading, inline_math, paragraph, table, why, with_subscripts
+from steadyslip.reports.elements import beside, figure, heading, inline_math, paragraph, table, why, with_subscripts
 from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, motion_after
+from steadyslip.verdict.words import PACE
 
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
@@ -101,12 +102,18 @@ def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
         return
     faster = f"After the drive was faster by {100 * (STEP - 1):.0f} % for a while"
     yield paragraph(f"{faster}: {_told(run, analysis)}.")
-    words = "Motion after the drive was faster for a while, over time."
-    yield figure(figure_html(lambda: figures.history(run), words, 6.4), words)
+    over = "Motion after the drive was faster for a while, over time."
     words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
     if run.status == BLOWN_UP:
         words = "The same motion in the phase plane, which it leaves to the right."
-    yield figure(figure_html(lambda: figures.phase_plane(run), words, 5.0), words)
+    drawn = (
+        (column_html(lambda: figures.history(run), over), over),
+        (
+            column_html(lambda: figures.phase_plane(run), words),
+            words,
+        ),
+    )
+    yield beside(figure(*one) for one in drawn)
 
 
 def _of_structure(analysis: Analysis) -> str:
@@ -118,7 +125,7 @@ def _of_structure(analysis: Analysis) -> str:
     grows, share = leading.real > 0, STEP - 1
     first = f"a disturbance of the slip rate by {100 * share:.0f} %"
     swings = f"oscillates at {format_quantity(leading.imag / (2 * math.pi), 'Hz')}, " if leading.imag else ""
-    changes = f"{'doubles' if grows else 'halves'} in {format_quantity(math.log(2) / abs(leading.real), 's')}"
+    changes = PACE["grows" if grows else "decays"].format(time=format_quantity(math.log(2) / abs(leading.real), "s"))
     text += f" By its eigenvalues {first} {swings}{changes}"
     if not grows:
         return f"{text} and dies out."

@@ -128,7 +128,7 @@ def _figure_6(ax: Any) -> Any:
         scaled = run["spring_stress"] / run["spring_stress"][0]
         ax.plot(np.log(run["v"] / drive), scaled, color=color, linewidth=1, label=f"ψ = {angle}°".replace("-", "−"))
     ax.plot([0], [1], "o", color=palette.BLACK, markersize=4)
-    ax.set_xlabel("ln(v/v0) (1)")
+    ax.set_xlabel("ln($v/v_0$) (1)")
     ax.set_ylabel("spring stress/its steady value (1)")
     ax.set_title("k = 1.1 k_cr(−45°), start at x = 0, ln(v/v0) = 0.5", fontsize="medium")
     ax.legend(fontsize="small")

@@ -1,6 +1,6 @@
 // Controls of parameters: a slider and a text field each; the slider track has the colour of the status at each value.
 import { CLASSES } from "./chart.js";
-import { make, put, tell } from "./dom.js";
+import { make, put, subscripted, tell } from "./dom.js";
 import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
 import { named } from "./words.js";
@@ -53,7 +53,7 @@ export class Controls {
     text.addEventListener("input", () => tell(taken, this.taken(i)));
     text.addEventListener("blur", () => tell(taken, ""));
     const about = named(one.doc, one.unit); // left out where it says no more than the title
-    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", {}, ...(about.startsWith(one.title.split(" ")[0]) || one.title.endsWith(about) ? [] : subscripted(about))));
+    const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", {}, ...(about.startsWith(one.title.split(" ")[0]) || one.title.endsWith(about) ? [] : numbered(about))));
     return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
   }
 
@@ -122,10 +122,10 @@ function filled({ from, to, status }) {
 }
 
 /** Title of a parameter with its letter, the subscript below the line. @param {any} one */
-export const lettered = ({ title }) => subscripted(title.replace(/ (?=\S+$)/, "\u00a0")); // the letter stays with the last word
+export const lettered = ({ title }) => numbered(title.replace(/ (?=\S+$)/, "\u00a0")); // the letter stays with the last word
 
-/** Text with the subscripts of letters, as in v_ref or σ0, below the line. @param {string} text @returns {(string | Node)[]} */
-const subscripted = (text) => text.replace(/(?<![\p{L}\d_])(\p{L})(?=\d)/gu, "$1_").split(/(?<=(?<![\p{L}\d_])\p{L})_([\p{L}\d]+)/u).map((part, n) => (n % 2 ? make("sub", { textContent: part }) : part));
+/** Text with subscripts, a number behind a letter, as in σ0, among them. @param {string} text */
+const numbered = (text) => subscripted(text.replace(/(?<![\p{L}\d_])(\p{L})(?=\d)/gu, "$1_"));
 
 /** Title of a parameter in a menu, which sets no subscripts: in words, if these name no other. @param {any} one @param {any[]} all */
 export function inMenu({ title }, all) {

@@ -148,7 +148,7 @@ export class Course {
       this.mover.forget();
       const wanted = asked(this.page, this.mover.own, { kind: this.disturbance.value, on: this.on.value, size: this.size.value, length: this.length.value });
       [this.size.placeholder, this.length.placeholder] = wanted.usual;
-      tell(this.file, wanted.file);
+      this.file.textContent = wanted.file;
       this.page.note();
       this.halt.disabled = false;
       this.late = setTimeout(() => (this.told.textContent = "Computing the motion …"), 100);

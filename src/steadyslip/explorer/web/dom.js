@@ -44,7 +44,13 @@ export function putAt(element, places) {
 /** Sentence in which no line ends between a number and its unit. @param {string} text */
 export const unbroken = (text) => text.replace(/(\d) (?=[^\s\d(])/g, "$1\u00a0");
 
-/** Set the text of an element only if it changes. @param {any} element @param {string} text */
+/** Text with the subscripts of letters, as in v_ref, below the line. @param {string} text @returns {(string | Node)[]} */
+export const subscripted = (text) => text.split(/(?<=(?<![\p{L}\d_.])\p{L})_([\p{L}\d]+)/u).map((part, n) => (n % 2 ? make("sub", { textContent: part }) : part));
+
+/** Set the text of an element only if it changes, with subscripts. @param {any} element @param {string} text */
 export function tell(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  if (element.told === text && element.firstChild) return;
+  element.told = text;
+  if (text.includes("_")) element.replaceChildren(...subscripted(text));
+  else element.textContent = text;
 }

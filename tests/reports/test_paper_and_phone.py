@@ -1,0 +1,57 @@
+"""Reports on paper and on a telephone, in a browser."""
+
+import re
+
+import pytest
+
+import steadyslip as ss
+from browser import chromium, driver
+from steadyslip.reports.elements import table
+
+SCROLLED = "[...document.querySelectorAll('.wide')].filter(one => one.scrollWidth > one.clientWidth + 1).length"
+PLACES = """[...document.querySelectorAll('.pair > figure')].map(one => one.getBoundingClientRect())
+.map(({ left, right, top }) => ({ left, right, top }))"""
+SKETCH = "document.querySelector('.sketch, figure > :is(svg, img)').getBoundingClientRect().height"
+PAPER = {"width": 672, "height": 1000}  # CSS pixels, of an A4 page between its margins
+
+
+def texts_on_axes(html):
+    """Sizes in CSS pixels of letters in the first drawing of two beside each other, per CSS pixel of its width."""
+    drawn = re.search(r'<div class="pair"><figure>(<svg.*?</svg>)', html, re.S)[1]
+    width = float(re.search(r'viewBox="0 0 ([\d.]+)', drawn)[1])
+    return [float(size) / width for size in re.findall(r"font(?:-size)?: *([\d.]+)px", drawn)]
+
+
+@pytest.mark.parametrize(("name", "many"), [("inclined-spring", 5), ("machines/brake-pad", 2)])
+def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephone(name, many, tmp_path):
+    """A figure as wide as the page left a quarter of the page before it empty; tables of inputs scrolled sideways."""
+    found = ss.report(ss.analyze(ss.read_rig(f"examples/{name}.toml")), explorer=False)
+    found.save(tmp_path / "a.html")
+    with driver() as play:
+        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        page = browser.new_page(viewport=PAPER)
+        page.goto((tmp_path / "a.html").as_uri())
+        page.emulate_media(media="print")
+        places = page.evaluate(PLACES)
+        sketch = page.evaluate(SKETCH)
+        page.emulate_media(media="screen")
+        page.set_viewport_size({"width": 360, "height": 740})
+        assert page.evaluate(SCROLLED) == 0
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        alone = page.evaluate(PLACES)
+        browser.close()
+    assert len(places) == many
+    assert places[0]["top"] == places[1]["top"]
+    assert places[0]["right"] < places[1]["left"]
+    assert places[1]["right"] <= PAPER["width"]
+    assert sketch < 0.35 * PAPER["height"]
+    assert alone[0]["top"] < alone[1]["top"], "below each other where there is no room"
+    least = 5.8 / 72 * 25.4 / 85  # letters of 5.8 points on a drawing of 85 mm, the smallest of a journal
+    assert min(texts_on_axes(found.html)) >= least
+
+
+def test_cells_of_wide_tables_have_the_names_of_their_columns():
+    html = table([("a", "1 m", "", "2 m")], ("name", "now", "edge", "then"))
+    assert html.count("data-head") == 2, "none before an empty cell"
+    assert '<td class=n data-head="then">2\u00a0m</td>' in html
+    assert "data-head" not in table([("a", "1 m")], ("name", "now"))

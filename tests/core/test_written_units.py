@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from guide_and_seal import GUIDE_AND_SEAL
 from steadyslip.core.format import format_quantity
 
 AXIS = """
@@ -100,3 +101,13 @@ def test_figures_and_fragments_have_them(axis):
     assert "(mm/min)" in chart.get_xlabel()
     assert "(N/µm)" in chart.get_ylabel()
     assert "mm/min" in ss.analyze(axis)._repr_html_()
+
+
+def test_an_edge_and_its_value_are_told_at_the_load_of_their_contact():
+    """Two contacts, each with a load: 4 s/m at 60 N are .24 N s/mm, and the seal has no load of 500 N."""
+    rig = ss.rig_from_text(GUIDE_AND_SEAL)
+    for text, then in ((str(ss.analyze(rig)), " +-> "), (str(ss.cure(rig)), " now; from ")):
+        assert re.search(rf"guide\.friction\.viscous +0\.25 N s/mm at 500 N{then}[\d.]+ N s/mm at 500 N", text)
+        assert re.search(rf"seal\.friction\.viscous +0\.24 N s/mm at 60 N{then}[\d.]+ N s/mm at 60 N", text)
+    assert rig.load_of("contacts.seal.friction.viscous") == 60.0
+    assert rig.load_of("bodies.carriage.mass") is None

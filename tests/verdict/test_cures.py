@@ -117,7 +117,7 @@ def test_a_stable_rig_is_told_what_makes_it_fail_first(axis):
 
 
 def test_the_command_reads_what_may_be_adjusted(axis, tmp_path):
-    axis.write_text(f'{AXIS}[adjust]\nvelocity = {{ to = "200 mm/min" }}\nstiffness = {{ cost = 9 }}\n')
+    axis.write_text(f'{AXIS}[adjust]\nvelocity = {{ to = "200 mm/min" }}\nstiffness = {{ cost = 40 }}\n')
     page = tmp_path / "cures.html"
     done = run("cure", axis, "--sure", "90 %", "-o", page)
     assert "cheapest single change: drive.velocity from 0.5 mm/min to" in done.stdout
@@ -191,3 +191,18 @@ def test_rigs_with_a_delay_are_drawn_less_often():
     """Each takes some hundredths of a second: of 4 096 an analysis took minutes, a cure hours."""
     axis = ss.read_rig("examples/machines/feed-axis.toml", ["drive.delay=0.4 ms"])
     assert chances_of(axis, {"drive.kp": "5 %"}).sizes == (4, 1, 0)
+
+
+def test_a_slower_feed_is_dearer_than_a_part_and_far_edges_are_named(axis):
+    """A quarter of the feed and four times the stiffness are as far, but a machine is built for its feed."""
+    block, _ = rig_and_tolerances(axis)
+    plain = {"drive.velocity": Adjustment(), "slider.stiffness": Adjustment()}
+    found = {one.parameter: one for one in ss.cure(block, adjust=plain).windows}
+    for name, each in (("drive.velocity", 4.0), ("slider.stiffness", 1.0)):
+        assert found[name].cost == pytest.approx(each * abs(math.log2(found[name].nearest / found[name].value)))
+    low, high = found["slider.stiffness"].nearest, 0.9 * found["slider.stiffness"].nearest
+    text = str(ss.cure(block, adjust=plain | {"slider.stiffness": Adjustment(high=high)}))
+    assert "\nno change of a part alone reaches it, another speed does: drive.velocity from 0.5 mm/min to" in text
+    edge = re.search(r"beyond the range: the rig itself is stable above ([\d.]+) N/um$", text, re.MULTILINE)
+    assert 1e6 * float(edge[1]) == pytest.approx(low * block.area, rel=1e-3)
+    assert "cheapest single change: slider.stiffness" in str(ss.cure(block, adjust=plain))

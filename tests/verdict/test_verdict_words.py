@@ -218,6 +218,20 @@ def test_all_speeds_at_which_an_axis_is_stable_are_told():
 
 
 @pytest.mark.parametrize(
+    ("path", "told"),
+    [
+        ("examples/machines/geared-servo.toml", r"stable speeds +above 3\.587 mm/s\n"),
+        ("examples/machines/feed-axis.toml", r"stable speeds +all \(searched from \S+ rpm to \S+ rpm\)\n"),
+    ],
+)
+def test_speeds_are_told_where_one_edge_parts_them_or_none(path, told):
+    found = ss.analyze(ss.read_rig(path))
+    assert re.search(told, str(found))
+    edges = next(one.edges for one in found.margins if one.parameter == "drive.velocity")
+    assert [f"{1e3 * edge.value:.4g}" for edge in edges] == (["3.587"] if found.stable is False else [])
+
+
+@pytest.mark.parametrize(
     ("contact", "told"),
     [
         (ss.laws.InclinedSpring(preload=5e6, angle=-0.4), True),

@@ -10,7 +10,7 @@ from functools import lru_cache
 from steadyslip import units
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
-from steadyslip.core.written import display_names
+from steadyslip.core.written import display_load, display_names
 
 _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "N s/mm"))}
 """Units of the force of bristles and of viscous friction, by the dimension that they have per load."""
@@ -38,6 +38,15 @@ def _is_own(name: str) -> bool:
         word not in PREFIXABLE or (word not in PLAIN_WORDS and (power < 0 or power > 1))
         for word, power in factors(name)
     )
+
+
+def _at_one_load(names: tuple[str, ...], load: float | None) -> tuple[str, ...]:
+    """Those units that are at the load nearest to `load` (N), or at the largest; all where none is at a load."""
+    if len(names) < 2 or " at " not in names[0]:
+        return names
+    sizes = {name: 1 / unit(f"1 at {name.partition(' at ')[2]}")[0] for name in names}
+    nearest = min(sizes.values(), key=lambda one: abs(math.log(one / load)) if load else -one)
+    return tuple(name for name in names if sizes[name] == nearest)
 
 
 def _best(value: float, names: tuple[str, ...]) -> str | None:
@@ -71,7 +80,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
-    names = own_units(display_names()).get(unit(si_unit)[1], ())
+    names = _at_one_load(own_units(display_names()).get(unit(si_unit)[1], ()), display_load())
     own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
     if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < _LONGEST):

@@ -11,6 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _names: ContextVar[frozenset[str]] = ContextVar("names of units", default=frozenset())
+_load: ContextVar[float | None] = ContextVar("load of a contact", default=None)
 
 
 def display_names() -> frozenset[str]:
@@ -24,7 +25,8 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
 
     They are added to those of the context around. Of several units of a dimension the one is used whose number is
     closest to 10. Units that differ from the default by a leading prefix alone, such as kN or um/s, have no effect,
-    since a suitable prefix is chosen in any case. Friction per load is told at the loads that are named, if any are.
+    since a suitable prefix is chosen in any case. Friction per load is told at
+    the largest load that is named, or that which `of_load` picks.
 
     >>> from steadyslip.core.format import format_quantity
     >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
@@ -38,6 +40,27 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
         yield
     finally:
         _names.reset(before)
+
+
+def display_load() -> float | None:
+    """Load of the contact of which quantities are told, N; None if it is not known."""
+    return _load.get()
+
+
+@contextmanager
+def of_load(load: float | None) -> Iterator[None]:
+    """Context in which friction per load is told at the one of several loads that is nearest to that of its contact, N.
+
+    >>> from steadyslip.core.format import format_quantity
+    >>> with display_units(["N/um at 500 N", "N/um at 60 N"]), of_load(70.0):
+    ...     format_quantity(1000.0, "1/m"), format_quantity(1e5, "1/m")
+    ('0.06 N/um at 60 N', '6 N/um at 60 N')
+    """
+    before = _load.set(load)
+    try:
+        yield
+    finally:
+        _load.reset(before)
 
 
 def in_written_units(make: Callable[_P, _T]) -> Callable[_P, _T]:

@@ -150,6 +150,15 @@ class Rig(FrozenRecord, Keeper):
         """Area (m²) if this parameter is printed as a total of the contact; None where contacts have own areas."""
         raise NotImplementedError
 
+    def load_of(self, name: str) -> float | None:
+        """Force that presses the contact whose parameter this is, N; None of other parameters, or without an area."""
+        for prefix, _, _, own in self.laws_by_contact().values():
+            area = 1.0 if self.in_forces and own is None else self.area if own is None else own
+            pressed = next((n for n in self.of_kind("normal stress") if n.startswith(prefix)), "")
+            if pressed and area is not None and name.startswith(prefix):
+                return abs(self.parameters()[pressed].value or 0.0) * area or None
+        return None
+
     def parameters(self) -> dict[str, Address]:
         """Parameters of the rig by dotted name: role, with the user's unit, and value (cached)."""
         return dict(_parameters(self))

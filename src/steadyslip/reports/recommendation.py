@@ -130,7 +130,7 @@ def _windows(found: Cures, at: str) -> Iterator[str]:
     able = sorted((one for one in found.windows if one.windows), key=lambda one: one.cost)
     rows = [(said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
     words = "Values that are enough, each alone, the others unchanged, the cheapest first. "
-    cost = "A cost of 1 is that of doubling or halving a value, unless the rig file gives another."
+    cost = "A cost of 1 is that of doubling or halving a value, 4 of the speed, unless the rig file gives another."
     yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
     if without := [said(rig, one.parameter) for one in found.windows if not one.windows]:
         yield paragraph(f"Not enough alone, whatever the value within range: {', '.join(without)}.", "small")

@@ -12,9 +12,8 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.format import format_percent, format_quantity, format_range
+from steadyslip.core.format import format_percent
 from steadyslip.core.options import Tested, checked
-from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
 from steadyslip.linear.boundary import REMOTE, boundary, searched
@@ -22,13 +21,13 @@ from steadyslip.linear.status import stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.chances import Chances, chances_of
+from steadyslip.verdict.cure_window import LEAST, Window, distance
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.tolerances import GIVEN, format_chance
 
 DECADES = 3.0  # searched to each side of a value without limits
 SCANNED, COARSE = 97, 17  # values along one parameter, and of each of a pair: by trial, time against windows missed
 FROM_ZERO = 145  # values of a parameter that is zero, over the twelve decades that `boundary` searches
-LEAST = 1e-12  # smallest of these values over the largest
 BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is looked at too
 HALVINGS, FEW_HALVINGS = 52, 12  # of a bracket: to the last digit of one rig, to 1e-5 of many
 NEAR = np.linspace(-0.02, 0.02, 5)  # relative places about an edge where the whole sample is judged
@@ -40,81 +39,14 @@ DESIGN = (
     (PRELOAD,), ("viscous",),
 )  # fmt: skip
 """What a designer chooses, in the order of asking: speed, stiffness, damping, mass, preload, lubricant."""
+SPEED = "drive.velocity"
+SPEED_COST = 4.0
+"""Cost of doubling or halving the speed over that of a part, where none is given: a machine is built for its speed."""
 OWN_VALUES = "without tolerances this is of the rig's own values, whatever chance is asked for"
 SURE = Tested(
     "a chance between 0 and 1, or text such as '95 %'",
     lambda v: isinstance(v, str) or (isinstance(v, (int, float)) and not isinstance(v, bool) and 0 < v <= 1),
 )
-
-
-@dataclass(frozen=True)
-class Window(Displayed):
-    """Values of one parameter at which the chance is reached, the others unchanged.
-
-    Attributes
-    ----------
-    parameter, unit : str
-    value : float
-        The rig's own.
-    windows : tuple of (float, float)
-        Rising; an end that is one of `limits` is no edge.
-    limits : tuple of float
-        Range that was searched.
-    cost : float
-        Of the change to the nearest window; 0 inside one, infinite if there is none.
-    """
-
-    parameter: str
-    unit: str
-    value: float
-    windows: tuple[tuple[float, float], ...]
-    limits: tuple[float, float]
-    cost: float
-    area: float | None = field(default=None, repr=False)
-    told: tuple[float, str] | None = field(default=None, repr=False)
-    """Factor and unit in which the values are told; those of `Rig.told`."""
-
-    @property
-    def nearest(self) -> float | None:
-        """End of a window nearest to the rig's own value; None inside a window or without one."""
-        if not self.windows or any(low <= self.value <= high for low, high in self.windows):
-            return None
-        return min((end for one in self.windows for end in one), key=lambda end: distance(self.value, end))
-
-    @property
-    def leaves(self) -> float | None:
-        """Nearest edge of the window around the rig's own value; None if it is in none, or if that has no edge."""
-        for ends in self.windows:
-            if ends[0] <= self.value <= ends[1]:
-                edges = [end for end in ends if end not in self.limits]
-                return min(edges, key=lambda end: distance(self.value, end), default=None)
-        return None
-
-    def __str__(self) -> str:
-        if not self.windows:
-            return "not reached from {} to {}".format(*map(self.written, self.limits))
-        return "; ".join(self._window(*one) for one in self.windows)
-
-    def _window(self, low: float, high: float) -> str:
-        if low == self.limits[0]:
-            return (
-                f"at every value up to {self.written(high)}"
-                if high == self.limits[1]
-                else f"up to {self.written(high)}"
-            )
-        if high == self.limits[1]:
-            return f"from {self.written(low)} up"
-        factor, unit = self.told or (1.0, self.unit)
-        if not self.limits[0]:  # of what was zero the low end may be, too
-            return f"{self.written(low)} to {self.written(high)}"
-        return format_range(low * factor, high * factor, unit, area=self.area)
-
-    def written(self, value: float) -> str:
-        """Format a value of the parameter."""
-        if 0 == self.limits[0] < value < LEAST * self.limits[1]:
-            return "anything above 0"  # the edge is zero itself, as of what damps an undamped machine
-        factor, unit = self.told or (1.0, self.unit)
-        return format_quantity(value * factor, unit, area=self.area)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,9 +104,9 @@ class Cures(ReadOnly):
             return "\n".join([*found, *alone])
         lines = [f"To be {wanted} (now {now})", *alone]
         if (best := self.best) is not None:
-            lines.append(
-                f"cheapest single change: {best.parameter} {_change(best, best.nearest)}, cost {best.cost:.3g}"
-            )
+            alone = best.parameter == SPEED and not any(one.nearest for one in self.windows if one is not best)
+            first = "no change of a part alone reaches it, another speed does" if alone else "cheapest single change"
+            lines.append(f"{first}: {best.parameter} {_change(best, best.nearest)}, cost {best.cost:.3g}")
         else:
             lines.append("no single change reaches it")
         if self.pair:
@@ -193,7 +125,7 @@ class Cures(ReadOnly):
             return {
                 "parameter": one.parameter, "unit": one.unit, "value": one.value, "limits": list(one.limits),
                 "windows": [list(ends) for ends in one.windows], "cost": one.cost, "nearest": one.nearest,
-                "leaves": one.leaves,
+                "leaves": one.leaves, "beyond": None if one.beyond is None else list(one.beyond),
             }  # fmt: skip
 
         found: dict[str, Any] = finite(
@@ -214,11 +146,6 @@ def _change(one: Window, to: float | None) -> str:
     return f"from {one.written(one.value)} to {one.written(to)}"
 
 
-def distance(value: float, other: float) -> float:
-    """Doublings from one value to another; 1 from or to zero, or through it."""
-    return abs(math.log2(other / value)) if value * other > 0 else float(value != other)
-
-
 @checked(tolerances=GIVEN, sure=SURE)
 def cure(
     rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances | None = None, *, sure: float | str = 0.95,
@@ -235,7 +162,8 @@ def cure(
         The chance, such as ``"95 %"``.
     adjust : mapping of str to Adjustment, optional
         What may be changed; by default that of `tolerances`, or else what a designer chooses: speed, stiffness,
-        damping, mass, preload and lubricant, within three decades to each side, each doubling at cost 1.
+        damping, mass, preload and lubricant, within three decades to each side. Each doubling costs 1, of the speed
+        4, unless a cost is given.
 
     Returns
     -------
@@ -342,7 +270,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
     values = _scan(chances, name, (low, high))
     unit, about = (
         chances.rig.parameters()[name].role.unit,
-        (chances.rig.printed_area(name), chances.rig.told(name, 1.0)),
+        (chances.rig.printed_area(name), chances.rig.told(name, 1.0), chances.rig.load_of(name)),
     )
     if not values.size:
         return Window(name, unit, chances.own(name), (), (low, high), math.inf, *about)
@@ -362,8 +290,26 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
     )
     found = Window(name, unit, chances.own(name), windows, (float(values[0]), float(values[-1])), 0.0, *about)
     if not windows:
-        return replace(found, cost=math.inf)
-    return found if found.nearest is None else replace(found, cost=one.cost * distance(found.value, found.nearest))
+        return replace(found, cost=math.inf, beyond=_beyond(chances, name, (low, high)))
+    if found.nearest is None:
+        return found
+    return replace(found, cost=_unit_cost(name, one) * distance(found.value, found.nearest))
+
+
+def _unit_cost(name: str, one: Adjustment) -> float:
+    """Cost of doubling or halving a parameter."""
+    return one.cost if one.cost is not None else SPEED_COST if name == SPEED else 1.0
+
+
+def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[str, float] | None:
+    """Side and value of the nearest edge outside the limits beyond which the rig itself is stable."""
+    try:
+        edges = boundary(chances.rig, name)
+    except (NotAvailable, ParameterError):
+        return None
+    outside = {"above": lambda value: value > limits[1], "below": lambda value: value < limits[0]}
+    found = [(one.stable, one.value) for one in edges if one.stable in outside and outside[one.stable](one.value)]
+    return min(found, key=lambda one: distance(chances.own(name), one[1]), default=None)
 
 
 def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first: Array, halvings: int) -> Array:
@@ -429,7 +375,7 @@ def _cheapest_pair(
 
 def _cost(chances: Chances, adjust: Mapping[str, Adjustment], name: str, to: Array) -> Array:
     far = [distance(chances.own(name), float(one)) for one in np.atleast_1d(to)]
-    return np.asarray(adjust[name].cost * np.array(far))
+    return np.asarray(_unit_cost(name, adjust[name]) * np.array(far))
 
 
 def _coarse(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
 from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.written import of_load
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.machine.letters import said
 from steadyslip.verdict.reasons import NEXT_TO_IT
@@ -100,13 +101,15 @@ def headline(analysis: Findings, capitals: bool = True) -> str:
 
 def told(rig: Rig, name: str, value: float) -> str:
     """Value of a parameter in words."""
-    return format_quantity(*rig.told(name, value), area=rig.printed_area(name))
+    with of_load(rig.load_of(name)):
+        return format_quantity(*rig.told(name, value), area=rig.printed_area(name))
 
 
 def told_range(rig: Rig, name: str, low: float, high: float) -> str:
     """Range of a parameter in words."""
     (first, unit), (last, _) = rig.told(name, low), rig.told(name, high)
-    return format_range(first, last, unit, rig.printed_area(name))
+    with of_load(rig.load_of(name)):
+        return format_range(first, last, unit, rig.printed_area(name))
 
 
 def is_undecided(analysis: Findings) -> bool:
@@ -115,10 +118,18 @@ def is_undecided(analysis: Findings) -> bool:
 
 
 def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
-    """Row (label, text) of all drive velocities at which sliding is stable; none if there is one edge at most."""
-    margin = next((one for one in analysis.margins if one.parameter == "drive.velocity"), None)
-    if margin is None or len(margin.edges) < 2:
+    """Row (label, text) of all drive velocities at which sliding is stable.
+
+    None where they were not searched, and of a rig in stresses whose stability does not depend on them.
+    """
+    rig, margin = analysis.rig, next((one for one in analysis.margins if one.parameter == "drive.velocity"), None)
+    if margin is None:
         return []
+    if not margin.edges:
+        if analysis.stable is None or analysis.on_edge or not (rig.in_forces or rig.area is not None):
+            return []
+        low, high = (told(analysis.rig, margin.parameter, end) for end in margin.searched)
+        return [("stable speeds", f"{'all' if analysis.stable else 'none'} (searched from {low} to {high})")]
     ends = [0.0, *(edge.value for edge in margin.edges), math.inf]
     below = [edge.stable == "below" for edge in margin.edges] + [False]
     above = [False] + [edge.stable == "above" for edge in margin.edges]

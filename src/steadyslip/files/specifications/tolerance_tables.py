@@ -35,13 +35,13 @@ class Adjustment(Displayed):
     ----------
     low, high : float or None
         Limits, SI units; None for those of the search.
-    cost : float
-        Of doubling or halving the value; other changes in proportion to their logarithm.
+    cost : float or None
+        Of doubling or halving the value; other changes in proportion to their logarithm. None for 1, of the speed 4.
     """
 
     low: float | None = None
     high: float | None = None
-    cost: float = 1.0
+    cost: float | None = None
 
 
 @dataclass(frozen=True)
@@ -175,10 +175,10 @@ class _Reader:
                 if key not in _KEYS:
                     self._problem(f"{where}.{key}", unknown_name("key", key, _KEYS))
             low, high = (self._limit(name, raw.get(key), f"{where}.{key}") for key in ("from", "to"))
-            cost = self._read(Parameter("1", nonnegative, "").checked, raw.get("cost", 1.0), where)
+            cost = self._read(Parameter("1", nonnegative, "").checked, raw["cost"], where) if "cost" in raw else None
             if low is not None and high is not None and not low < high:
                 self._problem(where, "from must be below to; exchange the two")
-            found[name] = Adjustment(low, high, 1.0 if cost is None else cost)
+            found[name] = Adjustment(low, high, cost)
         return found
 
     def _limit(self, name: str, raw: Any, where: str) -> float | None:

@@ -1,0 +1,96 @@
+"""Values of one parameter at which a rig is stable with a chance that is asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.pages import Displayed
+from steadyslip.core.written import of_load
+
+LEAST = 1e-12  # smallest value searched over the largest, of a parameter that is zero
+
+
+@dataclass(frozen=True)
+class Window(Displayed):
+    """Values of one parameter at which the chance is reached, the others unchanged.
+
+    Attributes
+    ----------
+    parameter, unit : str
+    value : float
+        The rig's own.
+    windows : tuple of (float, float)
+        Rising; an end that is one of `limits` is no edge.
+    limits : tuple of float
+        Range that was searched.
+    cost : float
+        Of the change to the nearest window; 0 inside one, infinite if there is none.
+    """
+
+    parameter: str
+    unit: str
+    value: float
+    windows: tuple[tuple[float, float], ...]
+    limits: tuple[float, float]
+    cost: float
+    area: float | None = field(default=None, repr=False)
+    told: tuple[float, str] | None = field(default=None, repr=False)
+    """Factor and unit in which the values are told; those of `Rig.told`."""
+    load: float | None = field(default=None, repr=False)
+    beyond: tuple[str, float] | None = None
+    """Side (above, below) and value of an edge outside `limits`, beyond which the rig without tolerances is stable."""
+
+    @property
+    def nearest(self) -> float | None:
+        """End of a window nearest to the rig's own value; None inside a window or without one."""
+        if not self.windows or any(low <= self.value <= high for low, high in self.windows):
+            return None
+        return min((end for one in self.windows for end in one), key=lambda end: distance(self.value, end))
+
+    @property
+    def leaves(self) -> float | None:
+        """Nearest edge of the window around the rig's own value; None if it is in none, or if that has no edge."""
+        for ends in self.windows:
+            if ends[0] <= self.value <= ends[1]:
+                edges = [end for end in ends if end not in self.limits]
+                return min(edges, key=lambda end: distance(self.value, end), default=None)
+        return None
+
+    def __str__(self) -> str:
+        if not self.windows:
+            text = "not reached from {} to {}".format(*map(self.written, self.limits))
+            if self.beyond is None:
+                return text
+            side, value = self.beyond
+            return f"{text}; beyond the range: the rig itself is stable {side} {self.written(value)}"
+        return "; ".join(self._window(*one) for one in self.windows)
+
+    def _window(self, low: float, high: float) -> str:
+        if low == self.limits[0]:
+            return (
+                f"at every value up to {self.written(high)}"
+                if high == self.limits[1]
+                else f"up to {self.written(high)}"
+            )
+        if high == self.limits[1]:
+            return f"from {self.written(low)} up"
+        factor, unit = self.told or (1.0, self.unit)
+        if not self.limits[0]:  # of what was zero the low end may be, too
+            return f"{self.written(low)} to {self.written(high)}"
+        with of_load(self.load):
+            return format_range(low * factor, high * factor, unit, area=self.area)
+
+    def written(self, value: float) -> str:
+        """Format a value of the parameter."""
+        if 0 == self.limits[0] < value < LEAST * self.limits[1]:
+            return "anything above 0"  # the edge is zero itself, as of what damps an undamped machine
+        factor, unit = self.told or (1.0, self.unit)
+        with of_load(self.load):
+            return format_quantity(value * factor, unit, area=self.area)
+
+
+def distance(value: float, other: float) -> float:
+    """Doublings from one value to another; 1 from or to zero, or through it."""
+    return abs(math.log2(other / value)) if value * other > 0 else float(value != other)

@@ -1,5 +1,6 @@
 """A servo that follows a step of the rate late: found in the displacement, followed by the model, named."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -7,8 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import steadyslip as ss
-from servo_records import record, response
+from servo_records import WAYS, record, response
+from steadyslip.experiments.fitting import fit as fitting
 from steadyslip.experiments.loading.kinks import load_course
+from steadyslip.experiments.loading.loading import raised
 from steadyslip.experiments.loading.servo import overshoot, ramps, rate_share, settling, travel
 
 SERVOS = [(0.3, 50.0), (0.2, 1.0), (0.05, 0.3), (0.5, 0.7)]
@@ -177,6 +180,74 @@ def test_a_load_point_that_follows_in_another_way_is_taken_as_measured(way, law)
     assert np.max(np.abs(z)) < 3
 
 
+@pytest.mark.parametrize("way", ["stick", "two times"])
+def test_shapes_that_pieces_may_have_spread_as_these_are_off(way):
+    """Six records: rms deviation of the displacement around changes over the standard deviation of its shapes."""
+    off, (time, moved) = [], displacement(0, 0, 0, 0.0, 10)
+    for at, by in ((40.13, 9e-6), (80.37, -9e-6)):  # the ways in place of steps
+        fine = np.linspace(0, 120, 120_001)
+        beyond = WAYS[way](fine - at) - (fine > at)
+        moved = moved + by * np.interp(time, fine, np.cumsum(beyond) * 1e-3)
+    for seed in range(6):
+        noise = 5e-8 * np.random.default_rng(seed).standard_normal(len(time))
+        course = load_course(time, moved + noise).otherwise
+        shapes = np.array([one.integral(time) for one in raised(course)]) - course.integral(time)
+        away = course.integral(time) - (moved - moved[0])
+        before = time < 38
+        shapes, away = shapes - np.mean(shapes[:, before], axis=1, keepdims=True), away - np.mean(away[before])
+        near = (np.abs(time - 40.6) < 2) | (np.abs(time - 80.8) < 2)
+        off.append((away / np.sqrt(np.sum(shapes**2, axis=0)))[near])
+    assert 0.75 < np.sqrt(np.mean(np.square(off))) < 1.3
+
+
+def test_loads_run_together_are_those_run_one_by_one():
+    fit, _ = fitted_in_pieces("stick", 7)
+    (part,), (load,) = fit.comparison.parts, (loading.load for loading in fit.plan.loading)
+    loads = [load, *list(raised(load))[::20]]
+    together = part.driven_by(np.array(list(fit.values.values())), loads)
+    for own, course in zip(together, loads, strict=True):
+        plan = replace(fit.plan, loading=(replace(fit.plan.loading[0], load=course),))
+        np.testing.assert_allclose(own, plan.comparison().model(fit.coordinates[None])[0][0], atol=1e-8)
+    assert np.max(np.abs(together - together[0])) > 1e-6
+
+
+@pytest.mark.parametrize("fails", ["pieces", "all"])
+def test_steps_are_tried_where_pieces_cannot_be_followed(monkeypatch, fails):
+    """Such a record was refused."""
+    found, _ = record(7, way="stick")
+    search = fitting.find_minimum
+
+    def fails_along(plan, *args):
+        if fails == "all" or any(change.pieces for _, _, change in plan.loading[0].changes):
+            raise ss.NotAvailable("the model cannot follow these records")
+        return search(plan, *args)
+
+    monkeypatch.setattr(fitting, "find_minimum", fails_along)
+    if fails == "pieces":
+        fit = fitting.search_fit(ss.lab_rig("slip"), found)
+        assert not any(change.pieces for _, _, change in fit.plan.loading[0].changes)
+        return
+    with pytest.raises(ss.NotAvailable, match="along neither these nor its own course there: the model cannot follow"):
+        ss.fit(ss.lab_rig("slip"), found)
+
+
+def test_a_load_point_given_by_thousands_of_rows_is_followed():
+    """Motions were given up as too slow: steps were allowed by the number of samples, not by rows of the protocol."""
+    found, source = record(7, way="creep")
+    fine = np.linspace(0.0, 169.9, 12_000)
+    table = ss.protocol.LoadPointTable(time=tuple(fine), displacement=tuple(np.interp(fine, *ramped())))
+    fit = ss.fit(ss.lab_rig("slip", velocity=1e-6), found, protocol=table, starts=3)
+    assert fit["slider.stiffness"].value == pytest.approx(source.value("slider.stiffness"), rel=0.05)
+
+
+def ramped():
+    """Time and place of a load point that creeps to its rates."""
+    fine, rate = np.linspace(0.0, 170.0, 170_001), 1e-6
+    for at, by in ((60.13, 9e-6), (110.37, -9e-6)):
+        rate = rate + by * WAYS["creep"](fine - at)
+    return fine, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 1e-3)])
+
+
 def test_friction_tells_a_glitch_at_a_step_from_a_late_load_point():
     found, source = record(7)
     glitch = 2e-6 * np.exp(-0.5 * ((found.time - 60.4) / 0.3) ** 2)
@@ -191,4 +262,6 @@ def test_a_fit_with_a_late_load_point_is_saved_and_read(tmp_path, saved):
     fit.save(tmp_path / "fit.nc")
     again = ss.load_fit(tmp_path / "fit.nc")
     assert str(again) == str(fit)
+    for own, other in zip(*(one.plan.loading[0].load.shapes for one in (fit, again)), strict=True):
+        assert np.array_equal(np.concatenate([own[0], *own[1]]), np.concatenate([other[0], *other[1]]))
     assert again.residuals == pytest.approx(fit.residuals, abs=0)

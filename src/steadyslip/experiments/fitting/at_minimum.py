@@ -14,7 +14,7 @@ from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
 from steadyslip.experiments.fitting.valleys import along_valleys
-from steadyslip.experiments.loading.loading import shifted
+from steadyslip.experiments.loading.loading import raised, shifted
 from steadyslip.experiments.numerics.noise import describe, white
 
 ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
@@ -25,6 +25,14 @@ def _level_uncertainty(plan: Plan, comparison: Comparison, z: Array, rows: Array
     """Covariance (p, p) of Jᵀr that comes from the uncertain levels of velocity and normal stress in the records."""
     found = np.zeros((len(z), len(z)))
     predicted: Array | None = None
+    values = comparison.space.values(z[None])[0]
+    for loading, part, where in zip(plan.loading, comparison.parts, comparison.slices, strict=True):
+        loads = () if loading.load is None else tuple(raised(loading.load))
+        if loads and loading.load is not None:
+            models = part.driven_by(values, [loading.load, *loads])
+            pushes = ((models[1:] - models[0]) * part.weights) @ rows[:, where].T
+            pushes = pushes[np.all(np.isfinite(pushes), axis=1)]
+            found += pushes.T @ pushes
     for i, loading in enumerate(plan.loading):
         for moved in shifted(loading, plan.pressed):
             if predicted is None:

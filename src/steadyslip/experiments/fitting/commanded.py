@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -99,6 +100,11 @@ class CommandedInputs:
         found += [(-1, "lag")] if self.lag else []
         return found + ([(-1, "hold")] if self.resting is not None else [])
 
+    def table_of(self, times: Array, loads: Sequence[Course]) -> InputTable:
+        """Input table (loads, ...) for values of the free times (free,) and other load points, whose levels and shares
+        alone differ."""  # fmt: skip
+        return _ManyLoads(self, loads).table(np.tile(times, (len(loads), 1)))
+
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """Input table for values of the free times (jobs, free), s; see `MeasuredInputs.table`."""
         if not self.free:
@@ -174,15 +180,15 @@ class CommandedInputs:
     def _fill(self, rows: Array, nodes: Array, begins: Array, lengths: Array, curves: dict[str, Array]) -> None:
         """Set the values and slopes of the inputs on every row of the table."""
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
-        for channel, course in self.courses.items():
-            before = np.full(middle.shape, course.first - self.base[channel])
+        for channel in self.courses:
+            before = self._first(channel) - self.base[channel] + np.zeros(middle.shape)
             after = before.copy()
-            for j, (i, (_, ramped, share)) in enumerate(self.ramps):
-                own, _, change = self.changes[i]
-                if own != channel:
+            heights = self._heights(channel)
+            for j, (i, (_, ramped, _)) in enumerate(self.ramps):
+                if self.changes[i][0] != channel:
                     continue
                 begin, length = begins[:, j : j + 1], lengths[:, j : j + 1]
-                height = share * (change.after - change.before)
+                height = heights[:, j : j + 1]
                 if ramped > 0:
                     length = np.maximum(length, MIN_RAMP * np.ptp(self.time))
                     before += height * np.clip((nodes[:, :-1] - begin) / length, 0.0, 1.0)
@@ -192,7 +198,7 @@ class CommandedInputs:
                     before += gone
                     after += gone
             if channel == "load" and self.resting is not None:
-                before[:, 0] = after[:, 0] = self.resting
+                before[:, 0] = after[:, 0] = self._rates_before_rest()
             if channel in curves:
                 before, after = before + curves[channel][:, :-1], after + curves[channel][:, 1:]
             spacing = nodes[:, 1:] - nodes[:, :-1]
@@ -200,6 +206,19 @@ class CommandedInputs:
             slope = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
             rows[:, :, 3 + column] += sign * before
             rows[:, :, 3 + self.inputs + column] += sign * slope
+
+    def _first(self, channel: str) -> Array:
+        """First level, (jobs or 1, 1)."""
+        return np.array([[self.courses[channel].first]])
+
+    def _heights(self, channel: str) -> Array:
+        """Heights of all ramps, (jobs or 1, ramps); of other channels any."""
+        found = [share * (self.changes[i][2].after - self.changes[i][2].before) for i, (_, _, share) in self.ramps]
+        return np.array(found).reshape(1, -1)
+
+    def _rates_before_rest(self) -> Array | float | None:
+        """Rate of the load point before the rest with which the record begins, (jobs,) or one for all, m/s."""
+        return self.resting
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
         """Derivatives of the inputs at fixed times in the free times of ramps, (jobs, directions, rows, inputs)."""
@@ -219,6 +238,33 @@ class CommandedInputs:
                 column, sign = self.columns_and_signs[channel]
                 rates[:, first + k, :, column] += np.where((share > 0) & (share < 1), sign * slope, 0.0)
         return rates
+
+
+class _ManyLoads(CommandedInputs):
+    """Input tables of several load points that differ in levels and shares, one for each job."""
+
+    def __init__(self, like: CommandedInputs, loads: Sequence[Course]) -> None:
+        self.__dict__.update(vars(like))
+        self.loads = loads
+
+    def _first(self, channel: str) -> Array:
+        own = super()._first(channel)
+        return own if channel != "load" else np.array([[one.first] for one in self.loads])
+
+    def _heights(self, channel: str) -> Array:
+        if channel != "load":
+            return super()._heights(channel)
+        own = [k for k, (of, _, _) in enumerate(self.changes) if of == "load"]
+        found = np.zeros((len(self.loads), len(self.ramps)))
+        for j, load in enumerate(self.loads):
+            for k, change in zip(own, load.changes, strict=True):
+                found[j, self._ramps_of(k)] = [share * (change.after - change.before) for _, _, share in change.ramps]
+        return found
+
+    def _rates_before_rest(self) -> Array | float | None:
+        if self.resting is None:
+            return None
+        return np.array([next(level for level in one.levels.tolist() if level > 0) for one in self.loads])
 
 
 def time_windows(changes: list[tuple[str, int, Change]]) -> list[tuple[float, float, float]]:

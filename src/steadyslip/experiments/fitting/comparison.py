@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.errors import InternalError
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.forward import Forward, InputTable
 from steadyslip.experiments.fitting.input_tables import MeasuredInputs, ProtocolInputs, Sharp
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.loading.loading import Loading, resting_rate
+from steadyslip.experiments.loading.loading import Course, Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
@@ -70,6 +71,23 @@ class RecordPart:
         """The model without derivatives, which runs several times as fast."""
         own = self.forward
         return Forward(own.rig, own.names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort)
+
+    def driven_by(self, values: Array, loads: Sequence[Course]) -> Array:
+        """Friction (loads, n), without a trend, at values (p,) of the unknowns for other load points of the same times.
+
+        All are run at once, without derivatives.
+        """
+        if not isinstance(self.inputs, CommandedInputs):
+            raise InternalError("only the commanded loading has other courses")
+        own = self.forward
+        names = (*own.names, "drive.velocity")
+        forward = Forward(own.rig, names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort)
+        rates = [next(level for level in one.levels.tolist() if level > 0) if one.first == 0 else one.first
+                 for one in loads]  # fmt: skip
+        given = np.column_stack([np.tile(values[list(self.rig_indices)], (len(loads), 1)), rates])
+        begin = np.tile(values[list(self.begin_indices)], (len(loads), 1))
+        table = self.inputs.table_of(values[list(self.time_indices)], loads)
+        return np.asarray(forward.run(table, given, given, begin)[:, 0])
 
 
 class DataComparison:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import checked
 from steadyslip.experiments.fitting.at_minimum import fit_with_errors
 from steadyslip.experiments.fitting.effort import Budget, Effort
@@ -178,12 +179,7 @@ def search_fit(
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
     if plan.follows and any(one.load and one.load.otherwise for one in plan.loading):
         many = records if isinstance(records, (list, tuple)) else (records,)
-        commanded = [replace(one, commanded=as_followed(one.loading, False)) for one in many]
-        one = search_fit(rig, list(map(_as_it_follows, many)), free, **search, **options)
-        in_pieces = any(change.pieces for loading in one.plan.loading for _, _, change in loading.changes)
-        if not in_pieces or one.whiteness.p >= STRUCTURE:
-            return one
-        return min(one, search_fit(rig, commanded, free, **search, **options), key=operator.attrgetter("rms"))
+        return _fit_either(rig, many, free, **search, **options)
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
@@ -203,6 +199,31 @@ def search_fit(
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
     return fit_with_errors(Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+
+
+def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | None, **options: Any) -> Fit:
+    """Fit along pieces that follow the load point; where that leaves structure or fails, along the better loading."""
+    fits, problems = [], []
+    for own in (list(map(_as_it_follows, records)), [_as_commanded(one) for one in records]):
+        try:
+            fits.append(search_fit(rig, own, free, **options))
+        except NotAvailable as problem:
+            problems.append(problem)
+            continue
+        changes = [change for loading in fits[-1].plan.loading for _, _, change in loading.changes]
+        if not any(change.pieces for change in changes) or fits[-1].whiteness.p >= STRUCTURE:
+            break
+    if not fits:
+        raise NotAvailable(
+            "the load point lies beside the commanded steps, ramps or servo around changes, and the model follows "
+            f"friction along neither these nor its own course there: {problems[-1]}"
+        ) from problems[-1]
+    return min(fits, key=operator.attrgetter("rms"))
+
+
+def _as_commanded(record: Record) -> Record:
+    """Record whose load point moves as it was commanded, whether or not its displacement is beside that."""
+    return replace(record, commanded=as_followed(record.loading, False))
 
 
 def _as_it_follows(record: Record) -> Record:

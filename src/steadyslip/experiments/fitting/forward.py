@@ -248,7 +248,7 @@ class Forward:
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
         richer = 1 + STEPS_PER_DIRECTION * (len(self.names) + self.shifts + len(self.unsettled))
-        most = int(self.effort.patience * richer * len(table.times)) + 1000
+        most = int(self.effort.patience * richer * max(len(table.times), table.segments.shape[1])) + 1000
         settings[:, Setting.MOST_STEPS] = min(most, max(self.effort.growth * self.slowest, MIN_STEPS))
         settings[:, Setting.FIRST_STEP] = np.inf
         settings[:, Setting.ATOL : Setting.ATOL + size] = self.rtol * scales

@@ -40,7 +40,7 @@ _OPTIONS = {
 }  # fmt: skip
 _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
 _NUMBERS = len(fields(Change)) - 1  # of a change in files, without its pieces; 8 before there were lags
-_COURSE = (float, [[float]], [float], [_CURVE], float, int, int, int, int, [(float, float)])
+_COURSE = (float, [[float]], [float], [_CURVE], float, int, int, int, int, [[float]])  # servos or shapes last
 _COLUMNS = (*ROLES, "worth")
 RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
@@ -239,8 +239,9 @@ def _loading_to_json(loading: Loading | None) -> Any:
 
 def _course_to_json(course: Course) -> list[Any]:
     changes = [[*astuple(change)[:-1], *chain.from_iterable(change.pieces)] for change in course.changes]
+    others = [[*one] for one in course.servos] or [np.concatenate([a, *b]).tolist() for a, b in course.shapes]
     return [course.first, changes, list(course.errors), _curves_to_json(course.curve), course.strays, course.slips,
-            course.glitches, course.early, course.late, [list(one) for one in course.servos]]  # fmt: skip
+            course.glitches, course.early, course.late, others]  # fmt: skip
 
 
 def _curves_to_json(curve: Any) -> list[Any]:
@@ -261,13 +262,22 @@ def _loading_from_json(table: ExpectedTable, written: list[Any]) -> Loading | No
 
 
 def _course_from_json(one: list[Any]) -> Course:
-    first, changes, errors, curves, *rest, servos = one
+    first, changes, errors, curves, *numbers, others = one
     own = [(ends, Smooth.from_parts(*parts)) for ends, *parts in curves]
     curve: Any = None
     if own:
         curve = JoinedCurves([(*ends, smooth) for ends, smooth in own]) if own[0][0] else own[0][1]
-    course = Course(first, tuple(map(_change_from_json, changes)), np.array(errors), curve, *rest)
-    return replace(course, servos=tuple((lag, damping) for lag, damping in servos))
+    made = tuple(map(_change_from_json, changes))
+    ends = np.cumsum([len(made) + 1, *(len(change.pieces) for change in made)])
+    if any(len(own) not in (2, ends[-1]) for own in others):
+        raise ValueError("has servos or shapes of other changes")
+    shaped = any(change.pieces for change in made)
+    parts = [np.split(np.array(own), ends[:-1]) for own in others if shaped]
+    return Course(
+        first, made, np.array(errors), curve, *numbers,
+        servos=() if shaped else tuple((lag, damping) for lag, damping in others),
+        shapes=tuple((levels, shares) for levels, *shares in parts),
+    )  # fmt: skip
 
 
 def _change_from_json(one: list[float]) -> Change:

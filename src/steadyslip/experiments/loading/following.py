@@ -6,7 +6,7 @@ Tested on the displacement around each change. SensorSamples far from changes ar
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -101,7 +101,7 @@ def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) ->
         spared = len(lines.levels) - len(levels) + 2 * (len(lines.meets) - len(kinks.meets))
         gain = (at_once.misfit - servo.misfit) / inflation + spared * SPARED
         if gain > most:
-            most, best = gain, replace(servo, covariance=inflation * servo.covariance)
+            most, best = gain, servo.widened(inflation)
         if np.all(np.diff(servo.times) > settling(servo.lag, servo.damping)):
             break
     time, values = (column[~lines.in_glitch(time)] for column in (time, values))
@@ -114,7 +114,7 @@ def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) ->
         best = fit_pieces(samples, fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets))), spacing)
         if not is_beside(time, (values - best.predicted(time)) / noise, lines.meets):
             break
-    yield best
+    yield best.widened(_inflation(best, time, values))
 
 
 def _off(found: JointFit, at: Array, time: Array, values: Array, noise: float, spacing: float) -> list[Array]:

@@ -33,6 +33,10 @@ _Found = tuple[Array, Array, Array, float, Array]
 """Nonlinear and linear parameters, deviations, misfit, covariance of the response's parameters."""
 
 
+Shape = tuple[Array, list[Array]]
+"""Rates (changes + 1,), m/s, and shares of each change in its pieces."""
+
+
 @dataclass(frozen=True, eq=False)
 class JointFit:
     """Joint fit of a displacement.
@@ -54,9 +58,11 @@ class JointFit:
     misfit : float
         Sum of squared deviations, in which large ones count less.
     covariance : ndarray (2, 2)
-        Of the logarithms of lag and damping for white noise; empty without a servo.
+        Of the logarithms of lag and damping, for white noise unless `widened`; empty without a servo.
     pieces : tuple
         Straight ramps of each change, if they were fitted: begin after its time (s), duration (s), share of the change.
+    shapes : sequence of Shape
+        Rates and shares one standard deviation from those of the pieces, in independent directions.
     """
 
     rates: Array
@@ -69,6 +75,20 @@ class JointFit:
     misfit: float
     covariance: Array
     pieces: tuple[Pieces, ...] = ()
+    shapes: Sequence[Shape] = ()
+
+    def widened(self, inflation: float) -> JointFit:
+        """The same fit, in noise of so many samples per independent sample."""
+        wide = float(np.sqrt(inflation))
+        own = [np.array([share for _, _, share in change]) for change in self.pieces]
+        shapes = [
+            (
+                self.rates + wide * (rates - self.rates),
+                [one + wide * (a - one) for one, a in zip(own, shares, strict=True)],
+            )
+            for rates, shares in self.shapes
+        ]
+        return replace(self, covariance=inflation * self.covariance, shapes=shapes)
 
     def others(self) -> tuple[tuple[float, float], ...]:
         """Lag and damping one standard deviation away along each axis of their covariance, a factor of 2 at most."""

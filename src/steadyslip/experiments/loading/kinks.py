@@ -104,6 +104,7 @@ class _Lines:
             samples_off_line(time, displacement, runs[0], max(self.strays)),
             samples_off_line(*back, runs[-1].reversed(time), max(self.strays)),
             joint.others() if joint is not None and joint.lag else (),
+            () if joint is None else tuple((np.where(rest, 0.0, own), shares) for own, shares in joint.shapes),
         )  # fmt: skip
 
 

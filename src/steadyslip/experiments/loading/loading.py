@@ -7,9 +7,10 @@ curve where these do not fit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -112,6 +113,9 @@ class Course(ReadOnly):
         the sensor or the loading differed.
     servos : tuple of (float, float)
         Lag (s) and damping ratio of servos one standard deviation from that of the changes, in independent directions.
+    shapes : tuple of (ndarray (changes + 1,), sequence of ndarray)
+        Levels, and shares of each change in its pieces, one standard deviation from those of the course in independent
+        directions; where there are some, they stand for the errors of the levels too.
     otherwise : Course or None
         One with changes made of pieces that follow the column, if that is beside this course by more than its noise: a
         load point that follows in a way of its own, or glitches of the sensor.
@@ -127,6 +131,7 @@ class Course(ReadOnly):
     early: int = 0
     late: int = 0
     servos: tuple[tuple[float, float], ...] = ()
+    shapes: tuple[tuple[Array, Sequence[Array]], ...] = field(default=(), repr=False)
     otherwise: Course | None = field(default=None, repr=False)
 
     @property
@@ -225,23 +230,39 @@ def resting_rate(loading: Loading) -> float | None:
     return next((float(level) for level in course.levels if level > 0), None)
 
 
+def _with_shares(change: Change, shares: Array) -> Change:
+    """Change with other shares of its pieces."""
+    pieces = zip(change.pieces, shares.tolist(), strict=True)
+    return replace(change, pieces=tuple((since, lasts, share) for (since, lasts, _), share in pieces))
+
+
+def _with_levels(course: Course, levels: Array, changes: Sequence[Change]) -> Course:
+    """Course with changes between other levels."""
+    ends = pairwise(levels.tolist())
+    own = tuple(replace(one, before=low, after=high) for one, (low, high) in zip(changes, ends, strict=True))
+    return replace(course, first=float(levels[0]), changes=own)
+
+
+def raised(course: Course) -> Iterator[Course]:
+    """Courses one standard deviation from it in levels and shapes: each level where its error is above rounding."""
+    levels = course.levels
+    for others, shares in course.shapes:
+        yield _with_levels(course, others, [_with_shares(*pair) for pair in zip(course.changes, shares, strict=True)])
+    for k, error in enumerate(() if course.shapes else course.errors):
+        if error > FELT * np.max(np.abs(levels)):
+            moved = levels.copy()
+            moved[k] += error
+            yield _with_levels(course, moved, course.changes)
+
+
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
-    """Loadings with one level each raised by its standard deviation, where that is above rounding, and other servos."""
+    """Loadings with one level of stress each raised by its standard deviation, and with other servos."""
     for channel in ("load", "stress", "pore") if pressed else ("load",):
         course = getattr(loading, channel)
         if course is None:
             continue
-        levels = course.levels
-        for k, error in enumerate(course.errors):
-            if not error > FELT * np.max(np.abs(levels)):
-                continue
-            moved = levels.copy()
-            moved[k] += error
-            changes = tuple(
-                replace(change, before=float(moved[i]), after=float(moved[i + 1]))
-                for i, change in enumerate(course.changes)
-            )
-            yield replace(loading, **{channel: replace(course, first=float(moved[0]), changes=changes)})
+        for moved in () if channel == "load" else raised(course):
+            yield replace(loading, **{channel: moved})
         for lag, damping in course.servos:
             changes = tuple(
                 replace(one, time=one.time + one.lag - lag, lag=lag, damping=damping) if one.lag else one

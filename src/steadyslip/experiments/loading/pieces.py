@@ -18,6 +18,7 @@ from steadyslip.experiments.loading.joint import (
     ROUNDS,
     JointFit,
     SensorSamples,
+    Shape,
     joint_columns,
     misfit,
     ramp_responses,
@@ -90,19 +91,24 @@ def fit_pieces(samples: SensorSamples, step: JointFit, spacing: float) -> JointF
         own.tolist()
     ):  # differences of neighbouring pieces of a change, and of the outer ones from none
         rough[k + i : k + i + 2, 2 + k] = np.array([1.0, -1.0]) / jumps[i]
-    found = _smoothest(rows, values, rough)
-    made = found[2 : 2 + len(own)]
-    rates = found[1] + np.concatenate([[0.0], np.cumsum(np.bincount(own, made))])
+    found, deviations = _smoothest(rows, values, rough)
+
+    def shape(coefficients: Array) -> Shape:
+        made = coefficients[2 : 2 + len(own)]
+        rates = coefficients[1] + np.concatenate([[0.0], np.cumsum(np.bincount(own, made, len(nodes)))])
+        return rates, [made[own == i] / change for i, change in enumerate(np.diff(rates))]
+
+    rates, shares = shape(found)
     times, pieces = [], []
-    for i, change in enumerate(np.diff(rates)):
-        share = made[own == i] / change
+    for i, share in enumerate(shares):
         time = float(begins[own == i][np.argmax(np.cumsum(share) > BEGUN)])
         times.append(time)
         since, duration = begins[own == i] - time, (ends - begins)[own == i]
         pieces.append(tuple(zip(since.tolist(), duration.tolist(), share.tolist(), strict=True)))
     off = values - rows @ found
+    others = [shape(found + one) for one in deviations]
     return JointFit(rates, np.array(times), samples.levels, 0.0, 0.0, lambda t: columns(t) @ found, off, misfit(off),
-                    np.empty((0, 0)), tuple(pieces))  # fmt: skip
+                    np.empty((0, 0)), tuple(pieces), others)  # fmt: skip
 
 
 def _nodes(time: Array, changes: Array, spacing: float) -> list[Array]:
@@ -116,22 +122,28 @@ def _nodes(time: Array, changes: Array, spacing: float) -> list[Array]:
     return found
 
 
-def _smoothest(rows: Array, values: Array, rough: Array) -> Array:
-    """Coefficients of a robust fit, no rougher than generalised cross-validation asks for."""
-    weight, found = np.ones(len(values)), np.zeros(rows.shape[1])
+def _smoothest(rows: Array, values: Array, rough: Array) -> tuple[Array, Array]:
+    """Coefficients (p,) of a robust fit, no rougher than generalised cross-validation asks for, and deviations (p, p).
+
+    The latter are one standard deviation along the axes of the coefficients' distribution, if roughness beforehand is
+    as likely as its penalty says (Wahba 1983): that of noise alone would leave out what smoothing takes away.
+    """
+    weight, found, axes = np.ones(len(values)), np.zeros(rows.shape[1]), np.empty((0, rows.shape[1]))
     for _ in range(ROUNDS):
         heavy = rows * weight[:, None]
         size = np.maximum(np.linalg.norm(heavy, axis=0), 1e-300)
         normal = (heavy / size).T @ (heavy / size) + SINGULAR * np.eye(len(size))
-        strength, axes = eigh((rough / size).T @ (rough / size), normal)  # both are diagonal along these axes
+        strength, ways = eigh((rough / size).T @ (rough / size), normal)  # both are diagonal along these ways
         strength = np.maximum(strength, 0.0)
-        right = axes.T @ ((heavy / size).T @ (values * weight))
+        right = ways.T @ ((heavy / size).T @ (values * weight))
         least = np.inf
         for much in np.geomspace(1 / strength[-1], 1 / (EVEN * strength[-1]), COMPARED):
             kept = 1 / (1 + much * strength)
-            own = axes @ (kept * right) / size
-            score = float(np.sum((weight * (values - rows @ own)) ** 2)) / (len(values) - float(np.sum(kept))) ** 2
+            own = ways @ (kept * right) / size
+            spare = len(values) - float(np.sum(kept))
+            score = float(np.sum((weight * (values - rows @ own)) ** 2)) / spare**2
             if score < least:
                 least, found = score, own
+                axes = (ways * np.sqrt(score * spare * kept) / size[:, None]).T
         weight = 1 / np.sqrt(1 + ((values - rows @ found) / OUTLIER) ** 2)
-    return found
+    return found, axes

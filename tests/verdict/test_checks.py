@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import steadyslip as ss
+from delays import lagging
 from edges_at_random import drawn
 from machines import at_random
 from rigs_of_theory import LAWS, rig
@@ -229,3 +230,13 @@ def test_undamped_bristles_without_mass_are_judged_by_the_limit_of_small_masses(
     falling = ss.analyze(bristles(0.35))
     assert (falling.stable, falling.growth_rate) == (False, np.inf)
     assert ss.stability(bristles(0.35, 1e-6)) == "unstable"
+
+
+def test_a_lag_whose_friction_balances_the_damping_touches_the_axis_many_times_in_one_check():
+    """|c iω| = |S exp(−iωδ)| at one ω only: roots touch the axis once a period of it, for ever."""
+    verdict = ss.analyze(lagging(0.3, damping=0.1, lag=0.5))
+    (one,) = (check for check in verdict.checks if "lag touches" in check.what)
+    assert "edges at 10002 values, the first 5.73574 s" in one.what
+    assert one.passed
+    assert one.error == pytest.approx(0.0, abs=1e-6)
+    assert len(verdict.checks) < 20

@@ -238,7 +238,8 @@ def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Ma
     """Margins without the edges in `lost`, the most critical first."""
     if not lost:
         return tuple(found)
-    kept = [(one, tuple(edge for edge in one.edges if edge not in lost)) for one in found]
+    gone = set(lost)
+    kept = [(one, tuple(edge for edge in one.edges if edge not in gone)) for one in found]
     others = [_margin(one.parameter, one.unit, one.value, edges, one.searched) for one, edges in kept]
     return tuple(sorted(others, key=_urgency))
 

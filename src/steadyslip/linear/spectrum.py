@@ -186,6 +186,20 @@ def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
     return np.asarray((np.abs(nearness(point)[0]) <= share) & (counts(point) <= _ONE_CROSSING))
 
 
+@quietly
+def distance_from_axis(point: OperatingPoint) -> Array:
+    """Distance of the rightmost root from the imaginary axis, relative to its size, (...); NaN where none is known.
+
+    With one delay the phase (rad) by which a crossing is missed, which is never less; inf where other roots grow.
+    """
+    if len(point.model.delays) == 1:
+        return np.where(counts(point) <= _ONE_CROSSING, np.nanmin(np.abs(nearness(point)), axis=0), np.inf)
+    s = _rightmost(point, 1) if point.model.delays else spectrum(point)
+    first = np.argmax(np.where(np.isnan(s.real), -np.inf, s.real), axis=-1)[..., None]
+    root = np.take_along_axis(s, first, axis=-1)[..., 0]
+    return np.asarray(np.abs(root.real) / np.abs(root))
+
+
 def _negligible(s: ComplexArray, share: float) -> Array:
     """Size (1/s) of a real part up to which an eigenvalue (..., n) counts as one on the imaginary axis.
 

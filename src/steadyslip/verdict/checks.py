@@ -25,7 +25,7 @@ from steadyslip.linear.allowance import at_most
 from steadyslip.linear.boundary import Margin, without_edges
 from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.spectrum import can_be_counted, counts, is_ill_posed, spectrum
+from steadyslip.linear.spectrum import can_be_counted, counts, distance_from_axis, is_ill_posed, spectrum
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral
 from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.rig import Rig
@@ -225,21 +225,26 @@ def edge_checks(
         _find_sides(rig, edges, shares, SIDE_OFFSETS, branch, posed | (not several))
         lost = np.flatnonzero(np.isinf(shares) & posed)
         touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
-        alone = [_room(*one) > max(FURTHER_OFFSETS) for one in edges]
-        slow = ~posed | ((touching <= AXIS_TOLERANCE) & alone)
+        slow = ~posed | ((touching <= AXIS_TOLERANCE) & (_room(edges) > max(FURTHER_OFFSETS)))
         # with several delays one edge at a time, so that the work stays within `at_most`
         for some in np.eye(len(edges), dtype=bool)[slow] if several else (slow,):
             _find_sides(rig, edges, shares, FURTHER_OFFSETS[::-1] if several else FURTHER_OFFSETS, branch, some)
-    lost = np.flatnonzero(np.isinf(shares))
-    for i, ((_, edge), share) in enumerate(zip(edges, shares, strict=True)):
-        where = f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
-        if math.isinf(share) and touching[i] <= AXIS_TOLERANCE:
-            what, how = f"{edge.parameter} touches an edge at {where}", "a root on the imaginary axis, sides alike"
-            checks.append(check(what, how, touching[i], AXIS_TOLERANCE))
-        else:
-            most = max(SIDE_OFFSETS if math.isinf(share) else (*SIDE_OFFSETS, share))
-            checks.append(check(f"edge of {edge.parameter} at {where}", "roots on both sides", share, most))
-    return without_edges(margins, [edges[i][1] for i in lost]), tuple(checks)
+    lost = np.isinf(shares)
+    touched = lost & (touching <= AXIS_TOLERANCE)
+    for (_, edge), share in ((edges[i], shares[i]) for i in np.flatnonzero(~touched)):
+        most = max(SIDE_OFFSETS if math.isinf(share) else (*SIDE_OFFSETS, share))
+        checks.append(check(f"edge of {edge.parameter} at {_place(edge)}", "roots on both sides", share, most))
+    for name in dict.fromkeys(edges[i][1].parameter for i in np.flatnonzero(touched)):
+        own = [i for i in np.flatnonzero(touched) if edges[i][1].parameter == name]
+        first = _place(edges[own[0]][1])
+        which = f"an edge at {first}" if len(own) == 1 else f"edges at {len(own)} values, the first {first}"
+        how = "a root on the imaginary axis, sides alike"
+        checks.append(check(f"{name} touches {which}", how, float(np.max(touching[own])), AXIS_TOLERANCE))
+    return without_edges(margins, [edges[i][1] for i in np.flatnonzero(lost)]), tuple(checks)
+
+
+def _place(edge: Boundary) -> str:
+    return f"{edge.value:.6g} {edge.unit}".removesuffix(" 1")
 
 
 def _find_sides(
@@ -260,11 +265,19 @@ def _find_sides(
             ]
 
 
-def _room(margin: Margin, edge: Boundary) -> float:
-    """Half the distance of an edge to the next of its parameter, relative to its value; inf for the only edge."""
-    others = [abs(one.value - edge.value) for one in margin.edges if one is not edge]
-    size = abs(edge.value) or abs(margin.value) or margin.searched[1]
-    return 0.5 * min(others, default=math.inf) / size
+def _room(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
+    """Half the distance of each edge to the next of its parameter, relative to its value, (n,); inf for the only."""
+    names, values = np.array([edge.parameter for _, edge in edges]), np.array([edge.value for _, edge in edges])
+    order = np.lexsort((values, names))
+    gaps = np.where(names[order][1:] == names[order][:-1], np.diff(values[order]), np.inf)
+    room = np.empty(len(edges))
+    room[order] = np.minimum(np.append(gaps, np.inf), np.insert(gaps, 0, np.inf))
+    return 0.5 * room / _sizes(edges)
+
+
+def _sizes(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
+    """Size of the value at each edge, (n,); of the rig's own where that is zero, or of the largest searched."""
+    return np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
 
 
 def _touching(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], branch: int) -> Array:
@@ -276,11 +289,8 @@ def _touching(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], branch: int) -
         return np.empty(0)
     sides = np.array(_sides(rig, edges, max(SIDE_OFFSETS), branch))
     alike = (sides[:, 0] == sides[:, 1]) & np.isin(sides[:, 0], (STABLE, UNSTABLE))
-    with np.errstate(all="ignore"):
-        roots = spectrum(_rigs_beside(rig, edges, 0.0, branch)).reshape(2, len(edges), -1)[0]
-        real = np.where(np.isnan(roots.real), -np.inf, roots.real)
-        least = np.take_along_axis(roots, np.argmax(real, axis=-1)[:, None], axis=-1)[:, 0]
-        return np.where(alike, np.abs(least.real) / np.abs(least), np.inf)
+    distance = distance_from_axis(_rigs_beside(rig, edges, 0.0, branch)).reshape(2, len(edges))[0]
+    return np.where(alike, distance, np.inf)
 
 
 def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> list[list[int]]:
@@ -293,15 +303,15 @@ def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, bra
 def _rigs_beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> OperatingPoint:
     """Operating points `share` times the value of each of n edges below it, then those above, shape (2 n,)."""
     values = np.array([edge.value for _, edge in edges])
-    sizes = np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
-    beside = values + share * sizes * np.array([[-1.0], [1.0]])
+    beside = values + share * _sizes(edges) * np.array([[-1.0], [1.0]])
+    names = np.array([margin.parameter for margin, _ in edges])
     vary = {}
-    for margin, _ in edges:
-        at = [i for i, (_, edge) in enumerate(edges) if edge.parameter == margin.parameter]
-        own = np.full(beside.shape, margin.value)
-        allowed = rig.parameters()[margin.parameter].role.domain.contains(beside[:, at])
+    for name, value in {margin.parameter: margin.value for margin, _ in edges}.items():
+        own = np.full(beside.shape, value)
+        at = names == name
+        allowed = rig.parameters()[name].role.domain.contains(beside[:, at])
         own[:, at] = np.where(allowed, beside[:, at], values[at])
-        vary[margin.parameter] = own.ravel()
+        vary[name] = own.ravel()
     return operating_point(rig, vary, rig.kept_zeros(), branch, scan=True)
 
 

@@ -11,6 +11,8 @@ from steadyslip import figures
 from steadyslip.cli.program import app
 from steadyslip.reports import verdict_files
 
+AXIS = ss.read_rig("examples/stick-slip.toml")
+PAD = ss.read_rig("examples/machines/brake-pad.toml")
 STIFF = Path("examples/stick-slip.toml").read_text().replace('"12 GPa/m"', '"40 GPa/m"')
 
 
@@ -30,6 +32,7 @@ def test_a_comparison_is_a_document_like_that_of_one_rig(tmp_path):
                  "SHA-256 of stick-slip.toml", "SHA-256 of stiff.toml"):  # fmt: skip
         assert part in text, part
     assert STIFF.splitlines()[0] in to.read_text(encoding="utf-8")
+    assert "How near stick-slip and stiff are to the edge of stability" in text
     assert len(to.read_bytes()) <= 500_000
 
 
@@ -40,6 +43,45 @@ def test_two_rigs_of_one_verdict_are_told_what_differs_most():
     assert "No difference decides, as the verdict is the same; most of what differs comes from stiffness k" in text
     same = words(ss.report(ss.compare_rigs(rig, rig)).html)
     assert "They have the same equations and numbers" in same
+
+
+@pytest.mark.parametrize(
+    ("rigs", "over", "measure"),
+    [
+        ((AXIS, AXIS.with_values({"stiffness": 40e9, "friction.a": 0.011})), "slider.stiffness", "safety_factor"),
+        ((PAD, PAD.with_values({"disc.contact.normal_stiffness": 5e6})), "contacts.disc.contact.normal_stiffness", ""),
+        ((AXIS, ss.read_rig("examples/stick-slip.toml", ["friction.evolution=aging"])), "drive.velocity", ""),
+        ((AXIS, AXIS.with_values({"damping": 1e10})), "slider.damping", ""),
+    ],
+    ids=["stiffness", "machine", "law", "zero"],
+)
+def test_two_rigs_have_one_chart(rigs, over, measure):
+    """Each curve goes through its own rig, at the edge a verdict changes, and dashes and marks differ for grey."""
+    found = ss.compare_rigs(*rigs, names=("old", "new"))
+    ax = found.plot()
+    a, b, edge = ax.get_lines()
+    assert a.get_linestyle() != b.get_linestyle()
+    assert a.get_marker() != b.get_marker()
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["old", "new"]
+    factor = (
+        1e9
+        if "GPa" in ax.get_xlabel()
+        else 1e6
+        if "N/µm" in ax.get_xlabel()
+        else 1e-6
+        if "µm/s" in ax.get_xlabel()
+        else 1
+    )
+    safe = "k/k" in ax.get_ylabel()
+    assert safe or not measure
+    for line, rig in zip((a, b), rigs, strict=True):
+        (at,) = line.get_markevery()
+        value = rig.value(over)
+        assert line.get_xdata()[at] * factor == pytest.approx(value)
+        own = ss.safety_factor(rig) if safe else ss.growth_rate(rig)
+        assert line.get_ydata()[at] == pytest.approx(float(own))
+        (height,) = set(edge.get_ydata())
+        assert (line.get_ydata()[at] > height) == (ss.analyze(rig).stable == safe)
 
 
 @pytest.mark.parametrize(("name", "first"), [("inclined-spring", "contact.preload"), ("lead-screw", "drive.velocity")])

@@ -34,12 +34,13 @@ from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 from steadyslip.figures.style import journal, save_with_footer
 from steadyslip.figures.tolerance_bars import tolerances
+from steadyslip.figures.two_rigs import two_rigs
 from steadyslip.linear import ModeChart, Modes
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
 from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, FrozenVerdicts, HopfCurve, Hunt
-from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict import Analysis, RigComparison, Tolerated
 
 __all__ = [
     "ANGLES",
@@ -77,6 +78,7 @@ __all__ = [
     "steps",
     "threshold_map",
     "tolerances",
+    "two_rigs",
 ]
 
 
@@ -118,3 +120,4 @@ register_figures(MapResult, map=map_figure)
 register_figures(Refined, refined=refined)
 register_figures(Sensitivity, sensitivity=sensitivity)
 register_figures(Tolerated, tolerances=tolerances)
+register_figures(RigComparison, rigs=two_rigs)

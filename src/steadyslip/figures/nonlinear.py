@@ -14,7 +14,15 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
 from steadyslip.figures.map_axes import is_geometric
-from steadyslip.figures.style import AREAS, add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
+from steadyslip.figures.style import (
+    AREAS,
+    add_legend_above,
+    axes_or_new,
+    axis_label,
+    display_unit,
+    parameter_label,
+    with_subscripts,
+)
 from steadyslip.linear.status import ABSENT, UNKNOWN, UNSTABLE as UNSTABLE_CODE
 from steadyslip.nonlinear.orbits.ranges import WORDS
 
@@ -279,7 +287,8 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     found : xarray.DataArray
-        With two dimensions that have coordinates; units of the axes from their attribute ``units``.
+        With two dimensions that have coordinates; names and units of the axes from their attributes ``long_name`` and
+        ``units``.
     ax : matplotlib.axes.Axes, optional
 
     Returns
@@ -301,29 +310,40 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     for dim in dims[::-1]:
         values = np.asarray(found[dim].values, dtype=float)
         factor, unit = display_unit(found[dim].attrs.get("units", "1"), float(np.median(np.abs(values))))
-        axes.append((values / factor, axis_label(str(dim).rpartition(".")[2].replace("_", " "), unit)))
+        words = found[dim].attrs.get("long_name") or str(dim).rpartition(".")[2].replace("_", " ")
+        axes.append((values / factor, axis_label(with_subscripts(words), unit)))
     size = np.where(np.isfinite(found.values) & (found.values > 0), found.values, np.nan)
     (x, x_label), (y, y_label) = axes
     label = found.attrs.get("long_name", str(found.name or "threshold").replace("_", " "))
-    mesh = ax.pcolormesh(x, y, size, cmap="cividis", shading="nearest", rasterized=True)
-    ax.figure.colorbar(mesh, ax=ax, label=f"{label} (1)")
+    if np.isfinite(size).any():
+        mesh = ax.pcolormesh(x, y, size, cmap="cividis", shading="nearest", rasterized=True)
+        ax.figure.colorbar(mesh, ax=ax, label=with_subscripts(fill(f"{label} (1)", LEGEND_WIDTH)))
+    else:
+        ax.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
+    if np.isinf(found.values).any():
+        ax.fill_between([], [], facecolor="white", edgecolor=GREY, label="no kick in the range is large enough")
     if np.isfinite(size).sum() > 3:
         lines = ax.contour(x, y, size, colors=BLACK, linewidths=0.7)
         ax.clabel(lines, fontsize="small")
     if np.any(found.values == 0):
-        ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors=[UNSTABLE])
+        _fill_cells(ax, x, y, found.values == 0, color=ListedColormap([UNSTABLE]))
         ax.fill_between([], [], label="steady sliding is unstable", **AREAS[UNSTABLE_CODE][1])
     for label, where, hatch in _missing_regions(found):
-        ax.contourf(x, y, where, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+        _fill_cells(ax, x, y, where, hatch=hatch, edgecolor=BLACK, linewidth=0, color=ListedColormap(["none"]))
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch=hatch, label=label)
-    if not np.all(found.values > 0):
-        ax.legend(fontsize="small")
+    if ax.get_legend_handles_labels()[0]:
+        add_legend_above(ax, 2, 1.0, fontsize="small")
     for values, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
         if len(values) > 2 and values.min() > 0 and is_geometric(values):
             set_scale("log")
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
     return ax
+
+
+def _fill_cells(ax: Axes, x: Any, y: Any, where: Any, color: Any, **style: Any) -> None:
+    """Fill the cells around the points of a grid where a mask is true."""
+    ax.pcolor(x, y, np.where(where, 1.0, np.nan), cmap=color, shading="nearest", **style)
 
 
 def _missing_regions(found: Any) -> list[tuple[str, Any, str]]:

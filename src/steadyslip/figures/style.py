@@ -151,9 +151,7 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
     """Save the figure of Axes with the values of the rig, version and date below it, and with its fonts inside."""
     figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
     width, height = figure.get_size_inches()
-    text = _with_subscripts(
-        fill(_footer(result), int(width * 72 / (0.55 * _FOOTER)))
-    )  # letters: .55 of their size wide
+    text = with_subscripts(fill(_footer(result), int(width * 72 / (0.55 * _FOOTER))))  # letters: .55 of their size wide
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
     if engine := figure.get_layout_engine():
@@ -263,7 +261,7 @@ def _subscript(base: str, below: str) -> str:
     return f"${base}_{{\\mathrm{{{below}}}}}$"
 
 
-def _with_subscripts(text: str) -> str:
+def with_subscripts(text: str) -> str:
     """Text for Matplotlib with letters such as d_c set as mathematics, dollar signs as they are."""
     escaped = text.replace("$", r"\$")
     return re.sub(r"(?<![^\W_])(\w)_(\w+)", lambda found: _subscript(found[1], found[2]), escaped)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from steadyslip.figures.inline import figure_html
 from steadyslip.machine.letters import said, worded
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import heading, paragraph, table
+from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.recommendation import Order, recommendation
 from steadyslip.reports.results import parts_of, rig_section
 from steadyslip.reports.rig import VALIDITY, edge_table
@@ -31,7 +32,7 @@ def _comparison(result: RigComparison) -> Parts:
           for part in recommendation(one, _order(within), within, f"The recommendation for {name}")),
         *first, *(part for part in second if part not in first),
         heading("Side by side"), table(told, (label, *names), caption="The two rigs."),
-        heading("What differs?"), *_differences(result),
+        heading("What differs?"), *_differences(result), _chart(result),
         *(part for name, one, _ in of_each
           for part in (heading(f"How far is the edge of {name}?"), *edge_table(one),
                        *motion(one, f"The motion of {name}"), heading(f"Inputs of {name}"), *rig_section(one.rig)[1:])),
@@ -78,6 +79,13 @@ def _differences(result: RigComparison) -> Iterator[str]:
         yield paragraph(f"A part is {of} in the mean over all orders of making the changes.", "small")
     else:
         yield paragraph("No parts are told, since some rig between the two has no growth rate.", "small")
+
+
+def _chart(result: RigComparison) -> str:
+    """HTML figure of both rigs, over the number that differs most."""
+    a, b = result.names
+    words = f"How near {a} and {b} are to the edge of stability, over what differs most; the marks are the rigs."
+    return figure(figure_html(result.plot, words, 6.0), words)
 
 
 def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:

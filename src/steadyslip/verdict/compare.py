@@ -16,6 +16,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_growth, format_percent, format_quantity
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
+from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord
 from steadyslip.files.specifications.tolerance_tables import Tolerances, rig_and_tolerances
 from steadyslip.machine.machine import Machine
@@ -155,6 +156,10 @@ class RigComparison(Displayed):
             if undoes
             else (f"no single value of {a} makes {b} {first}")
         )
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw how near the edge of stability both are; see `steadyslip.figures.two_rigs`."""
+        return draw(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``--json`` prints it."""

@@ -281,14 +281,17 @@ def test_verdict_with_kicks():
 
 
 def test_map_is_drawn_with_units():
-    angle = xr.DataArray(np.radians([-20.0, 0.0, 20.0]), dims="angle", name="angle", attrs={"units": "rad"})
-    stiffness = xr.DataArray([5e9, 1e10, 1.5e10], dims="stiffness", attrs={"units": "Pa/m"})
-    angle = angle.assign_coords(angle=angle)
-    stiffness = stiffness.assign_coords(stiffness=stiffness)
-    angle["angle"].attrs["units"], stiffness["stiffness"].attrs["units"] = "rad", "Pa/m"
-    found = ss.threshold_map(inclined(0), {"contact.angle": angle, "stiffness": stiffness}, "displacement")
+    """Axes had the last part of a dotted path, mu_ref or d c, and units only if they were given."""
+    grids = {"contact.angle": np.radians([-20.0, 0.0, 20.0]), "stiffness": [5e9, 1e10, 1.5e10], "friction.d_c": [1e-6]}
+    vary = {name: xr.DataArray(values, dims=name, coords={name: values}) for name, values in grids.items()}
+    angle = vary["contact.angle"]
+    found = ss.threshold_map(inclined(0), vary, "displacement")[:, :, 0]
+    assert not angle["contact.angle"].attrs, "those of the user stay as they are"
     ax = ss.figures.threshold_map(found)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("stiffness (GPa/m)", "angle (deg)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("stiffness k (GPa/m)", "angle ψ (deg)")
+    assert found["friction.d_c"].attrs == {"units": "m", "long_name": "slip distance d_c"}
+    named = found.assign_coords({"stiffness": found["stiffness"].assign_attrs(long_name="spring k_s")})
+    assert ss.figures.threshold_map(named).get_xlabel() == "spring $k_{\\mathrm{s}}$ (GPa/m)"
     assert "steady sliding is unstable" in ax.get_legend_handles_labels()[1]
     with pytest.raises(ss.ParameterError, match="two dimensions"):
         ss.figures.threshold_map(found.values)

@@ -12,6 +12,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, checked, finite
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.version import version
+from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -107,7 +108,8 @@ def threshold_map(
         middle of the bracket reached where something is. A DataArray has a coordinate ``limit`` beside it: what comes
         of larger kicks, ``edge``, ``unstable``, ``no steady sliding``, ``out of range`` (of floating point) or
         ``undecided`` with the reason; ``returns`` where none fails. Of machines another, ``contact``: that which
-        is lost beyond, or fastest in a blow-up.
+        is lost beyond, or fastest in a blow-up. Dimensions have ``units`` and ``long_name`` of the parameter that
+        varies along them.
 
     Examples
     --------
@@ -128,7 +130,20 @@ def threshold_map(
     beside = {"limit": (dims, np.array(BEYOND)[found.beyond])}
     if rig.contact_names:
         beside["contact"] = (dims, found.contact)
-    return xr.DataArray(found.size, dims=dims, coords={**coords, **beside}, name=f"{kick}_threshold", attrs=about)
+    made = xr.DataArray(found.size, dims=dims, coords={**coords, **beside}, name=f"{kick}_threshold", attrs=about)
+    return made.assign_coords({dim: made[dim].assign_attrs(own) for dim, own in _axes(made, rig, vary).items()})
+
+
+def _axes(made: Any, rig: Slider | Machine, vary: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Unit and words with letter of dimensions whose coordinate has the values of a parameter; what is given stays."""
+    found = {}
+    for given, values in vary.items():
+        for dim in getattr(values, "dims", ()):
+            if dim in made.coords and np.array_equal(values, made[dim]):
+                name = rig.resolve(given)
+                own = {"units": rig.parameters()[name].role.unit, "long_name": said(rig, name)}
+                found[dim] = own | dict(made[dim].attrs)
+    return found
 
 
 def threshold_brackets(

@@ -1,0 +1,144 @@
+"""Figure of two compared rigs: k/k_cr or growth of both over what differs most, or over the speed."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.palette import BLACK, BLUE, STABLE, UNSTABLE
+from steadyslip.figures.style import (
+    HALO,
+    SAFETY_WORDS,
+    add_legend_above,
+    axes_or_new,
+    axis_label,
+    display_unit,
+    parameter_label,
+)
+from steadyslip.linear.stable_values import safety_factor
+from steadyslip.linear.stiffness import growth_rate
+from steadyslip.verdict import RigComparison
+
+_POINTS = 121  # along the curves
+_BEYOND = 3.0  # factor beyond the values of both rigs up to which curves go (by trial)
+_SPEED = "drive.velocity"
+_CURVES: Any = (
+    {"color": BLACK, "linestyle": "-", "marker": "o"},
+    {"color": BLUE, "linestyle": (0, (5, 2)), "marker": "s"},
+)  # differ in dashes and marks too, for grey
+
+
+def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
+    """Plot how near the edge of stability two compared rigs are, over what differs between them.
+
+    The abscissa is the difference with the largest part that is a number of both rigs, or the speed without one. A mark
+    on each curve is the rig itself. The ordinate is k/k_cr where that tells the verdict everywhere, else the growth
+    rate.
+
+    Parameters
+    ----------
+    found : RigComparison
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> rig = ss.read_rig("examples/stick-slip.toml")
+    >>> axes = ss.figures.two_rigs(ss.compare_rigs(rig, rig.with_values({"stiffness": "40 GPa/m"})))
+    >>> axes.figure.savefig("two-rigs.svg")
+    """
+    rigs: list[Any] = [one.rig for one in found.verdicts]
+    name = _abscissa(found, rigs)
+    own = [float(rig.parameters()[name].value) for rig in rigs]
+    x = np.union1d(_values(rigs[0].parameters()[name].role, own), own)
+    heights = _heights(found, rigs, name, x)
+    factor, unit = display_unit(rigs[0].parameters()[name].role.unit, own[0] or own[1], rigs[0].printed_area(name))
+    ax = axes_or_new(ax)
+    for label, style, value, curve in zip(found.names, _CURVES, own, heights.curves, strict=True):
+        at = int(np.searchsorted(x, value))
+        ax.plot(x / factor, curve, label=label, markevery=[at], path_effects=HALO, **style)
+    _paint(ax, heights)
+    if x[0] > 0:
+        ax.set_xscale("log")
+        _plain_ticks(ax.xaxis)
+    ax.set_xlim(x[0] / factor, x[-1] / factor)
+    ax.set_xlabel(axis_label(parameter_label(rigs[0], name), unit))
+    add_legend_above(ax, 2, 1.0, fontsize="small")
+    return ax
+
+
+def _abscissa(found: RigComparison, rigs: list[Any]) -> str:
+    """Name of the difference with the largest part that both rigs have as a number; else that of the speed."""
+    known = [{name for name, one in rig.parameters().items() if one.value is not None} for rig in rigs]
+    of = (one.parameter for one in found.differences)
+    return next((name for name in of if all(name in one for one in known)), _SPEED)
+
+
+def _values(role: Any, own: list[float]) -> Array:
+    """Values of a parameter around those of both rigs, within its domain."""
+    low, high = min(own), max(own)
+    if low > 0:
+        return np.clip(np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS), role.domain.low, role.domain.high)
+    more = (high - low or abs(high) or 1.0) / 2
+    ends = max(low - more, role.domain.low), min(high + more, role.domain.high)
+    return np.linspace(*ends, _POINTS)[slice(int(ends[0] == role.domain.low and not role.domain.low_allowed), None)]
+
+
+class _Heights(NamedTuple):
+    """Curves of both rigs, words for the axis, height of the edge of stability, and whether sliding is stable above."""
+
+    curves: list[Array]
+    words: str
+    edge: float
+    stable_above: bool
+
+
+def _heights(found: RigComparison, rigs: list[Any], name: str, x: Array) -> _Heights:
+    growth = [np.asarray(growth_rate(rig, {name: x}), dtype=float) for rig in rigs]
+    growth = [np.where(np.isinf(one), np.nan, one) for one in growth]  # an ill-posed rig has no finite rate
+    if found.measure == "safety":
+        safety = [np.asarray(safety_factor(rig, {name: x}), dtype=float) for rig in rigs]
+        told = [
+            ((one > 1) == (rate < 0)) | (one == 1) | np.isnan(rate) for one, rate in zip(safety, growth, strict=True)
+        ]
+        if np.all(told) and all(np.isfinite(one).any() for one in safety):
+            return _Heights(safety, f"{SAFETY_WORDS} (1)", 1.0, True)
+    return _Heights(growth, "growth rate of disturbances (1/s)", 0.0, False)
+
+
+def _paint(ax: Axes, heights: _Heights) -> None:
+    """Paint the stable and unstable side of the edge, with their words, and scale the axis."""
+    values = np.concatenate([*heights.curves, [heights.edge]])
+    values = values[np.isfinite(values)]
+    if heights.stable_above and values.min() > 0:
+        ax.set_yscale("log")
+        _plain_ticks(ax.yaxis)
+        low, high = values.min() / 1.6, values.max() * 1.6
+    else:
+        room = 0.12 * (values.max() - values.min() or 1.0)
+        low, high = values.min() - room, values.max() + room
+    ax.set_ylim(low, high)
+    for stable, ends in ((heights.stable_above, (heights.edge, high)), (not heights.stable_above, (low, heights.edge))):
+        ax.axhspan(*ends, color=STABLE if stable else UNSTABLE, linewidth=0, zorder=0)
+        up = ends[1] == high
+        ax.text(
+            0.02, 0.97 if up else 0.03, "stable" if stable else "unstable", transform=ax.transAxes,
+            va="top" if up else "bottom", path_effects=HALO,
+        )  # fmt: skip
+    ax.axhline(heights.edge, color=BLACK, linewidth=1)
+    ax.set_ylabel(heights.words)
+
+
+def _plain_ticks(axis: Axis) -> None:
+    """Mark 1, 2 and 5 of every decade of a logarithmic axis, as numbers without powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())

@@ -22,6 +22,7 @@ _FALL = (
 )
 _ROUNDING = 1e-6  # of that share at its edge, where the status depends on rounding: 1e10 times that of a double
 _ROOM = 24.0  # pixels between a label of a contour and the next line (by trial)
+_BESIDE = 12.0  # pixels in the mean to the edge or a contour, below which another contour is not drawn (by trial)
 _CLOSE = 6.0  # pixels between vertices of a label's line (by trial)
 
 
@@ -77,14 +78,24 @@ def draw_levels(
 ) -> list[Array]:  # fmt: skip
     """Draw contours of fields over a plane with a label each; return the lines drawn, as vertices (n, 2).
 
-    They end at the outline `within`, a path in the units of the axes or None. Labels keep clear of the lines `beside`.
+    They end at the outline `within`, a path in the units of the axes or None. Labels keep clear of the lines `beside`;
+    contours that run along one of these, or along another contour, are left out.
     """
     drawn, clip = [], None if within is None else PathPatch(within, transform=ax.transData, visible=False)
     for field in fields:
         shown = [n for n, level in enumerate(levels) if np.nanmin(field) < level < np.nanmax(field)]
         if not shown:
             continue
-        lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **(CONTOURS | style))
+        drawing = CONTOURS | style
+        trial = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
+        apart = _not_along(ax, [pieces_of(path) for path in trial.get_paths()], beside)
+        shown = [n for n, keep in zip(shown, apart, strict=True) if keep]
+        lines = trial
+        if not all(apart):
+            trial.remove()
+            if not shown:
+                continue
+            lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
         if clip is not None:
             lines.set_clip_path(clip)
         pieces = [pieces_of(path) for path in lines.get_paths()]
@@ -107,6 +118,29 @@ def pieces_of(path: Path) -> list[Array]:
     vertices = np.asarray(path.vertices)
     starts = [0] if path.codes is None else np.flatnonzero(path.codes == Path.MOVETO)
     return [piece for piece in np.split(vertices, starts[1:]) if len(piece) > 1]
+
+
+def _not_along(ax: Axes, contours: Sequence[Sequence[Array]], beside: Sequence[Array]) -> list[bool]:
+    """Mask of the contours, several pieces each, that keep `_BESIDE` from the lines `beside` and from each other.
+
+    Of two that do not, the one is kept that is farther from these lines.
+    """
+
+    def in_pixels(lines: Sequence[Array]) -> list[Array]:
+        return [_thinned(ax.transData.transform(one)) for one in lines if len(one) > 1]
+
+    def away(lines: Sequence[Array], others: Sequence[Array]) -> float:
+        if not lines or not others:
+            return np.inf
+        points, rest = np.concatenate(lines), np.concatenate(others)
+        return float(np.median(np.linalg.norm(points[:, None] - rest[None], axis=-1).min(axis=1)))
+
+    edges, found = in_pixels(beside), [in_pixels(one) for one in contours]
+    far, kept = [away(one, edges) for one in found], [False] * len(found)
+    for n in sorted(range(len(found)), key=lambda n: -far[n]):
+        others = [away(found[n], found[m]) for m, keep in enumerate(kept) if keep]
+        kept[n] = min([far[n], *others]) >= _BESIDE
+    return kept
 
 
 def _apart(ax: Axes, line: Array, others: Sequence[Array], labels: Sequence[Array]) -> tuple[float, float]:

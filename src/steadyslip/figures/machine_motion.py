@@ -30,14 +30,14 @@ LEAVES = 1e4  # slip rate over the steady one beyond which a run that ends early
 
 
 def history(run: History, panels: np.ndarray) -> np.ndarray:
-    """Plot slip rate, friction and normal force of every contact in three panels, slip events shaded; return these."""
+    """Plot slip rate, friction and, if there is a third panel, normal force of every contact; shade slip events."""
     names = list(run.rig.contacts)
     colors = {name: _CONTACTS[i % len(_CONTACTS)] for i, name in enumerate(names)}
     factor, unit = display_unit("s", float(run.end) or 1.0)
     time = run["t"] / factor
     left = np.any([leaves(run, run[f"{name}.slip_rate"], steady_rate(run.rig, name)) for name in names], axis=0)
     series = (("slip_rate", "m/s", "slip rate"), ("friction", "", "friction"), ("normal_force", "N", "normal force"))
-    for panel, (what, si, label) in zip(panels, series, strict=True):
+    for panel, (what, si, label) in zip(panels, series, strict=False):
         values = {name: np.where(left, np.nan, run[f"{name}.{what}"]) for name in names}
         largest = max(float(np.nanmax(np.abs(own), initial=0.0)) for own in values.values()) or 1.0
         scale, own_unit = display_unit(si, largest) if si else (1.0, "1")
@@ -73,11 +73,12 @@ def phase_plane(
     scale, unit = display_unit("m/s", abs(own))
     factor, force_unit = display_unit("N", float(np.nanmax(np.abs(force), initial=0.0)) or 1.0)
     shown_rate = np.where(leaves(run, rate, own), np.nan, rate) / scale  # NaN: not drawn
-    ax.plot(shown_rate, force / factor, color=color, label=label or None, linewidth=1)
+    ax.plot(shown_rate, force / factor, color=color, label=label or "the run", linewidth=1)
     low, high = float(np.nanmin(shown_rate)), float(np.nanmax(shown_rate))
     logarithmic = low > 0 and high > _LOG_RATIO * low
     if ax.get_xlabel():  # Axes of another run: keep their scales and labels
         add_arrowheads(ax, shown_rate, force / factor, color)
+        add_legend_above(ax, 3, 1.0, fontsize="small")
         return ax
     if logarithmic:
         ax.set_xscale("log")
@@ -96,11 +97,11 @@ def phase_plane(
     if not pressed and (last := float(run["load_velocity"][-1])) > 0:
         dot = steady_contact_at(rig, name, np.array([last]))
         ax.plot(dot["slip_rate"] / scale, dot["friction_force"] / factor, "o", color=BLACK, markersize=4,
-                label="_steady sliding")  # fmt: skip
+                label="steady sliding of the last drive")  # fmt: skip
     ax.set_xlabel(axis_label(f"slip rate at {name}", unit))
     ax.set_ylabel(axis_label(f"friction force at {name}", force_unit))
     ax.grid(color=GREY, linewidth=0.3)
-    ax.legend(fontsize="small")
+    add_legend_above(ax, 3, 1.0, fontsize="small")
     return ax
 
 

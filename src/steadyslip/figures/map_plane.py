@@ -42,6 +42,8 @@ from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
+_POWERS, _SUPERSCRIPTS = 4, str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")  # 0.001 and 1000 are easy to read
+_ROOM = 0.03  # of an axis beyond its end, so that a mark there is whole: a little more than half of it
 _FINE = 8  # times as many points as a map has, for words in its areas
 
 
@@ -56,8 +58,8 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
         _share_of_stable(ax, x, y, view)
         line = _edge_of_shares(ax, x, y, view.shares["status"][STABLE])
         name = None if show is None else name
-    ax.set_xlim(x.min(), x.max())
-    ax.set_ylim(y.min(), y.max())
+    ax.set_xlim(_limits(x, scales[0], own_value(found, view.names[0])))
+    ax.set_ylim(_limits(y, scales[1], own_value(found, view.names[1])))
     plane, within = _Refined(found, view, scales), None
     if judged and not view.shares:
         within = _areas(ax, found, view, plane)
@@ -69,6 +71,24 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
     drawn = _contours(ax, x, y, view, name, found, (within, line)) if name is not None and judged else []
     if judged and not view.shares:
         _words(ax, view.values["status"], plane, [*drawn, *line])
+
+
+def _limits(values: Array, scale: Scale, own: float | None) -> tuple[float, float]:
+    """Ends of the axis of a map: its least and largest value, with room beyond one at which the mark of the rig stands.
+
+    `values` are in the unit of the axis, `own` is the rig's value in SI units.
+    """
+    low, high = float(values.min()), float(values.max())
+    if own is None or low == high:
+        return low, high
+    at = float(scale(own))
+    room = _ROOM * (math.log(high / low) if scale.log else high - low)
+    ends = []
+    for end, sign in ((low, -1.0), (high, 1.0)):
+        beyond = end * math.exp(sign * room) if scale.log else end + sign * room
+        near = abs(math.log(at / end)) < room if scale.log and at > 0 else abs(at - end) < room
+        ends.append(beyond if near and low <= at <= high else end)
+    return ends[0], ends[1]
 
 
 def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> Path | None:
@@ -212,12 +232,20 @@ def _contours(
         fields, levels = safety_fields(values, status), [one / (1 + one) for one in levels]
     if not view.shares:
         fields = [extended(one, ~np.isin(status, SLIDING)) for one in fields]
-    words = [f"{one:g}".replace("-", "−") for one in shown]
+    words = [_level_words(one) for one in shown]
     drawn = draw_levels(ax, x, y, fields, levels, words, around[0], around[1], linestyles="--")
     if drawn:
         label += missing_note(view, name)
         add_legend_entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label))
     return drawn
+
+
+def _level_words(level: float) -> str:
+    """Number of a contour, powers of ten far from 1 as such."""
+    power = round(math.log10(abs(level))) if level else 0
+    if abs(power) < _POWERS or not math.isclose(abs(level), 10.0**power):
+        return f"{level:g}".replace("-", "−")
+    return f"{'−' * (level < 0)}10{str(power).translate(_SUPERSCRIPTS)}"
 
 
 def _levels(values: Array) -> list[float]:

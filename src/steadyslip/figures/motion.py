@@ -13,11 +13,12 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREY, ORANGE
 from steadyslip.figures import machine_motion
 from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE, drawn_up_to, leaves
 from steadyslip.figures.style import (
+    WIDTH,
     add_arrowheads,
     add_legend_above,
     axes_or_new,
@@ -38,11 +39,14 @@ from steadyslip.protocol.protocol import NORMAL_STRESS
 if TYPE_CHECKING:
     from steadyslip.motion import History
 
+_ROUNDING = 1e-6  # change of a normal force that is none, share of it: that of steps of integration, with room
 _MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     """Plot velocity, friction and normal stress over time in three panels; for machines, of every contact.
+
+    A normal stress that is constant has no panel of its own: its value stands above that of friction.
 
     Parameters
     ----------
@@ -52,7 +56,8 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
 
     Returns
     -------
-    ndarray of three matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes
+        Two or three; those that were given.
 
     Raises
     ------
@@ -66,9 +71,12 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     >>> axes = ss.figures.history(run)
     >>> axes[0].figure.savefig("history.svg")
     """
-    panels = (
-        new_panels(3, 1, (6.4, 6.4), sharex=True)[:, 0] if ax is None else given_panels(ax, (3,), "a sequence of three")
-    )
+    given = None if ax is None else given_panels(ax, (3,), "a sequence of three")
+    pressed = _constant_load(run) if given is None else ""
+    rows = 2 if pressed else 3
+    panels = new_panels(rows, 1, (WIDTH, WIDTH * (rows + 1) / 4), sharex=True)[:, 0] if given is None else given
+    if pressed:
+        panels[1].set_title(pressed, loc="left", fontsize="small")
     if isinstance(run.rig, Machine):
         return machine_motion.history(run, panels)
     area = run.rig.area
@@ -79,12 +87,13 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     _velocity_panel(run, v, panels[0], time)
     panels[1].plot(time, friction, color=BLUE)
     panels[1].set_ylabel("friction τ/σ (1)")
-    stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(normal), initial=1.0)), area)
-    panels[2].plot(time, normal / stress_factor, color=BLUE)
-    panels[2].set_ylabel(axis_label(stress_name("normal stress", area), stress_unit))
-    panels[2].set_xlabel(axis_label("time", unit))
     _limit_zoom(panels[1], friction)
-    _limit_zoom(panels[2], normal / stress_factor)
+    if not pressed:
+        stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(normal), initial=1.0)), area)
+        panels[2].plot(time, normal / stress_factor, color=BLUE)
+        panels[2].set_ylabel(axis_label(stress_name("normal stress", area), stress_unit))
+        _limit_zoom(panels[2], normal / stress_factor)
+    panels[-1].set_xlabel(axis_label("time", unit))
     machine_motion.shade_let_go(run, panels, factor)
     slips = run.slip_events if len(run.slip_events) < MAX_SHADED_EVENTS else ()
     _add_slip_legend(panels[0], len(run.slip_events))
@@ -102,6 +111,19 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
         title = f"{run.status} at {format_quantity(run.end, 's')}{drawn_up_to(left)}"
         panels[0].set_title(title, color=BLOW_UP, fontsize="medium", pad=pad)
     return panels
+
+
+def _constant_load(run: History) -> str:
+    """Words with the normal stress or force of every contact; empty if one of them changes by more than rounding."""
+    rig = run.rig
+    many = {name: run[f"{name}.normal_force"] for name in rig.contacts} or {"": run["normal_stress"]}
+    if not all(len(one) and np.ptp(one) <= _ROUNDING * np.max(np.abs(one)) for one in many.values()):
+        return ""
+    unit, area = ("N", None) if rig.contacts else ("Pa", rig.area)
+    told = [typeset(format_quantity(float(one[0]), unit, area=area)) for one in many.values()]
+    if len(many) > 1:
+        told = [f"{value} at {name}" for value, name in zip(told, many, strict=True)]
+    return f"constant {stress_name(rig.result_name('normal stress'), rig.area)}: {', '.join(told)}"
 
 
 def _limit_zoom(ax: Axes, *shown: np.ndarray) -> None:
@@ -212,9 +234,17 @@ def phase_plane(
     if not ax.get_xlabel():
         _draw_steady_states(run, run.rig, ax, x, factor)
         ax.set_xlabel("ln($v/v_0$) (1)")
-        ax.set_ylabel(axis_label(stress_name("spring stress", area), unit))
-    ax.legend(fontsize="small")
+        ax.set_ylabel(axis_label(stress_name(f"{_puller(run.rig)} stress", area), unit))
+    add_legend_above(ax, 3, 1.0, fontsize="small")
     return ax
+
+
+def _puller(rig: Slider) -> str:
+    """What pulls the block: spring, drive (a controller), or both."""
+    held = rig.stiffness or rig.axial_stiffness
+    if not rig.drive.proportional():
+        return "spring"
+    return "spring and drive" if held else "drive"
 
 
 def _steady_spring_stress(rig: Slider, velocity: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -18,11 +18,12 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
-from steadyslip.core.areas import outside
+from steadyslip.core.areas import outside, stress_name
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, STABLE, UNSTABLE
+from steadyslip.core.records import records_in
 from steadyslip.linear.status import (
     ABSENT as ABSENT_CODE,
     STABLE as STABLE_CODE,
@@ -30,7 +31,7 @@ from steadyslip.linear.status import (
     UNKNOWN as UNKNOWN_CODE,
     UNSTABLE as UNSTABLE_CODE,
 )  # fmt: skip
-from steadyslip.machine.letters import letter_of, said
+from steadyslip.machine.letters import estimate_words, letter_of, said
 from steadyslip.machine.rig import Rig
 
 OUT_OF_RANGE = "numbers out of the range of floating point"
@@ -148,10 +149,11 @@ def journal() -> Iterator[None]:
 
 
 def save_with_footer(axes: Any, path: str, result: Any) -> None:
-    """Save the figure of Axes with the values of the rig, version and date below it, and with its fonts inside."""
+    """Save the figure of Axes with rig, values that no axis has, version and date below it, and its fonts inside."""
     figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
     width, height = figure.get_size_inches()
-    text = with_subscripts(fill(_footer(result), int(width * 72 / (0.55 * _FOOTER))))  # letters: .55 of their size wide
+    words = fill(_footer(result, figure.axes), int(width * 72 / (0.55 * _FOOTER)))  # letters: .55 of their size wide
+    text = with_subscripts(words)
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
     if engine := figure.get_layout_engine():
@@ -173,18 +175,53 @@ def _part_ticks(figure: Any, bins: int) -> None:
             ax.locator_params(axis="x", nbins=bins)
 
 
-def _footer(result: Any) -> str:
-    """Values of the rig of a result with their letters, the version of the program, and the date."""
+def _footer(result: Any, axes: Sequence[Axes]) -> str:
+    """File and law of a result, its values with their letters: fitted, or held; version of the program, and date."""
     from steadyslip import __version__
 
-    rig = getattr(result, "rig", None)
-    values = []
+    fit = getattr(result, "fit", result)  # of draws
+    plan = getattr(fit, "plan", None)
+    rig = getattr(plan if hasattr(plan, "records") else result, "rig", None)
+    parts = []
     if isinstance(rig, Rig):
-        for name, one in rig.parameters().items():
-            if one.value and np.ndim(one.value) == 0:
-                word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
-                values.append(f"{said(rig, name)} {typeset(word)}".replace(" ", "\xa0").replace("-", "−"))
-    return f"{', '.join(values)}. ".lstrip(". ") + f"steadyslip\xa0{__version__}, {datetime.now(UTC):%Y-%m-%d}"
+        estimates = {one.name: one for one in getattr(fit, "estimates", ())}
+        fitted = {name.partition("@")[0] for name in estimates}
+        labels = [text for ax in axes for text in (ax.get_xlabel(), ax.get_ylabel())]
+        shown = [name for name in rig.parameters() if _on_an_axis(rig, name, labels)]
+        held = ", ".join(_values_of(rig, {*fitted, *shown}))
+        told = ", ".join(
+            _unbroken(f"{estimate_words(rig, name)} {typeset(one.shown())}") for name, one in estimates.items()
+        )
+        laws = [one.friction for one in rig.laws_by_contact().values()] if fitted else []
+        words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
+        file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # that of a map
+        parts = [file, *words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
+    parts.append(f"steadyslip\xa0{__version__}, {datetime.now(UTC):%Y-%m-%d}")
+    return ". ".join(one for one in parts if one)
+
+
+def _values_of(rig: Rig, without: Collection[str]) -> Iterator[str]:
+    """Values of a rig with words and letters, in no-break spaces."""
+    for name, one in rig.parameters().items():
+        if one.value and np.ndim(one.value) == 0 and name not in without:
+            word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
+            yield _unbroken(f"{said(rig, name)} {typeset(word)}")
+
+
+def _unbroken(text: str) -> str:
+    return text.replace(" ", "\xa0").replace("-", "−")
+
+
+def _kind(law: Any) -> str:
+    """Names of the parts of a law, such as its evolution, in brackets; empty if it has none."""
+    names = ", ".join(one.name for one in records_in(law) if getattr(one, "name", "none") != "none")
+    return f" ({names})" if names else ""
+
+
+def _on_an_axis(rig: Rig, name: str, labels: Sequence[str]) -> bool:
+    """True if an axis has a parameter, so that a figure shows more than one value of it."""
+    words = stress_name(parameter_label(rig, name), rig.printed_area(name))
+    return any(label.startswith(f"{words} (") for label in labels)
 
 
 def display_unit(si_unit: str, typical: float, area: float | None = None) -> tuple[float, str]:

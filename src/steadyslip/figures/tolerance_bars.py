@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from steadyslip.core.format import typeset
 from steadyslip.core.palette import BLACK, STABLE, UNKNOWN, UNSTABLE
-from steadyslip.figures.style import add_legend_above, axes_or_new, is_narrow
+from steadyslip.figures.style import add_legend_above, axes_or_new, is_narrow, parameter_label
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
-from steadyslip.machine.letters import said
 from steadyslip.verdict.tolerances import Tolerated
 from steadyslip.verdict.words import told_range
 
@@ -59,12 +59,9 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
             linewidth=1.8,
             label="all together",
         )
-    ranges = [
-        f"{said(found.rig, one.parameter)}\n{told_range(found.rig, one.parameter, one.low, one.high)}" for one in shown
-    ]
-    ax.set_yticks(
-        range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
-    )
+    ranges = [typeset(told_range(found.rig, one.parameter, one.low, one.high)).replace("-", "−") for one in shown]
+    rows = [f"{parameter_label(found.rig, one.parameter)}\n{text}" for one, text in zip(shown, ranges, strict=True)]
+    ax.set_yticks(range(len(shown) + 1), ["all together", *rows])
     ax.margins(x=0.06)
     ends = np.concatenate([known, *(spans[one.parameter] for one in shown)])
     if edges and 0 < ends.min() < ends.max() / _DECADE:
@@ -73,11 +70,15 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     ax.axvline(1.0 if edges else 0.0, color=BLACK, linewidth=1)
     own = safety_factor(found.rig, along=found.along) if edges else growth_rate(found.rig)
     ax.axvline(float(own), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")
-    ratio = (
-        "stiffness over critical stiffness"
-        if found.along == STIFFNESS
-        else f"{said(found.rig, found.along)} over its edge"
-    )
-    ax.set_xlabel(f"{ratio} (1)" if edges else "growth rate of disturbances (1/s)")
+    words = "growth rate of disturbances (1/s)"
+    if edges:
+        stiffness = found.along == STIFFNESS
+        words = (
+            "stiffness over critical stiffness"
+            if stiffness
+            else f"{parameter_label(found.rig, found.along)} over its edge"
+        )
+        words += " (1)"
+    ax.set_xlabel(words)
     add_legend_above(ax, 4, 1.0, fontsize="small")
     return ax

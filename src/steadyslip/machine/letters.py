@@ -104,6 +104,37 @@ def said(rig: Rig, name: str) -> str:
     return f"{name.partition('.')[0]} {text}"
 
 
+_ESTIMATES = {
+    r"step\.(\d+)\.at": "time of change {} of the drive",
+    r"step\.(\d+)\.duration": "duration of change {} of the drive",
+    r"jump\.(\d+)": "time of jump {}",
+    r"lag": "lag of friction behind the drive",
+    r"trend\.1": "drift of friction over the record",
+    r"trend\.(\d+)": "drift of friction, order {}",
+    r"offset": "offset of friction",
+    r"start\.hold": "rest before the record",
+    r"initial\.(.+)": "{} at the beginning",
+    r"a - b": "direct less evolution effect a - b",
+    r"k_c": "critical stiffness k_c",
+    r"k/k_c": "stiffness over critical k/k_c",
+    r"k/k_cal": "stiffness over that of the calibration k/k_cal",
+}
+"""Words for what a fit finds beside parameters of a rig."""
+
+
+def estimate_words(rig: Rig, name: str) -> str:
+    """Words of what a fit finds: a parameter of the rig, or of the record, whose number stands behind "@".
+
+    >>> from steadyslip.reproduce import paper_rig
+    >>> [estimate_words(paper_rig(), name) for name in ("friction.a@2", "step.1.at", "trend.1")]
+    ['direct effect a (record 2)', 'time of change 1 of the drive', 'drift of friction over the record']
+    """
+    bare, _, record = name.partition("@")
+    found = ((re.fullmatch(pattern, bare), words) for pattern, words in _ESTIMATES.items())
+    text = next((words.format(*match.groups()) for match, words in found if match), "") or said(rig, bare)
+    return f"{text} (record {record})" if record else text
+
+
 def worded(rig: Rig, text: str) -> str:
     """Text with words and letters instead of the dotted names of parameters.
 

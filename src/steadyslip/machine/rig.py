@@ -60,10 +60,18 @@ class Rig(FrozenRecord, Keeper):
     """Words of messages about a rig of this class: `rig`, `block`, `place` of a coordinate by its name, and what limits
     its speed, `damping` and `mass`."""
 
+    read_from: ClassVar[str] = ""
+    """Name of the file that the rig was read from, for a caption; no part of its value."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.written_in:  # of a copy by dataclasses.replace: its parts know the file
             self.told_in(name for one in self._parts() for name in one.written_in)
+
+    def named(self, file: str) -> Self:
+        """The rig itself, which is told to be from this file from now on."""
+        object.__setattr__(self, "read_from", file)
+        return self
 
     def told_in(self, names: Iterable[str]) -> Self:
         """The rig itself, which is told in these units from now on, and so is what is made of its parts."""
@@ -256,7 +264,7 @@ class Rig(FrozenRecord, Keeper):
         if problems:
             raise ParameterError(problems)
         texts = {one for one in changes.values() if isinstance(one, str)}
-        return replaced(self, full).told_in((*self.written_in, *units_in(texts)))
+        return replaced(self, full).told_in((*self.written_in, *units_in(texts))).named(self.read_from)
 
 
 @question

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from os import PathLike
+from pathlib import Path
 from typing import Any, cast
 
 from steadyslip.core.domains import positive, speed
@@ -285,7 +286,7 @@ def read_tables(
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
     if rig is not None:
-        rig.told_in(sorted(units_in(tables)))
+        rig.told_in(sorted(units_in(tables))).named(Path(source).name if source.endswith(".toml") else "")
         faults += wrong_ends(rig, tolerances)
         if rig.written_in:  # numbers alone are SI units, as programs write them
             question_values(rig, reader.speeds)

@@ -63,7 +63,7 @@ class Population(ReadOnly):
     conditions : dict of str to ndarray (experiments,)
         Conditions on which the means may depend, by name.
     scale : float
-        Scale of the half-normal prior of the spreads, e-folds or natural sizes.
+        Scale s₀ of the prior of the spreads, exp(−s²/2s₀²)/√s, e-folds or natural sizes.
     draws : Pooled
         Draws from the posterior, in the coordinates of `axes`.
     """
@@ -165,8 +165,8 @@ class Population(ReadOnly):
             for (first, second), (middle, low, high) in pairs.items()
         ]
         lines.append(
-            f"priors          of means flat; of spreads half-normal, {self.scale:g} e-folds or natural sizes; of "
-            "correlations towards none"
+            f"priors          of means flat; of spreads s exp(-s²/2s0²)/√s, s0 = {self.scale:g} e-folds or natural "
+            "sizes; of correlations towards none"
         )
         if self.conditions:
             means = ", ".join(f"{name} {_condition(name, float(np.mean(x)))}" for name, x in self.conditions.items())
@@ -387,8 +387,8 @@ def population(
         ``{"temperature": {"p1": 20, "p2": 100, "p3": 250}}``: straight lines, of the logarithm where a parameter must
         be positive. ``"normal stress"``: that of the records.
     scale : float
-        Of the half-normal prior of the spreads, in e-folds (or natural sizes): with few experiments it keeps out
-        spreads that nobody would believe.
+        s₀ of the prior of the spreads, exp(−s²/2s₀²)/√s, in e-folds (or natural sizes): with few experiments it keeps
+        out spreads that nobody would believe.
     count : int
         Draws.
     seed : int

@@ -102,9 +102,7 @@ class PopulationSettings(Settings):
         ),
         default=None,
     )
-    scale: float = parameter(
-        "1", _scale, "of the half-normal prior of the spreads, e-folds or natural sizes", default=1.0
-    )
+    scale: float = parameter("1", _scale, "of the prior of the spreads, e-folds or natural sizes", default=1.0)
     draws: int = setting(Whole("draws from the posterior", *DRAWS), default=4000)
 
     def depends_on(self) -> str | dict[str, tuple[float, ...] | dict[str, float]] | None:

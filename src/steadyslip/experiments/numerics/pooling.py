@@ -1,7 +1,7 @@
 """Estimates of several experiments as members of one population: normal in coordinates, covariance unknown.
 
 Experiment j has true coordinates θ_j = X_j β + N(0, Σ) and says of some of them z_j = θ_j + N(0, C_j). The mean β is
-integrated out with a flat prior. The spreads, roots of the diagonal of Σ, have half-normal priors, and correlation
+integrated out with a flat prior. The spreads s, roots of the diagonal of Σ, have priors exp(−s²/2)/√s, and correlation
 matrices R the density |R|² (Lewandowski, Kurowicka & Joe 2009); both are sampled. β and θ follow from them exactly
 (Gelman et al. 2013, Bayesian Data Analysis, ch. 5). Samples are drawn by emcee, which only this file imports.
 """
@@ -24,6 +24,9 @@ MIN_STEPS = 350  # least number of steps after the discarded ones, for a usable 
 FEWEST_TIMES = 20  # autocorrelation times that walkers need, of which each has few draws; chosen by trial
 MOST_ROUNDS = 3  # rounds of steps, each as long as all before, until there are as many
 ALIKE = 3.0  # exponent of the determinant of correlations in their prior, plus 1: with 1, spreads came out too large
+SMALL = 0.5
+"""Power of a spread in its prior per e-fold. With 1, a half-normal density, medians of five rocks came out 15 to 26 %
+too large and 95 % intervals held .90 to .93 of 500, nearly all others above the truth; 0 has no posterior."""
 MOST_BEND = 8.0  # largest |artanh| of a partial correlation: closer to 1 than 1e-6 counts as 1
 
 
@@ -131,7 +134,7 @@ def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count
     size : int
         Number of coordinates.
     scale : ndarray (p,)
-        Of the half-normal priors of the spreads.
+        Of the priors of the spreads.
     count : int
         Draws, at least: as many of every walker.
     seed : int
@@ -147,9 +150,11 @@ def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count
         logs, bends = u[:, :size], u[:, size:]
         inside = np.all((logs > MIN_LOG_SPREAD) & (logs < 4.0), axis=1) & np.all(np.abs(bends) < MOST_BEND, axis=1)
         if np.any(inside):
-            share = np.exp(logs[inside])  # of the prior's scale; the next term is the change to logarithms
+            share = np.exp(logs[inside])  # of the prior's scale
             root = (scale * share)[:, :, None] * correlation_root(bends[inside], size)
-            prior = np.sum(logs[inside] - 0.5 * share**2, axis=1) + log_prior_of_correlation(bends[inside], size)
+            prior = np.sum(SMALL * logs[inside] - 0.5 * share**2, axis=1) + log_prior_of_correlation(
+                bends[inside], size
+            )
             found[inside] = log_evidence(experiments, root @ root.transpose(0, 2, 1))[0] + prior
         return found
 

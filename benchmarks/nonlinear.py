@@ -1,4 +1,4 @@
-"""What do cycles and thresholds cost, next to waiting for them?
+"""What do cycles and thresholds cost, next to waiting for them, and what does hunting?
 
     python benchmarks/nonlinear.py [--quick]
 
@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,7 +68,23 @@ def bisected(rig: ss.Slider, low: float = 1.0, high: float = 6.0) -> float:
     return low
 
 
+def held_axes() -> dict[str, ss.Slider]:
+    """The axis of Canudas de Wit et al. (1995) that hunts, with an encoder of 1 um read every millisecond."""
+    axis = ss.read_rig(Path(__file__).parents[1] / "examples/hunting-axis.toml")
+    fine = replace(axis, drive=replace(axis.drive, sample_time=1e-3, resolution=1e-6, derivative="measurement"))
+    coulomb = ss.laws.Coulomb(mu_coulomb=1.0, mu_static=1.5, viscous=0.4)
+    return {
+        "bristles": axis,
+        "bristles, sampled": fine,
+        "Coulomb": replace(axis, friction=coulomb),
+        "Coulomb, sampled": replace(fine, friction=coulomb),
+    }
+
+
 def main() -> None:
+    for name, axis in held_axes().items():
+        seconds, hunt = timed(lambda axis=axis: ss.hunt(axis, until=20.0 if QUICK else None), 1)
+        print(f"hunt, {name}: {hunt.time[-1]:.0f} s of motion in {seconds:.2f} s")
     rig = paper_rig(-45, 1e-7)
     seconds, branch = timed(lambda: ss.cycles(rig))
     decades = np.log10(branch["peak_velocity"].max() / branch["lowest_velocity"].min())

@@ -4,11 +4,45 @@ As a script: python tests/helpers/hunting_by_scipy.py 200 1 compares 200 random 
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 import steadyslip as ss
+
+RINGING = """
+[bodies.motor]
+motion = "rotation"
+inertia = "40 kg cm^2"
+[bodies.table]
+mass = "240 kg"
+[links.screw]
+kind = "screw"
+between = ["motor", "table"]
+lead = "10 mm/rev"
+stiffness = "120 N/um"
+damping = "5 N s/mm"
+[contacts.guide]
+body = "table"
+[contacts.guide.friction]
+law = "coulomb"
+mu_coulomb = 0.11
+mu_static = 0.19
+[contacts.guide.contact]
+law = "constant"
+preload = "3.2 kN"
+[drive]
+control = "rotary-pid"
+body = "motor"
+measured = "table"
+velocity = 0
+velocity_of = "table"
+kp = "5 N m/rad"
+kd = "0.2 N m s/rad"
+ki = "50 N m/(rad s)"
+"""
+"""An axis behind a compliant screw."""
 
 
 def axis(mass, rest, sliding, viscous, kp, kd, ki, **more):
@@ -125,25 +159,28 @@ def by_hand(
     of_integral=False,
     encoder=0.0,
     delay=0,
+    bristles=None,
 ):
-    """Places at the samples of a sampled PID, spans of constant force by their formula; delay in samples."""
+    """Places at the samples of a sampled PID; delay in samples.
+
+    Spans of constant force by their formula, or of bristles (stiffness, damping, Stribeck velocity) by SciPy.
+    """
 
     def banded(e):
         return np.sign(e) * max(abs(e) - band, 0.0)
 
-    x, v, total, before, aim, queue, places = 0.0, 0.0, 0.0, 0.0, 0.0, [0.0] * delay, []
-    for _ in range(round(until / sample)):
-        places.append(x)
-        seen = np.round(x / encoder) * encoder if encoder else x
-        e = step - seen
-        total = np.clip(total + sample * banded(e), -integral_limit / ki, integral_limit / ki)
-        wide = (lambda e: e) if of_integral else banded
-        rate = (before - seen) / sample if on_measurement else (wide(e) - wide(aim - before)) / sample
-        queue.append(np.clip(kp * wide(e) + kd * rate + ki * total, -force, force))
-        u, before, aim, left = queue.pop(0), seen, step, sample
-        while left > 0:
-            if v == 0 and abs(u) <= rest:
-                break
+    def bristled(x, v, z, u):
+        stiff, damped, slow = bristles
+
+        def moved(_, y):
+            rate = y[1] - stiff * abs(y[1]) * y[2] / (sliding + (rest - sliding) * np.exp(-((y[1] / slow) ** 2)))
+            return [y[1], (u - stiff * y[2] - damped * rate - viscous * y[1]) / mass, rate]
+
+        return solve_ivp(moved, (0, sample), [x, v, z], method="LSODA", rtol=1e-10, atol=1e-14).y[:, -1]
+
+    def slid(x, v, z, u):
+        left = sample
+        while left > 0 and not (v == 0 and abs(u) <= rest):
             way = np.sign(v) if v else np.sign(u)
             far = (u - way * sliding) / viscous
             tau = mass / viscous
@@ -152,7 +189,75 @@ def by_hand(
             x += far * span + (v - far) * tau * -np.expm1(-span / tau)
             v = far + (v - far) * np.exp(-span / tau) if span < stop else 0.0
             left -= span
+        return x, v, z
+
+    state, total, before, aim, queue, places = (0.0, 0.0, 0.0), 0.0, 0.0, 0.0, [0.0] * delay, []
+    for _ in range(round(until / sample)):
+        x = state[0]
+        places.append(x)
+        seen = np.round(x / encoder) * encoder if encoder else x
+        e = step - seen
+        total = np.clip(total + sample * banded(e), -integral_limit / ki, integral_limit / ki)
+        wide = (lambda e: e) if of_integral else banded
+        rate = (before - seen) / sample if on_measurement else (wide(e) - wide(aim - before)) / sample
+        queue.append(np.clip(kp * wide(e) + kd * rate + ki * total, -force, force))
+        before, aim = seen, step
+        state = (bristled if bristles else slid)(*state, queue.pop(0))
     return np.array(places)
+
+
+SAMPLED = {
+    "plain": {},
+    "on the measurement": {"derivative": "measurement"},
+    "an encoder": {"resolution": 1e-3, "derivative": "measurement"},
+    "a limit": {"force_limit": 1.2, "integral_limit": 1.1},
+    "a dead band": {"dead_band": 0.02},
+    "a dead band of the integral": {"dead_band": 0.02, "dead_band_of": "integral"},
+    "late": {"delay": 2},
+}
+"""Options of a sampled controller: lengths in steps of the target, forces in friction at rest, delay in samples."""
+
+
+def sampled(numbers, more, sample, until, bristles=None, rtol=1e-8):
+    """Largest difference of the places at samples between the two routes, of the target's step; and the motion."""
+    step = 2 * numbers["rest"] / numbers["kp"]
+    units = dict.fromkeys(("force_limit", "integral_limit"), numbers["rest"])
+    units |= {"resolution": step, "dead_band": step, "delay": sample}
+    given = {key: value if isinstance(value, str) else value * units[key] for key, value in more.items()}
+    names = {"force_limit": "force", "integral_limit": "integral_limit", "dead_band": "band", "resolution": "encoder"}
+    theirs = by_hand(
+        step, until, **numbers, sample=sample, on_measurement="derivative" in more, of_integral="dead_band_of" in more,
+        delay=more.get("delay", 0), bristles=bristles, **{names[key]: given[key] for key in given if key in names},
+    )  # fmt: skip
+    rig = axis(**numbers, sample_time=sample, **given)
+    if bristles:
+        stiff, damped, slow = bristles
+        law = ss.laws.LuGre(
+            mu_coulomb=numbers["sliding"], mu_static=numbers["rest"], v_stribeck=slow, viscous=numbers["viscous"],
+            bristle_stiffness=stiff, bristle_damping=damped,
+        )  # fmt: skip
+        rig = replace(rig, friction=law)
+    found = ss.hunt(rig, ss.protocol.DisplacementStep(at=0, by=step), until=until, rtol=rtol)
+    times = sample * np.arange(1, len(theirs))
+    places = np.searchsorted(found.time, times - 1e-6 * sample)  # at rest not every sample is kept
+    kept = np.abs(found.time[np.minimum(places, len(found.time) - 1)] - times) < 1e-6 * sample
+    differences = np.abs(step - found.error[places[kept]] - theirs[1:][kept]) / step
+    assert kept.sum() > 20
+    return float(differences.max()), found
+
+
+def sampled_at_random(random, kind, bristles=False, rtol=1e-8):
+    """The same of a random axis with options of a kind."""
+    numbers = random_axis(random)
+    numbers["viscous"] = max(numbers["viscous"], 0.01)
+    time = np.sqrt(numbers["mass"] / numbers["kp"])
+    given = None
+    if bristles:
+        slow = numbers["rest"] / numbers["kp"] / time * float(10 ** random.uniform(-3, -1))
+        stiff = numbers["kp"] * float(10 ** random.uniform(2, 4))
+        given = (stiff, float(random.uniform(0, 1)) * np.sqrt(stiff * numbers["mass"]), slow)
+    sample = time * float(10 ** random.uniform(-1.7, -0.7))
+    return sampled(numbers, SAMPLED[kind], sample, (8 if bristles else 25) * time, given, rtol)[0]
 
 
 def main(count, seed):

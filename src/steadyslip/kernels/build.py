@@ -34,7 +34,7 @@ from steadyslip.core.version import RELEASE
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 from steadyslip.kernels import linking
-from steadyslip.kernels.driver import lanes, states, table
+from steadyslip.kernels.driver import bristles, holding, lanes, states, table
 from steadyslip.kernels.driver_text import text_of, texts
 from steadyslip.kernels.layout import Layout, Routines
 from steadyslip.kernels.nodes import Program
@@ -55,8 +55,19 @@ ENTRIES: dict[str, tuple[ModuleType, tuple[str, ...]]] = {
         table,
         (_WHOLE, _TABLE, _TABLE, _TABLE, _CUBE, _REALS, _CUBE, "real[:,:,:,:]", _CUBE, _TABLE),
     ),
+    "bristle_step": (
+        bristles,
+        (_REALS, _TABLE, _TABLE, _TABLE, _TABLE, _REALS, _REALS, _REALS, _TABLE, _REALS, _TABLE, "int"),
+    ),
+    "follow_held": (
+        holding,
+        (_REALS, _TABLE, _TABLE, _TABLE, _TABLE, _REALS, _TABLE, _TABLE, _TABLE, _CUBE, _TABLE, _TABLE, _REALS, _REALS,
+         _REALS, _TABLE, "int"),
+    ),
 }  # fmt: skip
 """Functions of the driver called from Python: module, and types of the arguments after layout and routines."""
+DRIVERS = {"driver": ("advance", "observe", "field", "through_table"), "held": ("bristle_step", "follow_held")}
+"""Entries that are compiled together, by the name of their file: a motion needs none of those of a held rig."""
 KERNEL = FileKind("kernel", 4, 2**26, "it is compiled again")
 _FALSE_WORDS = ("", "0", "no", "off", "false")  # values of an environment variable that mean no
 _KEY_PLACEHOLDER = "THIS"  # placeholder for the key in the routines' text
@@ -108,6 +119,16 @@ class Code:
     def through_table(self) -> Callable[..., object]:
         """`steadyslip.kernels.driver.table.through_table` bound to this model."""
         return self._bound("through_table")
+
+    @cached_property
+    def bristle_step(self) -> Callable[..., int]:
+        """`steadyslip.kernels.driver.bristles.bristle_step` bound to these bristles."""
+        return self._bound("bristle_step")
+
+    @cached_property
+    def follow_held(self) -> Callable[..., int]:
+        """`steadyslip.kernels.driver.holding.follow_held` bound to these bristles."""
+        return self._bound("follow_held")
 
 
 def interpreting() -> bool:
@@ -247,33 +268,34 @@ def cached_or_compiled(
 def driver(name: str) -> Callable[..., int]:
     """One of `ENTRIES` as machine code; takes layout and addresses of routines as arrays, then its other arguments."""
     with _lock:
-        if not _drivers:
-            key = driver_key()
-            addresses = cached_or_compiled(lambda: driver_text(key), key, "driver", tuple(ENTRIES))
-            for entry, (_, types) in ENTRIES.items():
-                _drivers[entry] = callable_at(addresses[entry], entry, (_WHOLE, _WHOLE, *types))
+        if name not in _drivers:
+            (group,) = (one for one, names in DRIVERS.items() if name in names)
+            key = driver_key(group)
+            addresses = cached_or_compiled(lambda: driver_text(key, group), key, group, DRIVERS[group])
+            for entry in DRIVERS[group]:
+                _drivers[entry] = callable_at(addresses[entry], entry, (_WHOLE, _WHOLE, *ENTRIES[entry][1]))
         return _drivers[name]
 
 
-def driver_text(key: str) -> str:
-    """Assembly of the driver."""
-    entries = {name: (_WHOLE, _WHOLE, *types) for name, (_, types) in ENTRIES.items()}
-    return translated(_driver_modules(), entries, {name: f"{name}.{key}" for name in ENTRIES}, 2, linking.opaque())
+def driver_text(key: str, group: str) -> str:
+    """Assembly of one of `DRIVERS`."""
+    entries = {name: (_WHOLE, _WHOLE, *ENTRIES[name][1]) for name in DRIVERS[group]}
+    return translated(_driver_modules(group), entries, {name: f"{name}.{key}" for name in entries}, 2, linking.opaque())
 
 
-def _driver_modules() -> dict[str, str]:
+def _driver_modules(group: str) -> dict[str, str]:
     found: dict[str, str] = {}
-    for module, _ in ENTRIES.values():
-        found |= texts(module.__name__)
+    for name in DRIVERS[group]:
+        found |= texts(ENTRIES[name][0].__name__)
     return found
 
 
-@lru_cache(maxsize=1)
-def driver_key() -> str:
-    """Hash of everything that the machine code of the driver depends on."""
-    declared = [f"{name} {types}" for name, (_, types) in ENTRIES.items()]
+@lru_cache(maxsize=len(DRIVERS))
+def driver_key(group: str = "driver") -> str:
+    """Hash of everything that the machine code of one of `DRIVERS` depends on."""
+    declared = [f"{name} {ENTRIES[name][1]}" for name in DRIVERS[group]]
     others = [text_of(f"steadyslip.kernels.{part}") for part in _TRANSLATION]
-    return _key("\n".join([*declared, *_driver_modules().values(), *others]))
+    return _key("\n".join([*declared, *_driver_modules(group).values(), *others]))
 
 
 def callable_at(address: int, name: str, types: Sequence[str]) -> Callable[..., int]:

@@ -7,9 +7,11 @@ from importlib.resources import files
 from typing import Any, cast
 
 from steadyslip.kernels.layout import (
+    Control,
     Cursor,
     EventPlace,
     Final,
+    Held,
     Kind,
     Layout,
     Out,
@@ -19,11 +21,13 @@ from steadyslip.kernels.layout import (
     Sampled,
     Setting,
     Status,
+    Turn,
 )
 
 DRIVER = "steadyslip.kernels.driver"
 _ENUMS = {
-    enum.__name__: enum for enum in (Row, Setting, Cursor, Status, EventPlace, Kind, Sampled, Recorded, Final, Out)
+    enum.__name__: enum
+    for enum in (Row, Setting, Cursor, Status, EventPlace, Kind, Sampled, Recorded, Final, Out, Held, Control, Turn)
 }
 _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 

@@ -160,6 +160,46 @@ class Final(IntEnum):
     TIME, SEGMENT, ACCEPTED, REJECTED, POINT, STATE = 0, 1, 2, 3, 4, 5
 
 
+class Held(IntEnum):
+    """Elements of the array that carries the motion of a held rig through calls of `follow_held`."""
+
+    TIME, END, STOP = 0, 1, 2
+    """Now, end of the target's segment, and the next sample or change of force (s)."""
+    LENGTH, RTOL, SHORTEST = 3, 4, 5
+    """With bristles: next step (s), error allowed in it relative to the size of a variable, least step (s)."""
+    CHANGED, STEPS, MOST_STEPS = 6, 7, 8
+    """Flag: the force has changed since the last span; number of steps or passages, and the one to stop at."""
+    ROWS, EVERY = 9, 10
+    """Rows of the motion written, and nodes of a step from one to the next."""
+    RESTS, SINCE, LAST_ROW = 11, 12, 13
+    """Flag: at rest under a sampled controller; since when, and time of the last row (s)."""
+    LOWEST, HIGHEST, FASTEST = 14, 15, 16
+    """Extremes of error and speed of the stroke."""
+    PACE, FAR = 17, 18
+    """Speed up to which bristles may be at rest; error (m or rad) from which on it is no hunting any more."""
+    SIZE = 19
+
+
+class Control(IntEnum):
+    """Elements of the array of a sampled controller: its settings, then what it remembers."""
+
+    PERIOD, RESOLUTION, DELAY, ON_MEASUREMENT = 0, 1, 2, 3
+    """PERIOD is 0 of a controller without samples, which is a part of the linear system."""
+    BAND, BANDS_RATE, OF_INTEGRAL = 4, 5, 6
+    INTEGRAL, MOST_INTEGRAL, MOST_FORCE = 7, 8, 9
+    COUNT, AIM, LATE, CONSTANT = 10, 11, 12, 13
+    """Samples so far, last target, forces that wait; flag: the last sample changed neither integral nor force."""
+    SIZE = 14
+
+
+class Turn(IntEnum):
+    """What `follow_held` leaves to its caller."""
+
+    LOOK, STEP, LENGTH, STUCK = 0, 1, 2, 3
+    """Whether to go on; a step in which a guard may fail; a passage over the time to `Held.STOP`; steps that become too
+    short."""
+
+
 class Layout(NamedTuple):
     """Sizes of one kernel and indices of the groups of its record (first row of each)."""
 
@@ -296,6 +336,8 @@ class Routines(NamedTuple):
     watch_group : frequent events within the last step, for `GROUP` lanes from lane `number` on
     rates_lanes, see_lanes : rates; observables (all lanes)
     extend_lanes, look_lanes : `extend`; observables at `Row.NEXT_TIME`, within the last step (all lanes)
+    bristles : of a held rig, whose record is constants: ``array`` = slip rates and memories of its m contacts, then
+        friction forces and rates of the memories, then their slopes (m, m)
     """
 
     step: Routine
@@ -312,6 +354,7 @@ class Routines(NamedTuple):
     see_lanes: Routine
     extend_lanes: Routine
     look_lanes: Routine
+    bristles: Routine
 
 
 def call(routine: Routine, record: Array, number: float, array: Array) -> None:

@@ -1,9 +1,10 @@
 """Work between integration steps, one code for all models: jobs, breakpoints, jumps, events, samples, the end.
 
 Loops around the compiled step: `lanes.advance` (each lane runs its own job) and `table.through_table` (all lanes follow
-one table of inputs). `states` evaluates outputs at given states without a loop. Other modules: `segments` (breakpoints,
-jumps) with `balance` (force balance), `crossings` (events) with `slip` (log and statistics of slip events),
-`interpolate` (dense output), `samples` (output at requested times), `jobs` (start and end of a job).
+one table of inputs). `states` evaluates outputs at given states without a loop. `holding` follows a rig that holds a
+place, with `bristles` for laws with memory; it is compiled apart from the others. Other modules: `segments`
+(breakpoints, jumps) with `balance` (force balance), `crossings` (events) with `slip` (log and statistics of slip
+events), `interpolate` (dense output), `samples` (output at requested times), `jobs` (start and end of a job).
 
 All that depends on a model is called through `Routines`; sizes and indices are in `Layout`. The modules run as they
 stand, slowly, with Python routines; `steadyslip.kernels.build` compiles them once for all models into one namespace, so

@@ -24,8 +24,9 @@ from steadyslip.protocol.segments import pack
 
 EXACT = 1e-9  # relative difference of two cycles that are one: what exact pieces are asked to agree to
 MOST_STROKES = 400  # after which the last ones are judged as they are; chosen by trial
-SAMPLED_STROKES = 12  # the same of a sampled controller, whose strokes differ by when in them it samples
-MOST_STEPS, OF_BRISTLES = 150_000, 20_000  # the same for steps, exact and of bristles: some ten seconds
+SAMPLED_STROKES = 24  # the same of a sampled controller, whose strokes differ by when in them it samples,
+MOST_SAMPLED_STROKES = 100  # unless they shrink: then more of them tell whether they go on to do so
+MOST_STEPS, IN_CORE = 150_000, 2_000_000  # the same for steps, here and in the compiled core: some ten seconds
 LONGEST = 1e9  # s, end of a motion that ends earlier by rest, repetition, strokes or steps
 CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually there are two
 SHRINKING = 0.9  # ratio of later to earlier strokes below which they are told to shrink; chosen by trial
@@ -99,22 +100,29 @@ def hunt(
     motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol)
     last_change = max((float(t) for t in motion.segments.start[0]), default=0.0)
     close = EXACT if motion.exact else 100 * rtol
-    most_strokes = MOST_STROKES if motion.sampled is None else SAMPLED_STROKES
-    most_steps = MOST_STEPS if motion.exact else OF_BRISTLES
-    at_rest = False
+    at_rest, used_up = False, False
     for done in motion.run():
         if done is not None and progress is not None:
             progress(motion.time, len(motion.trace.strokes))
         if motion.time >= last_change and motion.at_rest:
             at_rest = True
             break
-        if motion.runs_away or motion.steps >= most_steps:
+        used_up = motion.steps >= MOST_STEPS or motion.steps_in_core >= IN_CORE
+        if motion.runs_away or used_up:
             break
         if end is None and done is not None:
             own = swings(one for one in motion.trace.strokes if one.start > last_change)
-            if len(own) >= most_strokes or cycle_length(own, close):
+            if _enough(own, motion.sampled) or cycle_length(own, close):
                 break
-    return replace(_result(rig, given, motion, at_rest, (close, rtol), last_change), stopped=motion.steps >= most_steps)
+    return replace(_result(rig, given, motion, at_rest, (close, rtol), last_change), stopped=used_up)
+
+
+def _enough(strokes: Sequence[Stroke], sampled: bool) -> bool:
+    """True if there are so many strokes that they are judged as they are."""
+    if not sampled:
+        return len(strokes) >= MOST_STROKES
+    goes_on = len(strokes) >= SAMPLED_STROKES and _trend(strokes) is True
+    return goes_on or len(strokes) >= MOST_SAMPLED_STROKES
 
 
 def _target(protocol: Protocol) -> Protocol:
@@ -169,7 +177,7 @@ def _result(
     from steadyslip import __version__
 
     close, rtol = errors
-    table, strokes = motion.trace.table(), motion.trace.strokes
+    table, strokes = motion.table(), motion.trace.strokes
     own = swings(one for one in strokes if one.start >= since)
     count = 0 if at_rest or motion.runs_away else cycle_length(own, close)
     period = own[-1].start - own[-1 - count].start if count else np.nan

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.kernels.layout import Held
+from steadyslip.nonlinear.hunting.bristles import Bristles, BristleSteps
 from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece, Switch
+from steadyslip.nonlinear.hunting.in_mode import CompiledMotion
 from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
-from steadyslip.nonlinear.hunting.sampled import SampledController
-from steadyslip.nonlinear.hunting.steps import NODES, POWERS, BristleSteps, ExactSteps, Passage, first_crossing
+from steadyslip.nonlinear.hunting.steps import NODES, POWERS, ExactSteps, first_crossing
 from steadyslip.protocol.segments import Segments
 
 BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
@@ -19,7 +21,6 @@ STILL_ERROR = 0.1  # of the error allowed per step, below which the speeds of br
 STILL = 1e-9  # of the fastest speed so far, below which what is at rest moves no more
 AT_ONCE = 100  # switches without time passing that are no sequence of switches any more
 AWAY = 1e4  # error over what friction, load or target account for, beyond which friction is negligible
-SAME = 9  # decimals of a share of the sample time to which times between samples are the same, but for rounding
 KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
 
 
@@ -68,10 +69,6 @@ class Trace:
     rows: list[Array] = field(default_factory=list)
     strokes: list[Stroke] = field(default_factory=list)
 
-    def table(self) -> Array:
-        """All values, (times, 4)."""
-        return np.concatenate(self.rows) if self.rows else np.zeros((0, 4))
-
 
 class Motion:
     """A motion from rest at place 0 under a target.
@@ -95,14 +92,17 @@ class Motion:
         self.expected = loads / gain if gain else 0.0
         self.mode = HeldMode((0,) * len(plant.contacts))
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
-        self.passages: dict[tuple[HeldMode, float, float], Passage | None] = {}
         self.acceleration = 0.0
         self.exact = not plant.memory
         self.still = STILL if self.exact else max(STILL, STILL_ERROR * rtol)
         self.stepper: ExactSteps | BristleSteps = (
             ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant))
         )
-        self.sampled = None if plant.limits.sample_time is None else SampledController(plant)
+        self.sampled = plant.limits.sample_time is not None
+        self.core: CompiledMotion | None = None
+        if self.sampled or not self.exact:
+            own = self.stepper if isinstance(self.stepper, BristleSteps) else Bristles(plant, rtol, self.state)
+            self.core = CompiledMotion(plant, own)
         self.fresh: frozenset[tuple[str, int]] = frozenset()
         self.at_once = 0
         self.watched = np.array([plant.error(), plant.row(None, plant.places[0]), plant.row()])
@@ -126,14 +126,46 @@ class Motion:
             while self.time < end:
                 yield from self._to(float(end))
 
+    def table(self) -> Array:
+        """Time, error, velocity of the measured place and force so far, (times, 4)."""
+        self.watched[2] = self._piece().force
+        now = np.array([[self.time, *(self.watched @ self.state)]])
+        kept = [*self.trace.rows, *([now] if self.time > 0 else [])]
+        return np.concatenate(kept) if kept else np.zeros((0, 4))
+
     def _to(self, end: float) -> Iterator[Stroke | None]:
-        """Go on to the next sample, or to the end."""
-        if self.sampled is not None:
-            if self.sampled.act(self.time, self.state):
-                self._placed()
-            end = min(end, self.sampled.next)
+        """Go on to the end, or in the compiled core until the mode may change, and by a step or to a sample then."""
+        if self.core is not None:
+            end = self._follow(self.core, end)
+            yield None
         while self.time < end:
             yield self._step(end)
+            if not self.exact:
+                break
+
+    def _follow(self, core: CompiledMotion, end: float) -> float:
+        """Go on in this mode; the time up to which steps are to be taken, if any."""
+        clock, strokes = core.clock, self.trace.strokes
+        last = strokes[-1] if strokes else Stroke(0.0, 0.0)
+        rests = self.sampled and not any(self.mode.contacts)
+        since = last.end if np.isfinite(last.end) else 0.0
+        if isinstance(self.stepper, BristleSteps):
+            self.stepper.begin(self._piece(), self.state)
+        clock[[Held.TIME, Held.END, Held.RESTS, Held.SINCE]] = self.time, end, rests, since
+        clock[[Held.LOWEST, Held.HIGHEST, Held.FASTEST]] = last.lowest, last.highest, last.fastest
+        clock[[Held.PACE, Held.FAR]] = self._pace, self._far
+        self.watched[2] = self._piece().force
+        may_switch, rows = core.follow(self._piece(), self.watched, self.state, bool(self.fresh))
+        if len(rows):
+            self.trace.rows.append(rows.copy())
+        if self.time < clock[Held.TIME]:
+            self.time, self.at_once = float(clock[Held.TIME]), 0
+            if strokes:
+                self._widen(*clock[[Held.LOWEST, Held.HIGHEST, Held.FASTEST]])
+        if clock[Held.CHANGED] and may_switch:
+            clock[Held.CHANGED] = 0.0
+            self._placed()
+        return float(clock[Held.STOP]) if may_switch else self.time
 
     def _piece(self) -> HeldPiece:
         key = (self.mode, self.acceleration)
@@ -141,29 +173,8 @@ class Motion:
             self.pieces[key] = HeldPiece(self.plant, *key)
         return self.pieces[key]
 
-    def _pass(self, end: float) -> bool:
-        """Go on to the next sample at once; False where that is not exact, or a contact may stick or slide before."""
-        if self.sampled is None or not self.exact or self.fresh:
-            return False
-        length = self.sampled.period * round((end - self.time) / self.sampled.period, SAME)
-        key = (self.mode, self.acceleration, length)
-        if key not in self.passages:
-            piece = self._piece()
-            self.watched[2] = piece.force
-            self.passages[key] = Passage(piece, self.watched, length) if piece.fastest * length <= 1 else None
-        passage = self.passages[key]
-        found = None if passage is None else passage.passed(self.state)
-        if found is None:
-            return False
-        self.state, values = found
-        self._keep(self.time + length * NODES, values)
-        self.time, self.at_once, self.steps = end, 0, self.steps + 1
-        return True
-
     def _step(self, end: float) -> Stroke | None:
         """Take one step, at most to a switch or the `end`; the stroke that it completes, or None."""
-        if self._pass(end):
-            return None
         piece = self._piece()
         length, coefficients = self.stepper.step(piece, self.state, end - self.time)
         self.steps += 1
@@ -228,7 +239,7 @@ class Motion:
     def _placed(self) -> None:
         """Positions of all switches after a jump of the target or of the force."""
         plant, limits, moved = self.plant, self.plant.limits, any(self.mode.contacts)
-        if self.sampled is None:
+        if not self.sampled:
             if limits.dead_band is not None:
                 self.mode = self.mode.switched(_side("band", float(plant.error() @ self.state), limits.dead_band))
             if limits.integral is not None and plant.integral:
@@ -264,21 +275,36 @@ class Motion:
         """Keep values (3, nodes) of a step at its times, and the extremes of the stroke."""
         self.trace.rows.append(np.array([times[KEPT], *values[:, KEPT]]).T)
         if self.trace.strokes:
-            last = self.trace.strokes[-1]
-            speeds = np.abs(values[1])
-            if min(values[0, 0], values[0, -1]) - last.lowest < np.ptp(values[0]) or not np.isfinite(last.lowest):
-                last.lowest = min(last.lowest, _least(values[0]))
-            if last.highest - max(values[0, 0], values[0, -1]) < np.ptp(values[0]) or not np.isfinite(last.highest):
-                last.highest = max(last.highest, -_least(-values[0]))
-            if last.fastest < 2 * speeds.max():
-                last.fastest = max(last.fastest, -_least(-speeds))
-            self.fastest = max(self.fastest, last.fastest)
-            self.farthest = max(self.farthest, last.highest, -last.lowest)
+            self._widen(_least(values[0]), -_least(-values[0]), -_least(-np.abs(values[1])))
+
+    def _widen(self, lowest: float, highest: float, fastest: float) -> None:
+        """Extend the extremes of the last stroke, and of all."""
+        last = self.trace.strokes[-1]
+        last.lowest, last.highest = min(last.lowest, float(lowest)), max(last.highest, float(highest))
+        last.fastest = max(last.fastest, float(fastest))
+        self.fastest = max(self.fastest, last.fastest)
+        self.farthest = max(self.farthest, last.highest, -last.lowest)
+
+    @property
+    def steps_in_core(self) -> int:
+        """Number of steps of the compiled core."""
+        return self.core.steps if self.core else 0
+
+    @property
+    def _far(self) -> float:
+        """Error (m or rad) from which on nothing ends its growth; infinite if nothing tells."""
+        far = AWAY * max(self.expected, abs(float(self.state[2 * self.plant.size + 1])))
+        return far or np.inf
+
+    @property
+    def _pace(self) -> float:
+        """Speed (m/s or rad/s) up to which what moves may be at rest."""
+        return self.still * max([self.fastest, *(one.slow for one in self.plant.contacts)])
 
     @property
     def runs_away(self) -> bool:
         """True if the error has become so large that nothing ends its growth."""
-        return bool(0 < AWAY * max(self.expected, abs(self.state[2 * self.plant.size + 1])) < self.farthest)
+        return self._far < self.farthest
 
     @property
     def at_rest(self) -> bool:
@@ -287,19 +313,19 @@ class Motion:
         Sliding, or bristles, that ever slower approach the target count as at rest where the error is `STILL` of the
         largest.
         """
-        plant, n = self.plant, self.plant.size
+        n = self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
             return False
-        if self.sampled is not None and not (self.sampled.constant and not any(self.mode.contacts)):
+        if self.sampled and not (self.core and self.core.constant and not any(self.mode.contacts)):
             return False
-        pace = self.still * max([self.fastest, *(one.slow for one in plant.contacts)])
+        pace = self._pace
         if np.any(np.abs(self.state[n : 2 * n]) > pace):
             return False
         rates = self.stepper.rate(self._piece(), self.state)
         moves = any(self.mode.contacts) or not self.exact  # a bristle can bend at any force, so that none is stuck
         if moves and np.any(np.abs(rates[n : 2 * n]) > pace * self.stepper.fastest(self._piece(), self.state)):
             return False
-        if self.sampled is not None:
+        if self.sampled:
             return True
         winds_up = self.mode.limit * float(self._piece().wanted @ rates) > 0  # the force stays at its limit
         return winds_up or bool(abs(rates[2 * n]) <= (self.still * self.farthest if moves else 0.0))

@@ -1,0 +1,203 @@
+"""Contacts with memory (bristles) as a compiled routine, and the steps of Rodas5P that call it.
+
+The routine has friction forces, rates of the memories and the slopes of both, as functions of slip rates and memories.
+It depends on the kinds of the laws alone; their numbers are its constants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import derivative
+from steadyslip.core.records import parameters, shape_of, with_values
+from steadyslip.core.symbols import inner_symbol
+from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
+from steadyslip.kernels.layout import Held, Routines, make_layout
+from steadyslip.kernels.methods import rodas5p
+from steadyslip.kernels.nodes import Program
+from steadyslip.kernels.source import Constants, Formulas
+from steadyslip.laws.friction import FrictionLaw
+from steadyslip.nonlinear.hunting.held_modes import HeldPiece
+from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
+
+SHORTEST = 1e-15  # s, of a step; far below the period of any bristle
+RATES, ALLOWED, FIXED = 0, 1, 2  # ways of `steadyslip.kernels.driver.bristles.bristle_step`
+
+
+class Bristles:
+    """Equations Y' = A Y + H f(G Y) of a plant, f friction forces and rates of memories, as arrays for the core.
+
+    Parameters
+    ----------
+    plant : Plant
+    rtol : float
+        Error allowed per step, relative to the largest size of each variable so far.
+    scale : ndarray (width,)
+        Least size of each variable.
+
+    Attributes
+    ----------
+    arrays : tuple of ndarray
+        Constants of the routine, and coefficients of Rodas5P.
+    maps : tuple of ndarray
+        G and H.
+    clock : ndarray
+        See `steadyslip.kernels.layout.Held`.
+    code : Code
+    """
+
+    def __init__(self, plant: Plant, rtol: float, scale: Array) -> None:
+        contacts = [one for one in plant.contacts if one.slow]
+        self.scale, self.clock, self.maps = scale.copy(), np.zeros(Held.SIZE), _maps(plant, contacts)
+        self.clock[[Held.RTOL, Held.SHORTEST, Held.LENGTH]] = rtol, SHORTEST, np.nan
+        if contacts:
+            laws = tuple(one.port.friction for one in contacts)
+            routine = _routine(_Kinds(tuple(map(shape_of, laws)), laws))
+            self.code, self.arrays = routine.code, (routine.constants(contacts), _tableau())
+        else:
+            layout = make_layout(lanes=1, size=0, kept=0, constants=0, inputs=0)
+            self.code = Code(layout, Routines(*[0] * len(Routines._fields)), interpreting())  # type: ignore[arg-type]
+            self.arrays = np.zeros(1), np.zeros((1, 1))
+
+
+class BristleSteps(Bristles):
+    """Steps of Rodas5P for contacts with memory; the length of a step is kept for the next piece."""
+
+    def begin(self, piece: HeldPiece, state: Array) -> None:
+        """Choose the first step, unless one has been taken."""
+        if np.isnan(self.clock[Held.LENGTH]):
+            self.clock[Held.LENGTH] = 1.0 / self.fastest(piece, state)
+
+    def step(self, piece: HeldPiece, state: Array, most: float) -> tuple[float, Array]:
+        """Length of a step whose error is allowed, at most `most` (s), and its coefficients (5, width)."""
+        self.begin(piece, state)
+        self.clock[Held.STOP] = most
+        found, _, _ = self._called(piece, state, ALLOWED)
+        return float(self.clock[Held.STOP]), found
+
+    def noise(self, piece: HeldPiece, rows: Array, coefficients: Array, length: float) -> Array:
+        """Errors of the first three coefficients of rows, (rows, 3): of a guard that was just passed, its value."""
+        found = np.zeros((len(rows), 3))
+        found[:, 0] = 1e-9 * np.abs(rows) @ np.abs(coefficients[0])
+        return found
+
+    def until(self, piece: HeldPiece, state: Array, coefficients: Array, length: float, share: float) -> Array:
+        """State at a share of a step, by a step to there: dense output is of lower order."""
+        if share == 0:
+            return state
+        self.clock[Held.STOP] = share * length
+        return np.asarray(self._called(piece, state, FIXED)[0].sum(axis=0))
+
+    def rate(self, piece: HeldPiece, state: Array) -> Array:
+        """Rates of all variables."""
+        return self._called(piece, state, RATES)[1]
+
+    def fastest(self, piece: HeldPiece, state: Array) -> float:
+        """Largest eigenvalue (1/s) of the motion."""
+        return float(np.max(np.abs(np.linalg.eigvals(self._called(piece, state, RATES)[2]))))
+
+    def _called(self, piece: HeldPiece, state: Array, way: int) -> tuple[Array, Array, Array]:
+        """Dense output of a step from a state, rates and Jacobian there."""
+        width = len(state)
+        found, rates, jacobian = np.zeros((5, width)), np.zeros(width), np.zeros((width, width))
+        if self.code.bristle_step(
+            *self.arrays, piece.matrix, *self.maps, self.scale, state, self.clock, found, rates, jacobian, way
+        ):
+            raise NotAvailable(TOO_SHORT)
+        return found, rates, jacobian
+
+
+TOO_SHORT = "the motion of the bristles cannot be followed: steps become too short"
+
+
+def _maps(plant: Plant, contacts: Sequence[HeldContact]) -> tuple[Array, Array]:
+    """G, (m, width), and H, (width, m), for slip rate and memory of each contact in turn."""
+    count, n, place = plant.memory + len(contacts), plant.size, 2 * plant.size + 4
+    into, out_of, k = np.zeros((count, plant.width)), np.zeros((plant.width, count)), 0
+    for one in contacts:
+        into[k] = plant.slip(one)
+        out_of[n : 2 * n, k] = -one.row / plant.inertia
+        for _ in one.port.friction.memory():
+            k += 1
+            into[k, place] = out_of[place, k] = 1.0
+            place += 1
+        k += 1
+    return into, out_of
+
+
+@lru_cache(maxsize=1)
+def _tableau() -> Array:
+    """Coefficients of Rodas5P in the rows that `steadyslip.kernels.driver.bristles` expects."""
+    method = rodas5p()
+    rows = [*method.arguments(), *method.c, method.error, *method.dense, (method.gamma,)]
+    return np.array([(*row, *(0.0,) * (method.stages - len(row))) for row in rows])
+
+
+# -- the routine
+
+
+@dataclass(frozen=True)
+class _Kinds:
+    """Laws, equal if they are of the same kind."""
+
+    shapes: tuple[Any, ...]
+    laws: tuple[FrictionLaw, ...] = field(compare=False)
+
+
+@lru_cache(maxsize=64)
+def _routine(kinds: _Kinds) -> _Routine:
+    return _Routine(kinds.laws)
+
+
+class _Routine:
+    """Compiled routine of some laws, whatever their numbers."""
+
+    def __init__(self, laws: Sequence[FrictionLaw]) -> None:
+        arguments: list[sp.Symbol] = []
+        groups: list[list[sp.Symbol]] = []
+        values: list[list[sp.Expr]] = []
+        for index, law in enumerate(laws):
+            names = _given(law)
+            area, sigma, *given = own = [
+                inner_symbol(f"law{index}.{name}", real=True) for name in ("area", "sigma", *names)
+            ]
+            arguments += own
+            symbolic = with_values(law, dict(zip(names, given, strict=True)))
+            group = [inner_symbol(f"bristle{index}.{k}", real=True) for k in range(1 + len(law.memory()))]
+            v, memory = group[0], tuple(group[1:])
+            strength = area * symbolic.strength(v, sigma, memory, sp.nan)
+            groups.append(group)
+            values.append([strength, *map(sp.sympify, symbolic.rates(v, sigma, memory, sp.nan))])
+        variables = [one for group in groups for one in group]
+        slopes = [derivative(value, by) if by in group else sp.Integer(0)
+                  for group, own in zip(groups, values, strict=True) for value in own for by in variables]  # fmt: skip
+        constants = Constants(variables)
+        written = [constants.with_constants(one) for one in (*(one for own in values for one in own), *slopes)]
+        self._function = constants.function(arguments)
+        program = Program("bristles")
+        loads: dict[str, Any] = {one.name: program.load(k, "y") for k, one in enumerate(variables)}
+        loads |= {one.name: program.load(k) for k, one in enumerate(constants.all)}
+        for k, value in enumerate(Formulas(written, {})(loads)):
+            program.store(len(variables) + k, value, "y")
+        layout = make_layout(lanes=1, size=0, kept=0, constants=len(constants.all), inputs=0)
+        self.code = (interpreted if interpreting() else compiled)([program], layout)
+
+    def constants(self, contacts: Sequence[HeldContact]) -> Array:
+        """Constants of the routine for contacts with such laws."""
+        given: list[Any] = []
+        for one in contacts:
+            found = parameters(one.port.friction)
+            given += [one.port.area, one.normal, *(found[name].value for name in _given(one.port.friction))]
+        return np.array([float(value) for value in self._function(*given)] or [0.0])
+
+
+def _given(law: FrictionLaw) -> list[str]:
+    """Names of the numbers that a law has."""
+    return [name for name, one in parameters(law).items() if one.value is not None]

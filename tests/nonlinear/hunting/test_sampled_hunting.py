@@ -1,0 +1,114 @@
+"""Hunting under a sampled controller, by the compiled core: a second route by hand, long motions, bounds."""
+
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from hunting_by_scipy import RINGING, SAMPLED, axis, sampled, sampled_at_random
+from steadyslip.nonlinear.hunting.in_mode import CompiledMotion
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+THEORY = {"mass": 1.0, "rest": 1.5, "sliding": 1.0, "viscous": 0.4, "kp": 3.0, "kd": 6.0, "ki": 4.0}
+BRISTLES = (1e3, 30.0, 5e-3)
+FINE = {"sample_time": 1e-3, "resolution": 1e-6, "derivative": "measurement"}
+
+
+@pytest.mark.parametrize("kind", SAMPLED)
+def test_a_sampled_controller_is_that_of_a_simulation_by_hand(kind):
+    assert sampled(THEORY, SAMPLED[kind], 0.05, 60.0)[0] < 1e-9
+
+
+@pytest.mark.parametrize("kind", SAMPLED)
+def test_bristles_under_a_sampled_controller_are_those_of_scipy(kind):
+    """SciPy's route allows 1e-10 a step, of 60 spans that each begin anew; the other 1e-10 as well."""
+    assert sampled(THEORY, SAMPLED[kind], 0.05, 3.0, BRISTLES, rtol=1e-10)[0] < 1e-7
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("bristles", [False, True])
+@pytest.mark.parametrize("kind", SAMPLED)
+def test_random_sampled_axes_are_those_of_a_simulation_by_hand(kind, bristles):
+    found = [sampled_at_random(np.random.default_rng([4, i]), kind, bristles) for i in range(4 if bristles else 20)]
+    assert max(found) < (1e-6 if bristles else 1e-10)
+
+
+@pytest.mark.parametrize("bristles", [False, True])
+def test_a_fine_encoder_and_short_samples_are_the_continuous_controller(bristles):
+    """1 ms and 1 um: 270 000 samples, and the cycle of theory 14 within what such samples change."""
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml") if bristles else axis(**THEORY)
+    one = ss.hunt(replace(held, drive=replace(held.drive, derivative="measurement")))
+    two = ss.hunt(replace(held, drive=replace(held.drive, **FINE)))
+    assert two.hunts
+    assert not two.repeats
+    assert two.time[-1] / 1e-3 > 2e5
+    assert two.period == pytest.approx(one.period, rel=2e-3)
+    assert two.highest == pytest.approx(one.highest, rel=3e-3)
+    assert two.fastest == pytest.approx(one.fastest, rel=1e-3)
+    assert len(two.time) < 5e5  # at rest not every sample is kept
+
+
+@pytest.mark.parametrize("friction", ["coulomb", "lugre"])
+def test_a_machine_moves_in_the_core_as_step_by_step(friction, monkeypatch):
+    """The same pieces and switches, sample by sample from outside: with a dead time that is no multiple of them."""
+    text = RINGING.replace('ki = "50', 'sample_time = "4 ms"\ndelay = "5 ms"\nderivative = "measurement"\nki = "50')
+    if friction == "lugre":
+        more = 'law = "lugre"\nv_stribeck = "80 mm/min"\nviscous = "1 s/m"\nbristle_stiffness = "1e5 1/m"'
+        text = text.replace('law = "coulomb"', more)
+    rig = ss.rig_from_text(text)
+    one = ss.hunt(rig, until=0.6)
+    follow = CompiledMotion.follow
+    monkeypatch.setattr(CompiledMotion, "follow", lambda self, *given: follow(self, *given[:-1], True))
+    two = ss.hunt(rig, until=0.6)
+    assert len(one.strokes) == len(two.strokes) > 1
+    starts, ends = ([[getattr(stroke, name) for stroke in found.strokes] for found in (one, two)]
+                    for name in ("start", "ends"))  # fmt: skip
+    assert starts[0] == pytest.approx(starts[1], rel=1e-7)
+    assert ends[0] == pytest.approx(ends[1], abs=1e-7 * np.abs(one.error).max(), nan_ok=True)
+
+
+def test_an_axis_whose_strokes_shrink_at_first_is_followed_until_they_do_not():
+    """After 12 strokes, "SETTLES: ... in ever smaller strokes" was told; it hunts on for as long as one looks."""
+    held = ss.rig_from_text("""
+    friction = {law = "coulomb", mu_coulomb = 0.11, mu_static = 0.19, viscous = "0.1 s/m"}
+    contact = {law = "constant", preload = "3.2 kN"}
+    slider = {area = "200 cm^2", mass = "240 kg", damping = "1 N s/mm"}
+    [drive]
+    control = "pid"
+    velocity = 0
+    kp = "12 N/um"
+    kd = "50 N s/mm"
+    ki = "200 N/um/s"
+    sample_time = "1 ms"
+    resolution = "1 um"
+    derivative = "measurement"
+    """)
+    short, long = ss.hunt(held), ss.hunt(held, until=60.0)
+    assert short.hunts
+    assert long.hunts
+    assert short.highest == pytest.approx(long.highest, rel=0.1)
+    assert short.period == pytest.approx(long.period, rel=0.02)
+
+
+def test_a_sampled_axis_with_an_encoder_is_told_by_its_average():
+    """Its strokes never repeat themselves: they end when the controller samples."""
+    found = ss.hunt(axis(**THEORY, sample_time=0.01, resolution=1e-3, derivative="measurement"))
+    assert found.hunts
+    assert len(found.strokes) == pytest.approx(24, abs=2)
+    assert found.highest == pytest.approx(0.0657, rel=0.05)
+    assert re.fullmatch(r"HUNTS .* about the target every 2[34]\.\d+ s( on average)?", found.sentence)
+
+
+@pytest.mark.parametrize("bristles", [False, True])
+def test_work_in_the_core_is_bounded_and_said(bristles, monkeypatch):
+    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.hunting.hunt"], "IN_CORE", 5000)
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml") if bristles else axis(**THEORY)
+    found = ss.hunt(replace(held, drive=replace(held.drive, **FINE)))
+    assert found.stopped
+    assert found.sentence.startswith("NOT DECIDED by ")
+    less = " or rtol, or law = 'coulomb' with mu_static," if bristles else ""
+    assert f"the work was used up; a larger sample_time{less} takes less" in str(found)

@@ -34,16 +34,20 @@ from steadyslip.figures.map_axes import (
     result_label,
 )
 from steadyslip.figures.style import AREAS, EDGES, OWN_RIG, SAFETY_WORDS, axis_label, display_unit
+from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.status import ABSENT, QUIET, STABLE, UNDAMPED, status as status_of
+from steadyslip.linear.stiffness import growth_rate
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.map_result import MapResult
+from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 
 _POWERS, _SUPERSCRIPTS = 4, str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")  # 0.001 and 1000 are easy to read
 _ROOM = 0.03  # of an axis beyond its end, so that a mark there is whole: a little more than half of it
+_CLOSER, _MOST = 8, 101  # times as many points as a map for contours; most along an axis, where a map has fewer
 _FINE = 8  # times as many points as a map has, for words in its areas
 
 
@@ -68,7 +72,7 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
     if "status" in view.values and not view.shares:
         line = _edge(ax, view.values["status"], plane, within)
     _mark_own(ax, found, view, scales, line, with_values=scale is None)
-    drawn = _contours(ax, x, y, view, name, found, (within, line)) if name is not None and judged else []
+    drawn = _contours(ax, plane, name, found, (within, line)) if name is not None and judged else []
     if judged and not view.shares:
         _words(ax, view.values["status"], plane, [*drawn, *line])
 
@@ -172,6 +176,24 @@ class _Refined:
         """Convert fractions of the axes, shape (n, 2), to their units."""
         return self.scales[0](self._values(shares[:, 0], 0)), self.scales[1](self._values(shares[:, 1], 1))
 
+    def finer(self, name: str, along: str | None, values: Array) -> tuple[Array, Array, Array, Array]:
+        """Units of both axes, statuses and values of a result, at `_CLOSER` times the points of a map, for contours.
+
+        Those of the map itself for results that are not computed here, and where there is no rig or it takes long.
+        """
+        status = self.view.values["status"]
+        sizes = [min(_CLOSER * (n - 1) + 1, max(n, _MOST)) for n in status.shape[::-1]]
+        quick = self.rig is not None and not by_matrices(self.rig) and not operating_point(self.rig).model.delays
+        if self.rig is None or not quick or self.view.shares or name not in ("growth_rate", "safety_factor"):
+            x, y = (s(p) for s, p in zip(self.scales, self.view.places, strict=True))
+            return x, y, status, values
+        a, b = (np.linspace(0, 1, n) for n in sizes)
+        vary = self.vary(*np.meshgrid(a, b))
+        status = status_of(operating_point(self.rig, vary, scan=True))
+        rate = growth_rate(self.rig, vary) if name == "growth_rate" else safety_factor(self.rig, vary, along=along)
+        x, y = (scale(self._values(one, n)) for n, (scale, one) in enumerate(zip(self.scales, (a, b), strict=True)))
+        return x, y, status, np.where(np.isin(status, SLIDING) & (status != UNDAMPED), rate, np.nan)
+
     def outline(self, mask: Array, *codes: int, known: Any = True) -> Path:
         """Outline, in the units of the axes, of the region of these statuses; `mask` has them on the grid."""
         if min(mask.shape) < 2 or not len(path := regions.region_path(self.has(*codes), mask, known)):
@@ -213,14 +235,15 @@ def _share_of_stable(ax: Axes, x: Array, y: Array, view: View) -> None:
 
 
 def _contours(
-    ax: Axes, x: Array, y: Array, view: View, name: str, found: MapResult, around: tuple[Path | None, Sequence[Array]]
+    ax: Axes, plane: _Refined, name: str, found: MapResult, around: tuple[Path | None, Sequence[Array]]
 ) -> list[Array]:
     """Draw contours of a result and return their lines; `around` has the outline of steady sliding and the edges."""
-    status = view.values["status"]
-    values = np.where(status == UNDAMPED, np.nan, view.values[name])
+    view = plane.view
+    values = np.where(view.values["status"] == UNDAMPED, np.nan, view.values[name])
     good = values[np.isfinite(values)]  # of an undamped rig a growth rate is rounding
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
         return []
+    x, y, status, values = plane.finer(name, found.along(name), values)
     levels, fields = [one for one in SAFETY_LEVELS if one != 1 or view.shares], [values]
     label = SAFETY_WORDS if found.along(name) is None else result_label(found, name)
     shown = levels

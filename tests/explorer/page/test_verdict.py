@@ -78,12 +78,26 @@ def test_lines_of_levels_are_where_a_plane_has_them():
     assert places[:, 1].min() >= 10
 
 
+def test_bent_lines_of_levels_are_where_a_function_has_them():
+    """On a hyperbola over few cells: sides and middles lie on it, which straight lines in cells miss by far."""
+    function = "(x, y) => Math.exp(8 * x * y)"
+    grid = f"Array.from({{ length: 7 }}, (_, j) => Array.from({{ length: 7 }}, (_, i) => ({function})(i / 6, j / 6)))"
+    how = f"{{ exact: {function}, steep: 0, steps: 5, bends: true }}"
+    straight, bent = (Script(page_modules())(f"line({grid}, 9, 600, 600, {one}).path") for one in ("{}", how))
+    off = []
+    for path in (straight, bent):
+        x, y = np.array(re.findall(r"[\d.]+", path), dtype=float).reshape(-1, 2).T / 600
+        off.append(np.abs(x * (1 - y) - np.log(9) / 8).max())
+    assert off[1] < 0.002 < 0.01 < off[0]
+    assert bent.count("L") == 2 * bent.count("M") == 2 * straight.count("L")
+
+
 def test_contours_end_at_edges_only():
     """Numbers are carried on beyond the edge of steady sliding by one point, where lines are cut; jumps have none."""
     page = Script(page_modules())
     grid = "[[0, 1, NaN, NaN], [0, 1, NaN, NaN], [0, 1, NaN, NaN]]"
     np.testing.assert_allclose(np.array(page(f"carried({grid}).map((row) => row.slice(0, 3))")), 3 * [[0, 1, 2]])
-    assert page("line([[0, 3], [0, 3]], 1.5, 60, 40, 1).path") == ""
+    assert page("line([[0, 3], [0, 3]], 1.5, 60, 40, { jump: 1 }).path") == ""
     assert page("line([[0, 3], [0, 3]], 1.5, 60, 40).path")
 
 

@@ -77,31 +77,56 @@ export function carried(grid) {
   }));
 }
 
-const STEEP = 0.15, HALVINGS = 8; // STEEP: difference between neighbours beyond which a crossing is searched for; HALVINGS: of a cell
+const STEEP = 0.15, TRIES = 8; // STEEP: difference between neighbours beyond which a crossing is searched for; TRIES: of a search
+
+/** Position from 0 to 1 at which a function with ends `a` and `b` of either sign is zero, by false position (Illinois). */
+function zero(f, a, b, steps) {
+  let low = 0, high = 1, t = a / (a - b);
+  for (let n = 0, kept = 0; n < steps; n++) {
+    const now = f(t);
+    if (!now || !Number.isFinite(now)) return t;
+    if (now * a > 0) {
+      if (kept < 0) b /= 2;
+      [low, a, kept] = [t, now, -1];
+    } else {
+      if (kept > 0) a /= 2;
+      [high, b, kept] = [t, now, 1];
+    }
+    t = low + ((high - low) * a) / (a - b);
+  }
+  return t;
+}
 
 /**
- * SVG path of the line of a level over a grid of numbers, straight within its cells, and the middles of its pieces; none in cells with a `jump`.
- * @param {number[][]} grid @param {number} at @param {((x: number, y: number) => number) | null} [exact] numbers at positions from 0 to 1
+ * SVG path of the line of a level over a grid of numbers, and the middles of its pieces; none in cells with a `jump`. It is straight
+ * within cells, or with `exact`, numbers at positions from 0 to 1, crosses their sides where these are reached if they change by more
+ * than `steep`; with `bends` in so many `steps` each, and with a vertex inside cells, which one step along the gradient finds.
+ * @param {number[][]} grid @param {number} at @param {{jump?: number, exact?: ((x: number, y: number) => number) | null, steep?: number, steps?: number, bends?: boolean}} [how]
  */
-export function line(grid, at, width, height, jump = Infinity, exact = null) {
-  const rows = grid.length - 1, columns = grid[0].length - 1, middles = /** @type {[number, number][]} */ ([]);
+export function line(grid, at, width, height, { jump = Infinity, exact = null, steep = STEEP, steps = TRIES, bends = false } = {}) {
+  const rows = grid.length - 1, columns = grid[0].length - 1, middles = /** @type {[number, number][]} */ ([]), known = /** @type {Record<string, number>} */ ({});
+  const beyond = (x, y) => (exact ? exact(x / columns, y / rows) : NaN) - at, shown = ([x, y]) => [(x / columns) * width, (1 - y / rows) * height];
   let path = "";
   for (let j = 0; j < rows; j++) {
     for (let i = 0; i < columns; i++) {
-      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]], values = corners.map(([x, y]) => grid[y][x]);
+      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]], values = corners.map(([x, y]) => grid[y][x] - at), [a, b, c, d] = values;
       if (Math.max(...values) - Math.min(...values) > jump) continue;
-      const ends = corners.flatMap(([x, y], k) => {
-        const [u, v] = corners[(k + 1) % 4], a = values[k] - at, b = values[(k + 1) % 4] - at;
-        let t = a / (a - b);
-        if (exact && a * b < 0 && Math.abs(a - b) > STEEP) {
-          t = 0.5;
-          for (let n = 2; n <= HALVINGS; n++) t += ((exact((x + t * (u - x)) / columns, (y + t * (v - y)) / rows) - at) * a > 0 ? 1 : -1) / 2 ** n;
-        }
-        return a * b < 0 ? [[((x + t * (u - x)) / columns) * width, (1 - (y + t * (v - y)) / rows) * height]] : [];
+      const ends = [[0, 1], [1, 2], [3, 2], [0, 3]].flatMap(([k, l]) => {
+        const [x, y] = corners[k], [u, v] = corners[l], one = values[k], other = values[l], side = `${[x, y, u]}`;
+        if (!(one * other < 0)) return [];
+        const t = known[side] ??= zero((share) => beyond(x + share * (u - x), y + share * (v - y)), one, other, exact && Math.abs(one - other) > steep ? steps : 0);
+        return [[x + t * (u - x), y + t * (v - y)]];
       });
       if (ends.length !== 2) continue;
-      path += `M${ends.map((one) => one.map((v) => v.toFixed(1)).join(" ")).join("L")}`;
-      middles.push([0.5 * (ends[0][0] + ends[1][0]), 0.5 * (ends[0][1] + ends[1][1])]);
+      const [first, last] = ends, middle = [0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1])];
+      if (bends) {
+        const [u, v] = [middle[0] - i, middle[1] - j], gx = (1 - v) * (b - a) + v * (c - d), gy = (1 - u) * (d - a) + u * (c - b), off = beyond(middle[0], middle[1]) / (gx * gx + gy * gy);
+        if (Math.hypot(off * gx, off * gy) < 0.5) [middle[0], middle[1]] = [middle[0] - off * gx, middle[1] - off * gy];
+        ends.splice(1, 0, middle);
+      }
+      path += `M${ends.map((one) => shown(one).map((value) => value.toFixed(1)).join(" ")).join("L")}`;
+      const [x, y] = shown(middle);
+      middles.push([x, y]);
     }
   }
   return { path, middles };

@@ -9,6 +9,7 @@ import { kindWords } from "./words.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
 const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows of machines and of sliders, and levels of k/k_cr
+const FEW = 5; // steps of the search for a contour of a machine on a side of a cell: each is some .2 ms, and the growth rate is smooth
 const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
@@ -99,12 +100,13 @@ export class Chart {
   contours(i, x, j, y, words) {
     const { size: { width, height }, rig, sliding } = this.page, { phrases, facts } = rig.data, cells = phrases ? CELLS : FINE, columns = Math.round(1.3 * cells);
     this.lines.replaceChildren();
+    clearTimeout(this.finer);
     if (sliding || facts.searched.some(Boolean)) return;
     const exact = (a, b) => rig.strength(i, x.at(a), j, y.at(b));
     const grid = carried(Array.from({ length: cells + 1 }, (_, b) => Array.from({ length: columns + 1 }, (_, a) => exact(a / columns, b / cells))));
     const top = Math.ceil(Math.log10(Math.max(...grid.flat().map(Math.abs).filter(Number.isFinite)))) - 1;
     const levels = phrases ? [-1, -0.1, 0.1, 1].map((share) => share * 10 ** top) : LEVELS;
-    const at = (level) => (phrases ? line(grid, level, width, height) : line(grid, level, width, height, 1, exact)), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
+    const at = (level) => (phrases ? line(grid, level, width, height) : line(grid, level, width, height, { jump: 1, exact })), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
     const drawn = levels.map((level) => {
       if (phrases) return at(level);
       const [lower, upper] = [0, UPPER].map((more) => at(level / (1 + level) + more));
@@ -115,6 +117,15 @@ export class Chart {
       const room = ([u, v]) => Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b, wide = 1]) => Math.hypot(wide * (a - u), b - v)));
       const [u, v] = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
       this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...(room([u, v]) > TIGHT ? [svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))] : []));
+    });
+    if (phrases) this.refine(Array.from(this.lines.querySelectorAll("path")), (n) => line(grid, levels[n], width, height, { exact, steep: 0, steps: FEW, bends: true }).path);
+  }
+
+  /** Draw contours of a machine anew where they run exactly, one after another, so that the page answers in between. @param {any[]} paths @param {(n: number) => string} exactly */
+  refine([path, ...others], exactly, n = 0) {
+    if (path) this.finer = setTimeout(() => {
+      put(path, "d", exactly(n));
+      this.refine(others, exactly, n + 1);
     });
   }
 

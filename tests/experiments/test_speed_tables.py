@@ -1,5 +1,6 @@
 """Friction laws from tables of speeds: reading, intervals that cover, and the rig files made of them."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -133,13 +134,50 @@ def test_two_columns_of_friction_are_two_directions(tmp_path):
 
 
 def test_a_column_that_is_named_settles_which_of_two_it_is(tmp_path):
-    """A load of a joint in N m looks like its torque."""
     path = tmp_path / "joint.csv"
     rows = ((1, 20), (2, 18), (5, 15), (10, 13), (20, 12), (50, 11.5), (100, 12))
     text = "".join(f"{speed};{torque};100\n" for speed, torque in rows)
-    path.write_text("speed [1/min];Drehmoment [Nm];Last [Nm]\n" + text, encoding="utf-8")
+    path.write_text("speed [1/min];Drehmoment [Nm];Moment 2 [Nm]\n" + text, encoding="utf-8")
     assert "say which with torque=NAME" in command("fit", path, "--law", "coulomb").stderr
     assert "mu_coulomb" in command("fit", path, "--law", "coulomb", "--set", "torque=Drehmoment").stdout
+
+
+@pytest.mark.parametrize("load", [None, "N", "N m"])
+@pytest.mark.parametrize("radius", [None, "40 mm"])
+def test_a_joint_has_the_torques_of_its_table_at_any_radius(tmp_path, load, radius):
+    """The load column, in N m or N, presses beside 30 of what is not in it, of which the file has the middle."""
+    path, r = tmp_path / "joint.csv", 1.0 if radius is None else 0.04
+    speeds, loads = np.array([0.5, 1, 2, 5, 10, 20, 50, 100]) * np.pi / 30, (10.0, 40.0) if load == "N" else (0.0, 40.0)
+    shape = curve(speeds, 0.1, 0.2, 0.5, 0.02, 1.0)
+    if load is None:
+        rows = [f"{30 * v / np.pi:.12g},{20 * mu:.12g}" for v, mu in zip(speeds, shape, strict=True)]
+    else:
+        rows = [
+            f"{30 * v / np.pi:.12g},{(30 + n) * mu:.12g},{n}"
+            for n in loads
+            for v, mu in zip(speeds, shape, strict=True)
+        ]
+    path.write_text("\n".join(["speed [rpm],torque [Nm]" + (f",load [{load}]" if load else ""), *rows]))
+    options = ("--set", f"radius={radius}") if radius else ()
+    done = command("fit", path, "--law", "lugre", "--set", "viscous=0.02" if load else "stribeck_exponent=1", *options,
+                   "-o", tmp_path / "rig.toml")  # fmt: skip
+    assert ("The rig file has the friction at a radius of 1 m" in done.stdout) is (radius is None)
+    rig = ss.read_rig(tmp_path / "rig.toml")
+    assert rig.contacts["bearing"].radius == r
+    for v, mu in zip(speeds, shape, strict=True):
+        steady = ss.steady_state(rig.with_values({"drive.velocity": v})).contacts["bearing"]
+        whole = 20 * mu if load is None else (30 + np.mean(loads)) * mu
+        assert steady.friction_force * r == pytest.approx(whole, rel=1e-3)
+    if load:
+        assert re.search(rf"internal_preload +(30|29\.9+|30\.0+) ± .* {load}, 95 %", done.stdout)
+
+
+def test_a_radius_is_of_what_turns(tmp_path):
+    path = tmp_path / "axis.csv"
+    path.write_text("v [mm/s],F [N]\n1,50\n2,40\n5,33\n9,30\n20,29\n")
+    done = command("fit", path, "--law", "coulomb", "--set", "radius=40 mm")
+    assert done.returncode == 2
+    assert "radius: is of a table of torques, over rpm or rad/s; leave it out" in done.stderr
 
 
 BAD = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ def fit_friction_table(
     loop: str | PathLike[str] | None = None,
     hold: Mapping[str, Any] | None = None,
     errors: str = "relative",
+    radius: float | str | None = None,
     **columns: Any,
 ) -> SpeedFit:
     """Fit a friction law to friction that was measured at constant speeds.
@@ -58,6 +59,8 @@ def fit_friction_table(
     errors : str
         ``"relative"`` if each error is a share of the friction measured, as of a gauge of 1 % of its reading;
         ``"absolute"`` if they are of one size, as of 1 % of full scale.
+    radius : float or str, optional
+        Of the contact of a table of torques, m, at which the rig file has its friction; 1 m unless given.
     **columns
         Column or unit by role where names do not tell: ``speed="mm/min"``, ``force="F2"``.
 
@@ -97,6 +100,10 @@ def fit_friction_table(
         read = table_from_arrays({**table, **pressed})
     else:
         read = read_speed_table(table, load=load, **columns)
+    if radius is not None:
+        if not read.turns:
+            raise ParameterError([Problem("radius", "is of a table of torques, over rpm or rad/s; leave it out")])
+        read = replace(read, radius=Parameter("m", positive, "radius").checked(radius))
     kind = _law(law)
     held = _held(kind, hold or {})
     sides = {

@@ -201,6 +201,8 @@ def unit_told(role: Parameter, table: SpeedTable, bent: bool) -> str:
     `bent` is true for what friction does not rise with in proportion, scales and exponents.
     """
     shown = role.unit
+    if shown == "N":  # a load
+        return "N m" if table.load_turns else "N"
     if table.load is None and not table.is_coefficient and not bent:
         shown = {"1": "N", "s/m": "N s/m"}.get(shown, shown)
     if table.turns:

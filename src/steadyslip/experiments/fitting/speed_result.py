@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from steadyslip.core.dimensions import unit
 from steadyslip.core.format import format_quantity, format_with_error
+from steadyslip.core.quantities import PER_LOAD
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.core.version import stamped
 from steadyslip.core.written import display_units
@@ -29,6 +31,8 @@ STIFFNESS, MASS, SHAFT, INERTIA = (
     0.1,
 )  # of a common axis, of a common joint; kg, kg m^2
 COEFFICIENT_LOAD = 1000.0  # N, where a table of coefficients has no load
+SHARES = ("exponent", "stress share", "immediate share")
+"""Kinds of parameters without unit that are no force per load."""
 CHANGE = "CHANGE: a table of speeds does not tell it"
 
 
@@ -36,8 +40,9 @@ def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
     """Least, usual and largest value of parameters of the law that a table of speeds does not tell, in law units."""
     one, turns = found.main, found.table.turns
     load = rig_load(found)
-    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load)
-    short, usual, long = (length * (RAD_A_METRE if turns else 1.0) for length in DEFLECTION)
+    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load + one.beside(OFFSET))
+    turned = 1 / found.table.radius if found.table.radius else RAD_A_METRE
+    short, usual, long = (length * (turned if turns else 1.0) for length in DEFLECTION)
     ranges: dict[str, tuple[float, float, float]] = {}
     known = parameters(one.law)
     for name, address in known.items():
@@ -72,10 +77,9 @@ def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -
     lines = [f"# Friction of {found.table.source}: steadyslip fit --law {found.law}."]
     lines += ["# Lines with CHANGE are not told by a table of speeds: give those of your machine."]
     if found.table.load is None and not found.table.is_coefficient:
-        force = "torque" if found.table.turns else "force"
-        lines += [
-            f"# The table has no load: it is 1 N here, and coefficients are {force}s in N{' m' * found.table.turns}."
-        ]
+        turned = found.table.turns and found.table.radius is None
+        what = "torques in N m" if turned else "forces in N"
+        lines += [f"# The table has no load: it is 1 N here, and coefficients are {what}."]
     lines += ["", *(_joint if found.table.turns else _axis)(found, ranges)]
     where = "contacts.bearing.friction" if found.table.turns else "friction"
     if ranges:
@@ -106,7 +110,25 @@ _RADIUS = {
     False: "so that m/s are rad/s, and N are N m: the table's torques, whatever the real radius",
     True: "CHANGE: at a radius of 0.1 m a tenth of v_stribeck and ten times viscous and bristles belong to it",
 }
-"""Comments on the radius of a table of torques, and of one of coefficients."""
+"""Comments on the radius of a table of torques, and of one of coefficients, that was not given."""
+AT_ONE_METRE = (
+    "The rig file has the friction at a radius of 1 m, where m/s are rad/s and N are N m; for that of your contact "
+    'give radius, --set radius="40 mm".'
+)
+
+
+def _lever(found: SpeedFindings) -> float:
+    """Load (N) of the rig over that of the table, which may be a torque that presses at a radius."""
+    return 1 / (found.table.radius or 1.0) if found.table.load_turns else 1.0
+
+
+def _at_radius(found: SpeedFindings, si_unit: str, kind: str) -> float:
+    """Factor of a parameter of the law from a radius of 1 m, at which rad/s are m/s, to that of the contact."""
+    table = found.table
+    if not table.turns or table.radius is None:
+        return 1.0
+    per_load = si_unit in PER_LOAD and kind not in SHARES and not table.is_coefficient and not table.load_turns
+    return float(table.radius ** (unit(si_unit)[1].length - per_load))
 
 
 def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
@@ -124,12 +146,17 @@ def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) 
         "[bodies.joint]", 'motion = "rotation"', f'inertia = "{INERTIA:g} kg m^2"  # {CHANGE}', "",
         "[links.shaft]", 'kind = "shaft"', 'between = ["drive", "joint"]', f'stiffness = "{SHAFT}"  # {CHANGE}', "",
         *(drag if damping else []), f"[{where}]", 'body = "joint"',
-        f'radius = "1 m"  # {_RADIUS[found.table.is_coefficient]}', "",
+        _radius(found), "",
         *_friction(found, ranges, f"{where}.friction"), "",
         f"[{where}.contact]", 'law = "constant"', _preload(found), "", "[drive]",
         'control = "rotary-steady"',
         f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
     ]  # fmt: skip
+
+
+def _radius(found: SpeedFindings) -> str:
+    radius = found.table.radius
+    return f'radius = "{radius:.6g} m"' if radius else f'radius = "1 m"  # {_RADIUS[found.table.is_coefficient]}'
 
 
 def _preload(found: SpeedFindings) -> str:
@@ -140,7 +167,8 @@ def _preload(found: SpeedFindings) -> str:
         if found.table.is_coefficient
         else "the table has none"
     )
-    return f'preload = "{rig_load(found) + found.main.beside(OFFSET):.6g} N"  # {told}'
+    load = _lever(found) * (rig_load(found) + found.main.beside(OFFSET))
+    return f'preload = "{load:.6g} N"  # {told}'
 
 
 def _friction(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]], where: str) -> list[str]:
@@ -185,7 +213,7 @@ def _written(found: SpeedFindings, name: str, value: float) -> str:
     """TOML value of a parameter, in the units of the table; stiffness and damping of bristles at the rig's load."""
     known = parameters(found.main.law)
     own, kind = (known[name].role.unit, known[name].role.kind) if name in known else ("1", "")
-    load = rig_load(found)
+    load, value = rig_load(found), value * _at_radius(found, own, kind)
     if own == "1":
         return f"{value:.8g}"
     if kind in (BRISTLES, BRISTLE_DAMPING) and not found.table.turns:
@@ -207,8 +235,10 @@ def words(found: SpeedFindings) -> str:
     for one in (found.forward, found.backward):
         lines += ["", *_direction(found, one)] if one is not None else []
     lines.append("")
+    if table.turns and table.radius is None:
+        lines += textwrap.wrap(AT_ONE_METRE, 100)
     if found.bristles is not None:
-        at = "" if table.load is None else f" at {format_quantity(found.main.load, 'N')}"
+        at = "" if table.load is None else f" at {format_quantity(found.main.load, 'N m' if table.load_turns else 'N')}"
         size = "N m/rad" if table.turns else "N/m"
         with display_units([] if table.turns else ["N/um"]):
             value, low, high = (

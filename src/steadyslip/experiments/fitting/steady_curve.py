@@ -28,6 +28,7 @@ BESIDE = {
 UNTOLD = ("direct effect", "reference rate")
 """Kinds of parameters that steady friction holds only together with others: a beside b, v* beside μ*."""
 FARTHEST = 100.0  # factor beyond the measured speeds at which a velocity scale is looked for
+OFFSETS = 100.0  # bound of the load that presses beside that of the table, in units of its largest
 LARGEST = 100.0  # bound of other parameters, in units of what alone would make the whole friction
 EXPONENTS = (0.1, 10.0)  # bounds of exponents and other parameters that are not scales: a step, a flat curve
 SCALE_STARTS, OTHER_STARTS, SEARCHED = 6, (0.6, 1.2, 2.5), 4  # grid of starts, and how many are searched from
@@ -103,7 +104,7 @@ class SteadyCurve:
                 high.append(math.log(ends[1]))
                 continue
             if name == OFFSET:
-                size = float(load.max())
+                size = OFFSETS * float(load.max())
             else:
                 steep = float(np.abs(slopes[:, i] / force).max())
                 size = LARGEST / steep if steep > 0 else LARGEST
@@ -131,6 +132,8 @@ class SteadyCurve:
         for point in product(*grids):
             inner = np.zeros(len(self.free))
             inner[bent] = point
+            if OFFSET in self.free and not load.min():  # else friction without load has no slope to follow
+                inner[self.free.index(OFFSET)] = float(load.max())
             slopes = self.residuals(inner, speed, load, force, False)[1]
             # at zero of all linear parameters the friction is zero, so that slopes are the whole of it
             ends = low[straight], np.maximum(high[straight], low[straight] + 1e-300)

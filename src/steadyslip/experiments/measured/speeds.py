@@ -24,7 +24,7 @@ from steadyslip.experiments.measured.formats.text import read_text
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
 FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
 _UNITS = {
-    "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg"),
+    "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
     "displacement": ("m", "rad"), "direction": ("1",),
 }  # fmt: skip
 """Units of each role, the first where the file has none."""
@@ -64,11 +64,14 @@ class SpeedTable:
     friction : ndarray (n,)
         Positive: N, N m where `turns`, or a coefficient where `is_coefficient`.
     load : ndarray (n,) or None
-        N.
+        N, or N m where `load_turns`: of a joint that friction follows the torque of.
     turns, is_coefficient : bool
     speed_unit : str
         As in the file.
     notes : tuple of str
+    load_turns : bool
+    radius : float or None
+        Of the contact of what turns, m; None if it is not known.
     """
 
     source: str
@@ -79,6 +82,8 @@ class SpeedTable:
     is_coefficient: bool
     speed_unit: str
     notes: tuple[str, ...] = ()
+    load_turns: bool = False
+    radius: float | None = None
 
 
 @dataclass(frozen=True)
@@ -151,8 +156,11 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     rows = [_stacked(speed.values, one, found.get("direction")) for one in found[kind]]
     v, f = (np.concatenate([row[i] for row in rows]) for i in range(2))
     pressed = np.tile(found["load"][0].values, len(rows)) if "load" in found else None
+    twisted = pressed is not None and unit(found["load"][0].unit)[1] == unit("N m")[1]
+    if twisted and not turns:
+        raise _fault(source, "load", f"got {found['load'][0].unit} beside a {kind}; allowed: a load in N, what presses")
     if load is not None:
-        pressed = np.full(len(v), Parameter("N", positive, "load").checked(load))
+        pressed, twisted = np.full(len(v), Parameter("N", positive, "load").checked(load)), False
     clean = np.isfinite(v) & np.isfinite(f) & (np.isfinite(pressed) if pressed is not None else True)
     if not np.all(clean):
         notes.append(f"{np.sum(~clean)} rows without a number left out")
@@ -162,10 +170,14 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     v, f, pressed = v[keep], f[keep], None if pressed is None else pressed[keep]
     if len(v) < FEWEST_ROWS:
         raise _fault(source, "speed", f"got {len(v)} rows of sliding; a table of speeds has {FEWEST_ROWS} at least")
-    if pressed is not None and not np.all(pressed > 0):
+    if twisted and pressed is not None:  # which rubs by its size, also where it is zero
+        pressed = np.abs(pressed)
+        if not np.any(pressed > 0):
+            pressed, twisted = None, False
+    elif pressed is not None and not np.all(pressed > 0):
         raise _fault(source, "load", f"got {pressed.min():g} N; allowed: loads above 0")
     return SpeedTable(
-        source, v, _unsigned(source, v, f, kind), pressed, turns, kind == "friction", speed.unit, tuple(notes)
+        source, v, _unsigned(source, v, f, kind), pressed, turns, kind == "friction", speed.unit, tuple(notes), twisted
     )
 
 

@@ -175,9 +175,10 @@ class Held(IntEnum):
     """Flag: at rest under a sampled controller; since when, and time of the last row (s)."""
     LOWEST, HIGHEST, FASTEST = 14, 15, 16
     """Extremes of error and speed of the stroke."""
-    PACE, FAR = 17, 18
-    """Speed up to which bristles may be at rest; error (m or rad) from which on it is no hunting any more."""
-    SIZE = 19
+    STILL, PACE, FAR = 17, 18, 19
+    """Share of a speed (PACE, or the stroke's fastest) up to which what moves may be at rest; error (m or rad) from
+    which on it is no hunting any more."""
+    SIZE = 20
 
 
 class Control(IntEnum):

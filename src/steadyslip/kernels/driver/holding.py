@@ -1,8 +1,8 @@
-"""Motion of a held rig while its mode stays: under a sampled controller, or with bristles.
+"""Motion of a held rig while its mode stays.
 
-The state is that of `steadyslip.nonlinear.hunting.plant`. Between two samples the controller's force is constant, and
-the motion of a linear piece is one matrix (a *passage*); with bristles there are steps of `bristles`. What may change
-the mode is left to the caller, at the start of the step in which it may happen.
+The state is that of `steadyslip.nonlinear.hunting.plant`. The motion of a linear piece over a fixed time is one matrix
+(a *passage*), also between two samples of a controller, whose force is constant there; with bristles there are steps of
+`bristles`. What may change the mode is left to the caller, at the start of the step in which it may happen.
 """
 
 from __future__ import annotations
@@ -131,24 +131,37 @@ def keep_values(values: Array, clock: Array, rows: Array, length: float) -> None
 
 
 def may_fail(coefficients: Array, first: int, count: int) -> bool:
-    """True if a polynomial on 0..1 may have a value that is not positive."""
-    rest = 0.0
+    """True if a polynomial on 0..1 may have a value that is not positive.
+
+    Between two nodes it is not farther below their values than an eighth of its largest bend there.
+    """
+    rest, bend, least = 0.0, 0.0, math.inf
     for k in range(1, count):
         rest += abs(coefficients[first + k])
-    return not coefficients[first] > rest
+        bend += k * (k - 1.0) * abs(coefficients[first + k])
+    if coefficients[first] > rest:
+        return False
+    for i in range(NODES):
+        share, value = i / (NODES - 1.0), 0.0
+        for k in range(count):
+            value = value * share + coefficients[first + count - 1 - k]
+        least = min(least, value)
+    return not least > bend / (8.0 * (NODES - 1.0) ** 2.0)
 
 
-def wants_look(Y: Array, clock: Array, control: Array, size: int, with_bristles: bool) -> bool:
+def wants_look(Y: Array, clock: Array, control: Array, size: int, exact: bool) -> bool:
     """True if nothing may move any more, or the error is beyond `Held.FAR`."""
     if max(float(clock[Held.HIGHEST]), -float(clock[Held.LOWEST])) > clock[Held.FAR]:
         return True
     if (control[Control.PERIOD] > 0.0 and control[Control.CONSTANT] == 0.0) or Y[2 * size + 2] != 0.0:
         return False
-    if not with_bristles:
-        return clock[Held.RESTS] > 0.0
     slow = True
-    for i in range(size):
-        slow = slow and abs(Y[size + i]) <= clock[Held.PACE]
+    if exact and control[Control.PERIOD] > 0.0:
+        slow = clock[Held.RESTS] > 0.0
+    else:
+        pace = clock[Held.STILL] * max(float(clock[Held.PACE]), float(clock[Held.FASTEST]))
+        for i in range(size):
+            slow = slow and abs(Y[size + i]) <= pace
     return slow
 
 
@@ -221,7 +234,7 @@ def step_span(
             Y[i] = total
         now = clock[Held.TIME] + length
         clock[Held.TIME] = clock[Held.STOP] if now + 1e-15 * abs(clock[Held.STOP]) >= clock[Held.STOP] else now
-        if wants_look(Y, clock, control, coordinates, True):
+        if wants_look(Y, clock, control, coordinates, False):
             return Turn.LOOK
     return Turn.LOOK
 
@@ -241,9 +254,9 @@ def follow_held(
 ) -> int:  # fmt: skip
     """Go on up to `Held.END`, from sample to sample if there are some; returns what the caller has to do (`Turn`).
 
-    Passages have one row of `lengths` each: time (s) and number of equal parts. If `fresh`, only the sample that is due
-    is taken, and the step after it is left to the caller. `rows` has room for the steps up to `Held.MOST_STEPS` and one
-    more span.
+    Passages have one row of `lengths` each: time (s) and number of equal parts; without samples there is one. If
+    `fresh`, only the sample that is due is taken, and the step after it is left to the caller. `rows` has room for the
+    steps up to `Held.MOST_STEPS` and one more span.
     """
     size, count, number = Y.shape[0], G.shape[0], guards.shape[0]
     coordinates = loops.shape[1] - 3
@@ -267,13 +280,19 @@ def follow_held(
                 values,
             )  # fmt: skip
         else:
-            p = passage_of(lengths, clock[Held.STOP] - clock[Held.TIME], control[Control.PERIOD])
+            p = 0
+            if control[Control.PERIOD] > 0.0:
+                p = passage_of(lengths, clock[Held.STOP] - clock[Held.TIME], control[Control.PERIOD])
+            elif clock[Held.END] - clock[Held.TIME] < lengths[0, 0]:
+                return Turn.STEP
+            else:
+                clock[Held.STOP] = clock[Held.TIME] + lengths[0, 0]
             if p < 0:
                 return Turn.LENGTH
             turn = pass_span(passages[p], int(lengths[p, 1]), number, degrees, Y, clock, rows, out, values)
         if turn != Turn.LOOK or clock[Held.TIME] < clock[Held.STOP]:
             return turn
         clock[Held.CHANGED] = 0.0
-        if wants_look(Y, clock, control, coordinates, count > 0):
+        if wants_look(Y, clock, control, coordinates, count == 0):
             return Turn.LOOK
     return Turn.LOOK

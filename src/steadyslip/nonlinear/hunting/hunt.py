@@ -26,7 +26,9 @@ EXACT = 1e-9  # relative difference of two cycles that are one: what exact piece
 MOST_STROKES = 400  # after which the last ones are judged as they are; chosen by trial
 SAMPLED_STROKES = 24  # the same of a sampled controller, whose strokes differ by when in them it samples,
 MOST_SAMPLED_STROKES = 100  # unless they shrink: then more of them tell whether they go on to do so
-MOST_STEPS, IN_CORE = 150_000, 2_000_000  # the same for steps, here and in the compiled core: some ten seconds
+IN_CORE = 2_000_000  # steps of the compiled core at which it stops: some ten seconds
+MOST_STEPS = 50_000  # the same for steps outside it, with a contact that sticks or slides anew
+OFTEN = 0.02  # share of new strokes after which all are judged again: they may be thousands where a drive rings
 LONGEST = 1e9  # s, end of a motion that ends earlier by rest, repetition, strokes or steps
 CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually there are two
 SHRINKING = 0.9  # ratio of later to earlier strokes below which they are told to shrink; chosen by trial
@@ -100,17 +102,18 @@ def hunt(
     motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol)
     last_change = max((float(t) for t in motion.segments.start[0]), default=0.0)
     close = EXACT if motion.exact else 100 * rtol
-    at_rest, used_up = False, False
+    at_rest, used_up, judged = False, False, 0
     for done in motion.run():
         if done is not None and progress is not None:
             progress(motion.time, len(motion.trace.strokes))
         if motion.time >= last_change and motion.at_rest:
             at_rest = True
             break
-        used_up = motion.steps >= MOST_STEPS or motion.steps_in_core >= IN_CORE
+        used_up = motion.steps >= MOST_STEPS or motion.core.steps >= IN_CORE
         if motion.runs_away or used_up:
             break
-        if end is None and done is not None:
+        if end is None and done is not None and len(motion.trace.strokes) > (1 + OFTEN) * judged:
+            judged = len(motion.trace.strokes)
             own = swings(one for one in motion.trace.strokes if one.start > last_change)
             if _enough(own, motion.sampled) or cycle_length(own, close):
                 break

@@ -1,4 +1,4 @@
-"""Motion within one mode by the compiled core: under a sampled controller, or with bristles."""
+"""Motion within one mode by the compiled core."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from steadyslip.nonlinear.hunting.plant import Array, Plant
 from steadyslip.nonlinear.hunting.steps import passage
 
 AT_ONCE = 4096  # steps between two looks at what has become of the motion: some ten milliseconds
+NONE = np.zeros((0, 2)), np.zeros((0, 0, 0))  # lengths and passages of a piece without
 FEW = 0.25  # radians of the fastest motion from one kept value to the next
 
 
@@ -85,9 +86,11 @@ class CompiledMotion:
         """
         clock, bristles = self.clock, self.bristles
         guards, _ = piece.guards
+        if not (self.period or self.plant.memory or piece in self.passages):
+            self._add(piece, watched, 1.0 / piece.fastest)
         clock[Held.EVERY] = self._every(piece)
         clock[Held.ROWS], clock[Held.MOST_STEPS] = 0, clock[Held.STEPS] + AT_ONCE
-        lengths, passages = self.passages.get(piece, (np.zeros((0, 2)), np.zeros((0, 0, 0))))
+        lengths, passages = self.passages.get(piece, NONE)
         parts = int(lengths[:, 1].max(initial=1))
         rows = np.empty(((AT_ONCE + parts) * (1 + (NODES - 1) // int(clock[Held.EVERY])), 4))
         turn = bristles.code.follow_held(
@@ -97,22 +100,21 @@ class CompiledMotion:
         if turn == Turn.STUCK:
             raise NotAvailable(TOO_SHORT)
         if turn == Turn.LENGTH:
-            self._add(piece, watched, lengths, passages)
+            self._add(piece, watched, float(clock[Held.STOP] - clock[Held.TIME]))
         return turn == Turn.STEP, rows[: int(clock[Held.ROWS])]
 
     def _every(self, piece: HeldPiece) -> int:
         """Nodes of a step from one kept value to the next: a force that stays needs only its ends."""
         if self.clock[Held.RESTS]:
             return NODES - 1
-        if self.plant.memory:
+        if self.plant.memory or not self.period:
             return (NODES - 1) // 4
         turned = piece.fastest * self.period
         return (NODES - 1) // (1 if turned <= FEW else 2 if turned <= 2 * FEW else 4)
 
-    def _add(self, piece: HeldPiece, watched: Array, lengths: Array, passages: Array) -> None:
-        """Add the passage over the time that the core has asked for."""
-        length = float(self.clock[Held.STOP] - self.clock[Held.TIME])
+    def _add(self, piece: HeldPiece, watched: Array, length: float) -> None:
+        """Add the passage over a time (s)."""
+        lengths, passages = self.passages.get(piece, NONE)
         parts = max(1, math.ceil(piece.fastest * length))
         found = passage(piece, watched, length / parts)
-        known = np.array([*passages, found])
-        self.passages[piece] = np.vstack([lengths, [length, parts]]), known
+        self.passages[piece] = np.vstack([lengths, [length, parts]]), np.array([*passages, found])

@@ -17,22 +17,33 @@ NODES = np.linspace(0.0, 1.0, holding.NODES)  # fractions of a step where guards
 POWERS = NODES ** np.arange(DEGREE + 1)[:, None]
 
 
+def series(piece: HeldPiece, length: float) -> Array:
+    """Matrices C_k, (degree + 1, width, width), with Y(t + s h) = Σ C_k Y(t) s^k for a length h (s)."""
+    powers = [np.eye(len(piece.matrix))]
+    for k in range(1, DEGREE + 1):
+        powers.append(piece.matrix @ powers[-1] * (length / k))
+    return np.array(powers)
+
+
 class ExactSteps:
     """Steps of the exact solution Y(t + s h) = Σ c_k s^k of linear pieces, h at most one over the fastest rate."""
 
+    def __init__(self) -> None:
+        self._series: dict[HeldPiece, tuple[float, Array]] = {}
+
     def step(self, piece: HeldPiece, state: Array, most: float) -> tuple[float, Array]:
         """Length h of a step of at most `most` (s), and its coefficients c, (degree + 1, width)."""
-        matrix, length = piece.matrix, most
-        if piece.fastest > 0:
-            length = min(most, 1.0 / piece.fastest)
-        found = np.empty((DEGREE + 1, len(state)))
-        found[0] = state
+        length = min(most, 1.0 / piece.fastest) if piece.fastest > 0 else most
         while True:
-            for k in range(1, DEGREE + 1):
-                found[k] = matrix @ found[k - 1] * (length / k)
+            whole, matrices = self._series.get(piece, (0.0, np.zeros(0)))
+            if length > whole or piece.fastest == 0:
+                whole, matrices = self._series[piece] = length, series(piece, length)
+            found = matrices @ state
+            if length < whole:
+                found *= (length / whole) ** np.arange(DEGREE + 1)[:, None]
             sizes = np.abs(found)
             if np.all(sizes[-1] <= 1e-16 * sizes.max(axis=0)):
-                return length, found
+                return length, np.asarray(found)
             length *= 0.5
 
     def noise(self, piece: HeldPiece, rows: Array, coefficients: Array, length: float) -> Array:
@@ -70,14 +81,10 @@ def passage(piece: HeldPiece, watched: Array, length: float) -> Array:
         Rows of the state at the end, of the guards' coefficients in turn, and of the values.
     """
     rows, _ = piece.guards
-    width = len(piece.matrix)
-    powers = [np.eye(width)]
-    for k in range(1, DEGREE + 1):
-        powers.append(piece.matrix @ powers[-1] * (length / k))
-    series = np.array(powers)
-    guards = np.einsum("gi,kij->gkj", rows, series).reshape(-1, width)
-    seen = np.einsum("wi,kij,kn->wnj", watched, series, POWERS).reshape(-1, width)
-    return np.vstack([series.sum(axis=0), guards, seen])
+    width, powers = len(piece.matrix), series(piece, length)
+    guards = np.einsum("gi,kij->gkj", rows, powers).reshape(-1, width)
+    seen = np.einsum("wi,kij,kn->wnj", watched, powers, POWERS).reshape(-1, width)
+    return np.vstack([powers.sum(axis=0), guards, seen])
 
 
 def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, int] | None:

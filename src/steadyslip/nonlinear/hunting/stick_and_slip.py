@@ -99,10 +99,8 @@ class Motion:
             ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant))
         )
         self.sampled = plant.limits.sample_time is not None
-        self.core: CompiledMotion | None = None
-        if self.sampled or not self.exact:
-            own = self.stepper if isinstance(self.stepper, BristleSteps) else Bristles(plant, rtol, self.state)
-            self.core = CompiledMotion(plant, own)
+        own = self.stepper if isinstance(self.stepper, BristleSteps) else Bristles(plant, rtol, self.state)
+        self.core = CompiledMotion(plant, own)
         self.fresh: frozenset[tuple[str, int]] = frozenset()
         self.at_once = 0
         self.watched = np.array([plant.error(), plant.row(None, plant.places[0]), plant.row()])
@@ -135,17 +133,17 @@ class Motion:
 
     def _to(self, end: float) -> Iterator[Stroke | None]:
         """Go on to the end, or in the compiled core until the mode may change, and by a step or to a sample then."""
-        if self.core is not None:
-            end = self._follow(self.core, end)
+        if self.sampled or not self.exact or (self._piece().fastest > 0 and not self.fresh):
+            end = self._follow(end)
             yield None
         while self.time < end:
             yield self._step(end)
-            if not self.exact:
+            if not self.sampled:
                 break
 
-    def _follow(self, core: CompiledMotion, end: float) -> float:
+    def _follow(self, end: float) -> float:
         """Go on in this mode; the time up to which steps are to be taken, if any."""
-        clock, strokes = core.clock, self.trace.strokes
+        clock, strokes = self.core.clock, self.trace.strokes
         last = strokes[-1] if strokes else Stroke(0.0, 0.0)
         rests = self.sampled and not any(self.mode.contacts)
         since = last.end if np.isfinite(last.end) else 0.0
@@ -153,9 +151,9 @@ class Motion:
             self.stepper.begin(self._piece(), self.state)
         clock[[Held.TIME, Held.END, Held.RESTS, Held.SINCE]] = self.time, end, rests, since
         clock[[Held.LOWEST, Held.HIGHEST, Held.FASTEST]] = last.lowest, last.highest, last.fastest
-        clock[[Held.PACE, Held.FAR]] = self._pace, self._far
+        clock[[Held.STILL, Held.PACE, Held.FAR]] = self.still, self._pace, self._far
         self.watched[2] = self._piece().force
-        may_switch, rows = core.follow(self._piece(), self.watched, self.state, bool(self.fresh))
+        may_switch, rows = self.core.follow(self._piece(), self.watched, self.state, bool(self.fresh))
         if len(rows):
             self.trace.rows.append(rows.copy())
         if self.time < clock[Held.TIME]:
@@ -286,11 +284,6 @@ class Motion:
         self.farthest = max(self.farthest, last.highest, -last.lowest)
 
     @property
-    def steps_in_core(self) -> int:
-        """Number of steps of the compiled core."""
-        return self.core.steps if self.core else 0
-
-    @property
     def _far(self) -> float:
         """Error (m or rad) from which on nothing ends its growth; infinite if nothing tells."""
         far = AWAY * max(self.expected, abs(float(self.state[2 * self.plant.size + 1])))
@@ -298,8 +291,8 @@ class Motion:
 
     @property
     def _pace(self) -> float:
-        """Speed (m/s or rad/s) up to which what moves may be at rest."""
-        return self.still * max([self.fastest, *(one.slow for one in self.plant.contacts)])
+        """Speed (m/s or rad/s) beside which what is at rest hardly moves."""
+        return max([self.fastest, *(one.slow for one in self.plant.contacts)])
 
     @property
     def runs_away(self) -> bool:
@@ -316,9 +309,9 @@ class Motion:
         n = self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
             return False
-        if self.sampled and not (self.core and self.core.constant and not any(self.mode.contacts)):
+        if self.sampled and not (self.core.constant and not any(self.mode.contacts)):
             return False
-        pace = self._pace
+        pace = self.still * self._pace
         if np.any(np.abs(self.state[n : 2 * n]) > pace):
             return False
         rates = self.stepper.rate(self._piece(), self.state)

@@ -74,9 +74,9 @@ class Visit:
 
     def told(self, pattern):
         """What the page says of a motion, once it is this."""
-        found = self.page.locator(".told", has_text=re.compile(pattern))
+        found = self.page.locator(".told", has_text=re.compile(pattern.replace(" ", r"\s")))  # some do not break
         found.wait_for(state="attached")
-        return found.inner_text()
+        return found.inner_text().replace("\xa0", " ")
 
     def saved(self, button, encoding="utf-8"):
         with self.page.expect_download() as waiting:

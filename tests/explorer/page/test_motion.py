@@ -172,9 +172,9 @@ def test_the_run_of_a_page_is_one_of_the_command_line(browser, moved, tmp_path):
     """The protocol that it tells gives the run that it shows."""
     with Visit(browser, moved["explorer"]) as visit:
         visit.page.get_by_label("after a disturbance").select_option("pull")
-        told = visit.told("slip event")
         visit.page.locator(".motion .hint", has_text="pull on the block").wait_for()
-        told, block = visit.page.inner_text(".told"), visit.page.locator(".motion pre").text_content()
+        told = visit.told("slip event")
+        block = visit.page.locator(".motion pre").text_content()
         when = re.match(r"At ([\d.]+) s ", visit.page.inner_text(".motion .hint"))[1]
     ss.write_rig(MOVED, tmp_path / "rig.toml")
     (tmp_path / "rig.toml").write_text(

@@ -1,6 +1,6 @@
 // Motion after a disturbance: curves over time, phase plane, events and moving sketch, with one time cursor for all.
 import { DISTURBANCES, Refused, asked, called } from "./disturbances.js";
-import { button, copy, make, putAt, svg, tell } from "./dom.js";
+import { button, copy, make, putAt, svg, tell, unbroken } from "./dom.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
@@ -14,6 +14,9 @@ const LEAD = 0.08, BRIEF = 1e-6; // LEAD: part of the time after the disturbance
 const AWAY = 1e6; // velocity over that of steady sliding above which a run-away is not drawn
 const STILL = 1e-15, LOOSE = 1e-3; // slip rate and normal force over those of steady sliding below which the contact counts as stuck and as open
 const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // HIGH: height of a strip and PLANE: box of the phase plane, SVG units; LISTED: most events in the list; FILM: duration of replay, ms
+
+/** Place of a point of the phase plane. @param {any} phase @param {number} x @param {number} y */
+const spot = ({ across, up }, x, y) => ({ cx: PLANE.left + across.of(x) * PLANE.width, cy: PLANE.top + (1 - up.of(y)) * PLANE.height });
 
 export class Course {
   /** @type {any} */ course; // result of the last run
@@ -80,6 +83,8 @@ export class Course {
     this.reading = make("output", { className: "reading" });
     this.phase = svg("svg", { class: "chart phase", role: "img", viewBox: `0 0 ${PLANE.left + PLANE.width + 14} ${PLANE.top + PLANE.height + 46}` });
     this.events = make("tbody", {});
+    const mark = (className, words) => make("span", {}, svg("svg", { class: "chart", viewBox: "0 0 14 14", "aria-hidden": "true" }, svg("circle", { class: className, cx: 7, cy: 7, r: 4 })), words);
+    const key = make("p", { className: "key" }, mark("begin", "where it begins"), mark("at", "at the time chosen"));
     const { area, phrases } = this.page.rig.data, drop = phrases || area !== null ? "drop of force" : "stress drop";
     const heads = [...(phrases ? ["contact"] : []), "begins", "lasts", "peak velocity", drop, "since the last"];
     this.list = make("details", { className: "events" }, make("summary", { textContent: "Slip events" }),
@@ -91,7 +96,7 @@ export class Course {
     this.box.append(
       make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), this.where, make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt),
       this.taken, this.told, this.done, make("p", { className: "pick" }, this.shown), this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
-      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", { className: motion.bodies.length ? "wide" : "" }, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)), this.list, this.same);
+      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase, key), make("figure", { className: motion.bodies.length ? "wide" : "" }, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)), this.list, this.same);
   }
 
   /** Name of the contact or body that is shown. */
@@ -159,7 +164,7 @@ export class Course {
       this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
       const { at, until } = this.course;
       this.course.since = until - at > BRIEF * at ? Math.max(0, at - LEAD * (until - at)) : 0; // the curves begin just before the disturbance
-      this.told.textContent = outcome(this.course, this.page.rig.data);
+      this.told.textContent = unbroken(outcome(this.course, this.page.rig.data));
       this.done.textContent = wanted.words;
       this.draw();
     } catch (error) {
@@ -229,8 +234,10 @@ export class Course {
     const named = (n) => /** @type {[string, string]} */ ([now.shown[n][1], now.shown[n][2]]);
     const phase = plane(PLANE, all.map((one) => ({ x: one.shown[across][0], y: one.shown[up][0] })), named(across), named(up));
     this.mark = svg("circle", { class: "at", r: 5 });
+    const begin = svg("circle", { class: "begin", r: 5 });
+    putAt(begin, spot(phase, now.shown[across][0][0], now.shown[up][0][0]));
     this.phase.setAttribute("aria-label", `${now.shown[up][2]} over ${now.shown[across][2]}`);
-    this.phase.replaceChildren(phase.group, this.mark);
+    this.phase.replaceChildren(phase.group, begin, this.mark);
     this.now = { ...now, strips, ups: parts.map((part) => part.up), phase };
     this.sketch.take(course);
     this.table();
@@ -273,7 +280,7 @@ export class Course {
     this.time.setAttribute("aria-valuetext", shown(at, "s"));
     putAt(this.cursor, { x1: x, x2: x });
     this.dots.forEach((dot, n) => putAt(dot, { cx: x, cy: this.boxes[n].top + (1 - this.now.ups[n].of(between(series[strips[n]][0]))) * HIGH }));
-    putAt(this.mark, { cx: PLANE.left + phase.across.of(between(series[across][0])) * PLANE.width, cy: PLANE.top + (1 - phase.up.of(between(series[up][0]))) * PLANE.height });
+    putAt(this.mark, spot(phase, between(series[across][0]), between(series[up][0])));
     this.sketch.place(between, this.course);
     const { floor = 0 } = this.course.contacts[Number(this.view.value || 0)] ?? {};
     const now = series.map(([values, unit, label]) => (unit === "1" ? `friction ${Number.isNaN(between(values)) ? "–" : between(values).toPrecision(4)}` : label === "velocity" && floor ? `velocity ${slow(between(values), 1.5 * floor)}` : `${label === "ahead" ? "ahead by" : label} ${shown(between(values), unit, unit === "N" || unit === "Pa" ? 4 : 3)}`));

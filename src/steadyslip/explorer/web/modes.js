@@ -82,7 +82,7 @@ export function modeOf(linear, given) {
   };
 }
 
-/** Template text with its {names} replaced by values. @param {string} template @param {Record<string, string>} values */
+/** Template text with its {names} replaced by values. @param {string} template @param {Record<string, any>} values */
 export const fill = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => values[name]);
 
 /** Share in per cent, with enough digits to differ from 0 and 100. @param {number} share */

@@ -59,7 +59,8 @@ export class Page {
     this.measure();
     this.tabs = Object.entries(OPENED).map(([part, words]) => make("button", { type: "button", textContent: words, onclick: () => this.open(part) }));
     this.word = make("b", {});
-    root.replaceChildren(this.skips(), this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, ...this.tabs));
+    this.next = make("small", {}); // the nearest edge, on a narrow page
+    root.replaceChildren(this.skips(), this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, this.next, ...this.tabs));
     this.open(this.part);
     this.judge();
     requestAnimationFrame(() => setTimeout(() => this.furnish(library))); // let the browser show the verdict first

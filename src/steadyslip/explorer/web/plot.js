@@ -32,6 +32,12 @@ export function ticks(low, high, logarithmic, most) {
   return found;
 }
 
+/** Text of a number as a power of ten, such as 10⁶ or 2·10⁶. @param {number} value */
+function inPowers(value) {
+  const power = Math.floor(Math.log10(value) + 1e-9), first = digits(value / 10 ** power, 3);
+  return power === 0 || power === 1 ? digits(value, 3) : `${first === "1" ? "" : `${first}·`}10${String(power).replace("-", "⁻").replace(/\d/g, (n) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(n)])}`;
+}
+
 /** Axis with ticks, numbers and label, in the unit of `one` or a readable one. @param {any} one name, unit and factor */
 export function axis(box, scale, [low, high], one, label, upright) {
   const logarithmic = low > 0 && high / low > 30 && scale.of(0.5 * (low + high)) > 0.6;
@@ -39,13 +45,14 @@ export function axis(box, scale, [low, high], one, label, upright) {
   const group = svg("g", { class: "axis" }), length = upright ? box.height : box.width;
   const marks = ticks(low / factor, high / factor, logarithmic, length / (upright ? 40 : 80));
   const many = Math.min(12, Math.max(3, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (Math.abs(high - low) || 1))) + 3)); // digits that distinguish the ticks
+  const powers = logarithmic && marks.some((value) => digits(value, 3).includes("e"));
   for (const value of marks) {
     const at = scale.of(value * factor);
     if (at < -1e-9 || at > 1 + 1e-9) continue;
     const x = box.left + (upright ? 0 : at * box.width), y = box.top + (upright ? (1 - at) * box.height : box.height);
     group.append(
       svg("line", { x1: x, y1: y, x2: upright ? box.left + box.width : x, y2: upright ? y : box.top, class: "grid" }),
-      svg("text", { x: upright ? x - 6 : x, y: upright ? y + 4 : y + 16, "text-anchor": upright ? "end" : "middle" }, digits(value, logarithmic ? 3 : many)),
+      svg("text", { x: upright ? x - 6 : x, y: upright ? y + 4 : y + 16, "text-anchor": upright ? "end" : "middle" }, powers ? inPowers(value) : digits(value, logarithmic ? 3 : many)),
     );
   }
   let own = label;

@@ -8,7 +8,8 @@ import { exactly, tellIn } from "./quantities.js";
  *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its SI size and the text of the value in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: (number | string)[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
- *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string}} Data
+ *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string,
+ *   pace: any, beyond: any, ends: any, means: string, usual: any}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
@@ -19,7 +20,7 @@ export class Rig {
   constructor(data, programs) {
     this.data = data;
     tellIn(data.written);
-    for (const one of data.parameters) Object.assign(one, { own: NEW, ...data.usual, ...one });
+    for (const one of data.parameters) Object.assign(one, { own: NEW, ...data.usual, .../** @type {any} */ (one) });
     data.facts.parameters = data.places.map((at) => (typeof at === "string" ? at : data.parameters[at].name));
     this.linear = new Linear(programs, data.facts);
     this.values = data.parameters.map((one) => one.value);

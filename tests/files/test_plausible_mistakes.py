@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import steadyslip as ss
+from steadyslip.core.errors import UnitWarning
 from toleranced import AXIS
 
 MISTAKES = {
@@ -102,3 +103,42 @@ def test_a_mistake_has_one_message(right, wrong, answer):
     (problem,) = raised.value.problems
     assert problem.message.startswith(answer)
     assert problem.line
+
+
+@pytest.mark.parametrize(
+    ("wrong", "answer"),
+    [
+        ("sample_time = 0", "drive.sample_time: got 0; allowed: a finite number > 0 in s, or text such as '1 ms'"),
+        ('sample_time = "1 mm"', "expected a quantity in s, for example '1 ms'"),
+        ('delay = "2 mm"', "expected a quantity in s, for example '2 ms'"),
+    ],
+)
+def test_times_of_controllers_have_examples_of_their_size(wrong, answer):
+    """A dead time of 10 s is none."""
+    text = AXIS.replace('velocity = "0.5 mm/min"', f'velocity = 0\ncontrol = "pid"\nkp = "9 N/um"\nki = 0\n{wrong}')
+    with pytest.raises(ss.RigFileError, match=re.escape(answer)):
+        ss.rig_from_text(text)
+
+
+def test_a_stiffness_without_a_unit_is_asked_about():
+    """12 N/m of an axis that 3.2 kN press; in N/um, written so, it is none to ask about."""
+    with pytest.warns(UnitWarning, match=r"slider.stiffness = 12 has no unit and is read as 12 N/m, .* 320 m|266.7 m"):
+        ss.rig_from_text(AXIS.replace('"12 ± 20 % N/um"', "12"))
+    ss.rig_from_text(AXIS.replace('"12 ± 20 % N/um"', "12e6"))
+
+
+def test_advice_is_given_once():
+    """Of a file without an area each force has the same: its first line has the advice, all have their fault."""
+    with pytest.raises(ss.RigFileError) as raised:
+        ss.rig_from_text(AXIS.replace('area = "200 cm^2"\n', ""))
+    assert len(raised.value.problems) > 2
+    assert str(raised.value).count("add the contact's area to the rig file") == 1
+    assert str(raised.value).count("has the wrong dimension; expected a quantity in") == len(raised.value.problems)
+
+
+def test_a_tolerance_wider_than_its_value_is_told_in_its_unit():
+    answer = (
+        "a tolerance of '20 N/um' is too wide: it reaches -8 N/um; allowed: a finite number >= 0; for a share of the "
+    )
+    with pytest.raises(ss.RigFileError, match=re.escape(answer)):
+        ss.rig_from_text(AXIS.replace('"12 ± 20 % N/um"', '"12 ± 20 N/um"'))

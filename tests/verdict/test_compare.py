@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import steadyslip as ss
 from command import run
 from rigs_of_theory import rate_state, rig
 from steadyslip.verdict import between
+from steadyslip.verdict.compare import compare_files
 from toleranced import AXIS
 
 TILTED = rig(
@@ -177,3 +179,14 @@ def test_items_of_lists_are_told_by_their_values():
     one, two = (ss.read_rig(f"examples/{name}.toml") for name in ("inclined-spring", "double-direct-shear"))
     text = str(ss.compare_rigs(one, two))
     assert re.search(r"friction\.states +none -> b 0\.006, d_c 4 um; b 0\.002, d_c 40 um", text)
+
+
+def test_one_file_that_is_held_is_refused_once(tmp_path):
+    """Compared with itself it has one problem."""
+    path = tmp_path / "held.toml"
+    path.write_text(
+        (Path(__file__).parents[2] / "examples/hunting-axis.toml").read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    with pytest.raises(ss.ParameterError, match=r"drive\.velocity is 0, and verdicts") as raised:
+        compare_files(path, path)
+    assert len(raised.value.problems) == 1

@@ -133,7 +133,8 @@ def test_the_command_reads_what_may_be_adjusted(axis, tmp_path):
         ({"sure": "much"}, "sure: 'much' is not a number"),
         ({"sure": 2.0}, "sure: got 2.0; allowed: a chance between 0 and 1"),
         ({"sure": "95"}, "sure: got '95'; allowed: a number from 0 to 1; write '95 %'$"),
-        ({"sure": "120 %"}, "sure: got '120 %'; allowed: a number from 0 to 1"),
+        ({"sure": "120 %"}, "sure: got '120 %'; allowed: a number from 0 to 1, or '0 %' to '100 %'$"),
+        ({"sure": "120"}, "sure: got '120'; allowed: a number from 0 to 1, or '0 %' to '100 %'$"),
         ({"adjust": {"stifness": Adjustment()}}, "did you mean 'slider.stiffness'"),
     ],
 )
@@ -144,7 +145,9 @@ def test_mistakes_are_told_in_one_sentence(options, words):
 
 def test_a_chance_without_tolerances_is_said_to_have_no_bearing():
     """Also where nothing is to be cured; with tolerances it has."""
-    words = "\nwithout tolerances this is of the rig's own values, whatever chance is asked for"
+    words = (
+        "\nwithout tolerances this is of the rig's own values, whatever chance is asked for;\nits file takes them as "
+    )
     for own in (rig(), rig().with_values({"stiffness": 40e9})):
         assert words in str(ss.cure(own, sure=0.8))
         assert ss.cure(own).to_dict()["without_tolerances"]

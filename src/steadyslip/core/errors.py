@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -68,6 +68,7 @@ class Problem:
 
 SHOWN = 30
 """Number of problems listed in a message (chosen by trial); `ParameterError.problems` has all of them."""
+ADVICE = 40  # characters from which a clause is advice that is not repeated; shorter ones belong to their line
 
 
 class ParameterError(SteadyslipError, ValueError):
@@ -79,7 +80,7 @@ class ParameterError(SteadyslipError, ValueError):
         super().__init__(self._text())
 
     def _text(self) -> str:
-        lines = [str(problem) for problem in self.problems[:SHOWN]]
+        lines = _advised_once([str(problem) for problem in self.problems[:SHOWN]])
         if len(self.problems) > SHOWN:
             lines.append(f"... and {len(self.problems) - SHOWN} more")
         if self.title and len(lines) == 1:
@@ -87,6 +88,18 @@ class ParameterError(SteadyslipError, ValueError):
         if self.title:
             return "\n".join([f"{self.title}: {len(self.problems)} problems", *(f"  {i}" for i in lines)])
         return "\n".join(lines)
+
+
+def _advised_once(lines: Sequence[str]) -> list[str]:
+    """Lines without advice, a long clause after a semicolon, that a line before has given."""
+    found: list[str] = []
+    given: set[str] = set()
+    for line in lines:
+        parts = line.split("; ")
+        kept = [part for i, part in enumerate(parts) if i == 0 or len(part) < ADVICE or part not in given]
+        given.update(parts[1:])
+        found.append("; ".join(kept))
+    return found
 
 
 class RigFileError(ParameterError):

@@ -33,7 +33,7 @@ _RATIO = re.compile(r":\s*(\d+\.?\d*)", re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
-def parse(text: str, expected: str) -> float:
+def parse(text: str, expected: str, instance: str = "") -> float:
     """Parse text with a number and a unit to an SI value.
 
     Parameters
@@ -42,6 +42,8 @@ def parse(text: str, expected: str) -> float:
         A number and a unit, such as ``"5 MPa"``; a number alone if `expected` is ``"1"``.
     expected : str
         SI unit of the parameter; only its dimension matters.
+    instance : str, optional
+        Typical value with its unit, for messages; that of the SI unit by default.
 
     Returns
     -------
@@ -53,10 +55,11 @@ def parse(text: str, expected: str) -> float:
     QuantityError
         If the text is not a quantity, has no unit where one is needed, or another dimension.
     """
+    shown = repr(instance) if instance else example(expected)
     cleaned = text.translate(MICRO).strip()
     match = _NUMBER.match(cleaned) if len(text) <= MOST_TEXT else None
     if match is None:
-        raise QuantityError(f"{repr_short(text)} is not {described(expected)}; write for example {example(expected)}")
+        raise QuantityError(f"{repr_short(text)} is not {described(expected)}; write for example {shown}")
     digits, name = match.group(), cleaned[match.end() :].strip()
     if comma := _COMMA.match(name):
         raise QuantityError(f"{text!r} has a decimal comma: write {digits}.{comma[1]}")
@@ -69,16 +72,16 @@ def parse(text: str, expected: str) -> float:
         raise QuantityError(message)
     if not name:
         if wanted != Dimension():
-            raise QuantityError(f"{text!r} has no unit; write for example {example(expected)}")
+            raise QuantityError(f"{text!r} has no unit; write for example {shown}")
         return _scaled(digits, 1.0)
     try:
         if name == "1":
             raise QuantityError("it holds two numbers")
         factor, found = unit(name)
     except QuantityError as error:
-        raise QuantityError(f"{text!r} is not a quantity: {error}; write for example {example(expected)}") from error
+        raise QuantityError(f"{text!r} is not a quantity: {error}; write for example {shown}") from error
     if found != wanted:
-        message = f"{text!r} has the wrong dimension; expected {described(expected)}, for example {example(expected)}"
+        message = f"{text!r} has the wrong dimension; expected {described(expected)}, for example {shown}"
         per_area = total_unit(expected) in TOTALS
         if per_area and found == wanted.times(AREA):
             message += (

@@ -114,6 +114,7 @@ def parameter(
     standing: float | None = None,
     letter: str = "",
     elsewhere: tuple[str, ...] = (),
+    instance: str = "",
 ) -> Any:
     """Declare a numeric field; ``default=None`` makes it optional, the other arguments are those of `Parameter`.
 
@@ -122,7 +123,9 @@ def parameter(
     >>> ss.laws.parameter("m", ss.laws.positive, "slip distance").metadata["steadyslip"].unit
     'm'
     """
-    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere)
+    role = Parameter(
+        unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere, instance
+    )
     return field(default=default, metadata={_ROLE: role})
 
 

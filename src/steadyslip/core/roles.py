@@ -153,6 +153,8 @@ class Parameter(Entry):
         member is a simpler one.
     elsewhere : tuple of str
         SI units of the parameter for other kinds of rig: forces, angles.
+    instance : str
+        Typical value with its unit, for messages, such as ``2 ms``; that of its SI unit by default.
     """
 
     unit: str
@@ -167,6 +169,7 @@ class Parameter(Entry):
     letter: str = ""
     idle: float | None = None
     elsewhere: tuple[str, ...] = ()
+    instance: str = ""
 
     def __post_init__(self) -> None:
         if self.kind and self.kind not in PARAMETER_KINDS:
@@ -176,7 +179,7 @@ class Parameter(Entry):
         """Convert a number or text such as ``"5 MPa"`` to an SI float inside the domain."""
         if isinstance(value, str):
             try:
-                number = parse(value, self.unit)
+                number = parse(value, self.unit, self.instance)
             except QuantityError as error:
                 raise fault(str(error)) from error
         elif isinstance(value, bool) or not hasattr(value, "__float__"):
@@ -189,8 +192,10 @@ class Parameter(Entry):
             except (TypeError, ValueError, OverflowError) as error:
                 raise self.refused(value) from error
         if not self.domain.contains(number) and number != self.domain.apart:
-            if (self.domain.low, self.domain.high) == (0, 1) and 1 < number <= 100:
-                raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}; write '{number:g} %'")
+            if (self.domain.low, self.domain.high) == (0, 1) and number > 1:
+                bare = number <= 100 and "%" not in str(value)
+                meant = f"; write '{number:g} %'" if bare else ", or '0 %' to '100 %'"
+                raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}{meant}")
             raise self.refused(value)
         # + 0.0 turns -0.0 into 0.0, which equals the default when files are written
         return value if isinstance(value, Placeholder) else number + 0.0
@@ -211,8 +216,12 @@ class Parameter(Entry):
                     return Total(Parameter(total_unit(self.unit), self.domain, self.doc).checked(value))
             raise
 
+    def shown_instance(self) -> str:
+        """A quoted example of a value, for messages."""
+        return repr(self.instance) if self.instance else example(self.unit)
+
     def allowed(self) -> str:
-        unit = "" if self.unit == "1" else f" in {self.unit}, or text such as {example(self.unit)}"
+        unit = "" if self.unit == "1" else f" in {self.unit}, or text such as {self.shown_instance()}"
         return self.domain.text + unit
 
     def schema(self) -> Schema:

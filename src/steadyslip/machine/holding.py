@@ -17,7 +17,7 @@ from steadyslip.machine.mechanism import Limits
 def dead_time() -> Any:
     """Declare the time between measuring and acting."""
     doc = "dead time between measuring and acting"
-    return parameter("s", nonnegative, doc, default=0.0, structural=True, kind="delay", letter="t_d")
+    return parameter("s", nonnegative, doc, default=0.0, structural=True, kind="delay", letter="t_d", instance="2 ms")
 
 
 def limit(unit: str) -> Any:
@@ -65,6 +65,7 @@ class Holding(FrozenRecord):
         positive,
         "at velocity 0: time between samples, the force being constant between; without it none",
         default=None,
+        instance="1 ms",
     )
     resolution: float | None = encoder("m")
 

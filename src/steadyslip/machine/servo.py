@@ -114,7 +114,7 @@ class Cascade(_Controller, name="p-pi"):
     )
     kv: float = parameter("1/s", positive, "gain Kv of the position loop", letter="K_v")
     kp: float = parameter("N s/m", positive, "gain Kp of the speed loop", letter="K_p")
-    tn: float = parameter("s", positive, "reset time Tn of the speed loop", letter="T_n")
+    tn: float = parameter("s", positive, "reset time Tn of the speed loop", letter="T_n", instance="20 ms")
 
     def watched(self) -> tuple[str, str]:
         return self.measured or self.body, self.speed_measured or self.body

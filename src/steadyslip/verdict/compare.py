@@ -255,7 +255,8 @@ def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> Non
         "drive.velocity is 0, and verdicts on sliding are compared; give it a speed, such as '1 mm/min', and leave out "
         "what is of a held place alone, or ask `steadyslip hunt`, ss.hunt(rig) in Python, of either rig"
     )
-    problems = [Problem(name, message) for rig, name in zip(rigs, names, strict=True) if rig.holds]
+    held = dict.fromkeys(name for rig, name in zip(rigs, names, strict=True) if rig.holds)  # each file once
+    problems = [Problem(name, message) for name in held]
     if problems:
         raise ParameterError(problems)
 

@@ -42,7 +42,10 @@ DESIGN = (
 SPEED = "drive.velocity"
 SPEED_COST = 4.0
 """Cost of doubling or halving the speed over that of a part, where none is given: a machine is built for its speed."""
-OWN_VALUES = "without tolerances this is of the rig's own values, whatever chance is asked for"
+OWN_VALUES = (
+    "without tolerances this is of the rig's own values, whatever chance is asked for;\n"
+    'its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"'
+)
 SURE = Tested(
     "a chance between 0 and 1, or text such as '95 %'",
     lambda v: isinstance(v, str) or (isinstance(v, (int, float)) and not isinstance(v, bool) and 0 < v <= 1),
@@ -179,7 +182,8 @@ def cure(
     >>> rig = ss.read_rig("examples/inclined-spring.toml")
     >>> print(ss.cure(rig, adjust=None))
     To be stable (now unstable)
-    without tolerances this is of the rig's own values, whatever chance is asked for
+    without tolerances this is of the rig's own values, whatever chance is asked for;
+    its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"
     cheapest single change: slider.damping from 0 Pa s/m to 57.53 GPa s/m, cost 1
     no pair is cheaper
     drive.velocity    1 um/s now; not reached from 1 nm/s to 1 mm/s

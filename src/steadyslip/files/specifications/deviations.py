@@ -8,8 +8,11 @@ from typing import Any
 
 from steadyslip.core.domains import nonnegative
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError
+from steadyslip.core.format import format_quantity
+from steadyslip.core.quantities import units_in
 from steadyslip.core.roles import Parameter, Schema
 from steadyslip.core.tolerances import Tolerance, split_tolerance
+from steadyslip.core.written import display_units
 from steadyslip.files.specifications.layout import machine_sections, sections
 from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.machine import Machine
@@ -82,10 +85,11 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
         except ParameterError as error:
             width = tolerance.below if end == low else tolerance.above
             share = f"{width.partition(' ')[0]} %"
-            hint = (
-                "" if width.endswith("%") else f"; it was read as {width!r}: for a share of the value write '± {share}'"
-            )
-            raise ParameterError([Problem("", f"a tolerance too wide: {error.problems[0].message}{hint}")]) from error
+            hint = "" if width.endswith("%") else f"; for a share of the value write '± {share}'"
+            with display_units(units_in([width])):
+                told = format_quantity(*rig.told(name, end), area=rig.printed_area(name))
+            wide = f"a tolerance of {width!r} is too wide: it reaches {told}; allowed: {one.role.domain.text}{hint}"
+            raise ParameterError([Problem("", wide)]) from error
     return low, high
 
 

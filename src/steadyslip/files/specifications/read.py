@@ -28,7 +28,7 @@ from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
-from steadyslip.files.specifications.bare_speeds import question_values
+from steadyslip.files.specifications.bare_numbers import question_values
 from steadyslip.files.specifications.changes import apply, full_name, split
 from steadyslip.files.specifications.deviations import SCHEMA as TOLERANCES, taken_out, wrong_ends
 from steadyslip.files.specifications.layout import (
@@ -289,7 +289,7 @@ def read_tables(
         rig.told_in(sorted(units_in(tables))).named(Path(source).name if source.endswith(".toml") else "")
         faults += wrong_ends(rig, tolerances)
         if rig.written_in:  # numbers alone are SI units, as programs write them
-            question_values(rig, reader.speeds)
+            question_values(rig, reader.questioned)
     wrong = {one.name for one in faults}  # told once, as a tolerance
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
     return RigFileContents(source, rig, protocol, said, problems, changed, lines, tables, tolerances)

@@ -116,6 +116,7 @@ class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
         structural=True,
         kind="delay",
         letter="delta",
+        instance="2 ms",
     )
 
     def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:

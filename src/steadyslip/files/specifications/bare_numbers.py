@@ -1,4 +1,4 @@
-"""Questions about speeds without a unit and values that a law doubts, asked once where a rig file is read."""
+"""Questions about numbers without a unit and values that a law doubts, asked once where a rig file is read."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from steadyslip.core.quantities import parse, units_in
 from steadyslip.machine.rig import Rig
 
 SPEEDS = ("m/s", "rad/s")
+STIFFNESSES = ("N/m", "Pa/m")
+QUESTIONED = (*SPEEDS, *STIFFNESSES)
+STRETCHED = 1.0  # m: what friction stretches the softest of real axes and presses by is some 10 mm
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
@@ -22,7 +25,7 @@ BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: labora
 def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
     """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
 
-    Also of values that a friction law doubts.
+    Also of stiffnesses without a unit that friction would stretch far, and of values that a friction law doubts.
 
     Parameters
     ----------
@@ -31,7 +34,7 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
         Names of the values read, each as it was written and with its SI unit.
     """
     doubts = (text for one in rig.laws_by_contact().values() for text in one.friction.doubts(one.prefix))
-    for text in (*_questions(rig, read), *doubts):
+    for text in (*_questions(rig, read), *_soft(rig, read), *doubts):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -47,6 +50,22 @@ def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
                 yield f"{was}; other speeds of the file are in {', '.join(written)}: write the unit that is meant"
             elif name == "drive.velocity" and si == "m/s" and (law := _outrun(rig, abs(raw))):
                 yield f"{was}, {law}: write the unit that is meant"
+
+
+def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    """Questions about stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more."""
+    presses = max(
+        (rig.load_of(f"{prefix}friction") or 0.0 for prefix, *_ in rig.laws_by_contact().values()), default=0.0
+    )
+    for name, (raw, si) in read.items():
+        if si not in STIFFNESSES or not isinstance(raw, (int, float)) or not 0 < raw < presses / STRETCHED:
+            continue
+        unit_name = "N/m" if rig.in_forces or rig.area is not None else si
+        stretch = format_quantity(presses / raw, "m")
+        yield (
+            f"{name} = {raw:g} has no unit and is read as {raw:g} {unit_name}, which the load of the contact alone, "
+            f"{format_quantity(presses, 'N')}, would stretch by {stretch}: write the unit that is meant"
+        )
 
 
 def _fits_better(number: float, texts: Sequence[str], si: str) -> bool:

@@ -19,6 +19,7 @@ from steadyslip.experiments.numerics.noise import describe
 
 LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which nothing else changes; chosen by trial
 SPARED = 14.0  # decrease of chi squared that a level of the sensor or half a run is worth which a servo makes needless
+COARSE = 0.5  # share of the gain of a servo that the best of those where its search starts has, at least
 AROUND = 3.0  # times in which a servo settles that count as around a change
 NEAR = 30.0  # samples on each side of a change that are kept one by one
 PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
@@ -67,7 +68,9 @@ class Kinks:
         return np.asarray(self.levels[~near])
 
 
-def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) -> Iterator[JointFit]:
+def followed(
+    time: Array, values: Array, noise: float, ways: Sequence[Kinks], lasting: float = 1.0
+) -> Iterator[JointFit]:
     """How a load point follows changes of its rate: at once or along ramps, or late by a servo if that fits better.
 
     Where its displacement is beside each of these, a fit in pieces that follow it comes second.
@@ -80,6 +83,8 @@ def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) ->
         Standard deviation, m.
     ways : sequence of Kinks
         All changes, then fewer and fewer: those that the response of a servo may have made are left out.
+    lasting : float
+        Samples per independent sample, at least: a servo must gain in proportion.
     """
     spacing = float(np.median(np.diff(time)))
     lines = ways[0]
@@ -91,14 +96,15 @@ def followed(time: Array, values: Array, noise: float, ways: Sequence[Kinks]) ->
         levels = kinks.far_levels(spacing)
         samples = _thinned(time, values, noise, kinks, levels, spacing)
         steps = fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets)))
-        servo = fit_servo(samples, steps, 0.1 * spacing, kinks.longest, GAIN)
+        spared = len(lines.levels) - len(levels) + 2 * (len(lines.meets) - len(kinks.meets))
+        least = GAIN if spared else GAIN * max(COARSE * lasting, 1.0)
+        servo = fit_servo(samples, steps, 0.1 * spacing, kinks.longest, least)
         if servo is None:
             break
         everywhere = np.append(servo.times, lines.meets)
         if not all(map(_is_noise, _off(servo, everywhere, time, values, noise, spacing))):
             continue
         inflation = inflation or _inflation(servo, time, values)
-        spared = len(lines.levels) - len(levels) + 2 * (len(lines.meets) - len(kinks.meets))
         gain = (at_once.misfit - servo.misfit) / inflation + spared * SPARED
         if gain > most:
             most, best = gain, servo.widened(inflation)

@@ -63,7 +63,7 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     some = {len(fewer) - 1: fewer for fewer in _without_brief(lines.runs, time)}
     ways = [replace(_as_lines(time, fewer), durations=durations[:n]) for n, fewer in some.items()]
     found = []
-    for joint in followed(time - time[0], displacement, noise, ways):
+    for joint in followed(time - time[0], displacement, noise, ways, min(lines.inflation)):
         count = len(joint.times)
         own = lines if count == len(lines.kinks) else _Lines(time, displacement, some[count])
         found.append(own.course(joint if joint.lag or joint.pieces else None, blurred))

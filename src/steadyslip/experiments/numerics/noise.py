@@ -6,8 +6,10 @@ take them for independent several times too small. Their autocovariance is descr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
@@ -185,23 +187,28 @@ def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
     residuals, which the restricted likelihood (Patterson & Thompson 1971) allows for. What the autoregression was
     before the first sample is one parameter more.
     """
+    from scipy.linalg.lapack import dpotrf
     from scipy.optimize import minimize
     from scipy.signal import lfilter
 
     n = len(residuals)
     space = np.ones((1, n)) if rows is None else rows[np.any(rows != 0, axis=1)]
     _, sizes, space = np.linalg.svd(space / np.linalg.norm(space, axis=1, keepdims=True), full_matrices=False)
-    stack = np.concatenate([residuals[None], space[sizes > FITTED_RANK * sizes[0]]])
+    stack = np.concatenate([space[sizes > FITTED_RANK * sizes[0]], np.zeros((1, n)), residuals[None]])
+    freedom, limit = n - len(stack) + 1, LONGEST ** (1 / n)
 
     def left(x: Array) -> tuple[float, float, float, Array, float]:
-        decay, average = LONGEST ** (1 / n) * np.tanh(x)
+        """Decay, average, variance and innovations at a place, and minus twice the log-likelihood."""
+        decay, average = limit * math.tanh(x[0]), limit * math.tanh(x[1])
         through = lfilter([1.0, -decay], [1.0, -average], stack, axis=1)
-        r, own = through[0], np.concatenate([through[1:], average ** np.arange(n)[None]])
-        square, cross = own @ own.T, own @ r
-        size = float(r @ r) - float(cross @ np.linalg.solve(square, cross))
-        freedom = n - len(own)
-        variance = max(size, 1e-300) / freedom
-        return decay, average, variance, r, freedom * float(np.log(variance)) + float(np.linalg.slogdet(square)[1])
+        through[-2, 0], through[-2, 1:] = 1.0, average
+        np.multiply.accumulate(through[-2], out=through[-2])
+        root, singular = dpotrf(through @ through.T, lower=1)
+        if singular:
+            return decay, average, np.inf, through[-1], np.inf
+        *fitted, size = root.diagonal().tolist()
+        variance = max(size**2, 1e-300) / freedom
+        return decay, average, variance, through[-1], freedom * math.log(variance) + 2 * sum(map(math.log, fitted))
 
     begin = min((np.arctanh(start) for start in FIRST_GUESSES), key=lambda x: left(x)[4])
     best = minimize(lambda x: left(x)[4], begin, method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-3}).x
@@ -215,13 +222,16 @@ def _likely(deviance: Callable[[Array], float], best: Array) -> list[Array]:
 
     Two to each side along its axes, the rule of third degree (Stroud 1957).
     """
-    count, steps = len(best), CURVATURE_STEP * np.eye(len(best))
+    count, steps, middle = len(best), CURVATURE_STEP * np.eye(len(best)), deviance(best)
 
     def mixed(i: int, j: int) -> float:
-        at = [a * b * deviance(best + a * steps[i] + b * steps[j]) for a in (1, -1) for b in (1, -1)]
-        return sum(at) / (4 * CURVATURE_STEP**2)
+        ends = [best + a * (steps[i] + b * steps[j]) for b in (1, -1) for a in (1, -1)]
+        one, other, *turned = [middle if np.array_equal(at, best) else deviance(at) for at in ends]
+        return (one + other - sum(turned)) / (4 * CURVATURE_STEP**2)
 
-    curvature = 0.5 * np.array([[mixed(i, j) for j in range(count)] for i in range(count)])
+    curvature = np.empty((count, count))
+    for i, j in combinations_with_replacement(range(count), 2):
+        curvature[i, j] = curvature[j, i] = 0.5 * mixed(i, j)
     sizes, axes = np.linalg.eigh(curvature)
     ways = axes * np.sqrt(count / np.maximum(sizes, LEAST_CURVATURE))
     return [best + sign * way for way in ways.T for sign in (1, -1)]

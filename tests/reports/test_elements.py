@@ -61,3 +61,17 @@ def test_long_names_may_go_on_in_the_next_line():
 
 def test_cells_are_words_unless_they_say_otherwise():
     assert "&lt;i&gt;" in table([("<i>", "b")])
+
+
+@pytest.mark.parametrize(
+    ("text", "unbroken"),
+    [
+        ("above 272.2 mN m s/rad. Of", "272.2 mN m s/rad."),
+        ("at 11676.36 ± 0.013 s, then", "11676.36 ± 0.013 s,"),
+        ("40 kg cm^2 and", "40 kg cm²"), ("8 N s/mm or", "8 N s/mm"), ("after 7.37e-06 m", "7.37 × 10⁻⁶ m"),
+    ],
+)  # fmt: skip
+def test_no_line_breaks_within_a_value(text, unbroken):
+    """Nor inside its unit, nor around its error."""
+    assert unbroken.replace(" ", "\u00a0") in html_text(text)
+    assert "5\u00a0s mass m" in html_text("after 5 s mass m")

@@ -22,7 +22,12 @@ _EXPONENT, _SUPERSCRIPTS = (
     str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
 )
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
-_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])")  # space between a number and its unit, or what it counts
+_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # between a number and its unit, or what it counts
+_POWER = re.compile(r"(?<=10)([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) (?=[A-Za-zµ])")  # between a power of ten and its unit
+_UNIT = r"[mkMGTnµ]?(?:N|m|s|g|Pa|J|W|rad)|[cd]m|deg|rev"
+_WITHIN = re.compile(
+    rf"(?<=\d\u00a0)(?:{_UNIT})[²³]?(?: (?:{_UNIT})[²³]?(?![\w.]))+"
+)  # a unit of several words behind its number
 _LONG = 30  # characters of a word that may be broken, for it is none
 _NARROW = 3  # columns that fit on a telephone (by trial, at 360 px)
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
@@ -89,9 +94,11 @@ def why(refused: Exception) -> str:
 def html_text(text: Any) -> str:
     """Text with print typography, escaped for HTML; subscripts of letters, such as d_c, stand below the line.
 
-    No line breaks between a number and its unit.
+    No line breaks between a number and its unit or error, nor within a unit.
     """
-    return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", html.escape(_NUMBER.sub("\u00a0", typographic(text)), quote=True))
+    words = _WITHIN.sub(lambda unit: unit[0].replace(" ", "\u00a0"), _NUMBER.sub("\u00a0", typographic(text)))
+    words = _POWER.sub("\\1\u00a0", words)
+    return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", html.escape(words, quote=True))
 
 
 def with_subscripts(text: str) -> str:

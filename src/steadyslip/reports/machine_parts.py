@@ -47,8 +47,8 @@ def _verdict_figure(analysis: Analysis) -> str:
     if far := undrawn_edges(analysis):
         names = ", ".join(said(analysis.rig, name) for name in far)
         words += (
-            f" Not drawn, but in the list below, is the edge of {names}: a factor of 100 away or more, or not "
-            "of a positive value."
+            f" Not drawn, but named below, is the edge of {names}: a factor of 100 away or more, or not of a "
+            "positive value."
         )
     return figure(figure_html(lambda: figures.machine_verdict(analysis), words, 8.0), words)
 

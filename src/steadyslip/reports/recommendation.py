@@ -12,17 +12,19 @@ from steadyslip.core.format import format_percent
 from steadyslip.files.specifications.tolerance_tables import Adjustment
 from steadyslip.linear.boundary import Margin
 from steadyslip.linear.status import stability
-from steadyslip.machine.letters import said, worded
+from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why
 from steadyslip.verdict import Cures, Tolerated, Window, cure
 from steadyslip.verdict.analysis import Analysis
-from steadyslip.verdict.cures import default_adjust
-from steadyslip.verdict.tolerances import LEAST
+from steadyslip.verdict.cures import SPEED, default_adjust
+from steadyslip.verdict.tolerances import LEAST, format_chance
 from steadyslip.verdict.words import told
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
+FAR = 10.0  # factor between a value and its change from which the change is named only: nobody orders such a part
 SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
-_ROWS = 4  # changes that are recommended, nearest first
+_ROWS = 4  # changes that are recommended
+_LEFT_OUT = f"Left out, as they would have to change by more than a factor of {FAR:g}"
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ def recommendation(
     adjustable = order.adjustable
     yield heading(title)
     if tolerated is not None and tolerated.share < SURE:
-        yield from _made_sure(tolerated, adjustable)
+        yield from _made_sure(analysis, tolerated, adjustable)
         if analysis.stable:
             yield paragraph(f"Of the values themselves: {_what_to_hold(analysis, adjustable)}")
         return
@@ -68,24 +70,28 @@ def recommendation(
             yield paragraph(near)
         return
     able = [one for one in changeable(analysis, adjustable) if not adjustable or one.parameter in adjustable]
-    rows = [row for one in able if (row := _change(analysis, one, adjustable.get(one.parameter)))][:_ROWS]
-    if not rows:
-        yield from _cured(analysis.rig, {}, adjustable, "stable", "stable at")
+    found = {one: row for one in able if (row := _change(analysis, one, adjustable.get(one.parameter)))}
+    if not found:
+        yield from _cured(analysis, {}, adjustable, "stable", "stable at")
         return
+    near = [one for one in found if adjustable or not _is_far(one.value, one.edge.value if one.edge else None)]
+    rows = [found[one] for one in near or found][:_ROWS]
     name, now, to, *_ = rows[0]
     yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
-    yield table(rows, head, caption="Changes that make it stable.")
+    order = "Changes that make it stable: first of settings, then of parts, last of the speed of the task."
+    yield table(rows, head, caption=order)
+    if near and (far := [row[0] for one, row in found.items() if one not in near]):
+        yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
 
 
-def _made_sure(tolerated: Tolerated, adjustable: Mapping[str, Adjustment]) -> Iterator[str]:
+def _made_sure(analysis: Analysis, tolerated: Tolerated, adjustable: Mapping[str, Adjustment]) -> Iterator[str]:
     """HTML of what makes a rig stable with a chance of `SURE`, and of what to measure where that may be enough."""
     wanted = format_percent(SURE)
-    text = worded(tolerated.rig, tolerated.headline())
-    yield paragraph(f"{text}; {wanted} are asked for here.")
+    yield paragraph(f"{_within(tolerated)} Wanted is that {wanted} of all that is built within them are stable.")
     yield from _cured(
-        tolerated.rig, tolerated.tolerances, adjustable, f"stable in {wanted} of them", f"stable in {wanted} at"
+        analysis, tolerated.tolerances, adjustable, f"stable in {wanted} of them", f"stable in {wanted} at"
     )
     telling = [one for one in tolerated.alone if one.share >= LEAST]
     if 0 < tolerated.share < 1 and telling:
@@ -96,9 +102,38 @@ def _made_sure(tolerated: Tolerated, adjustable: Mapping[str, Adjustment]) -> It
         )
 
 
-def _cured(rig: Any, tolerances: Any, adjustable: Mapping[str, Adjustment], reached: str, at: str) -> Iterator[str]:
-    """HTML of what `cure` finds: the cheapest change, the cheapest pair, and the windows of each parameter."""
+def _within(tolerated: Tolerated) -> str:
+    """Sentences on how many rigs within the tolerances are stable."""
+    rig, count = tolerated.rig, len(tolerated.stable)
+    kind = "machine" if rig.in_forces else "rig"
+    tried = f"({count} were tried{', and all corners of the ranges' if tolerated.corners else ''})"
+    if tolerated.share:
+        chance = format_chance(tolerated.share, tolerated.error)
+        return f"Of the {kind}s that may be built within the tolerances, {chance} are stable {tried}."
+    text = f"No {kind} within the tolerances is stable {tried}"
+    if tolerated.otherwise:
+        values = (f"{said(rig, name)} {told(rig, name, value)}" for name, value in tolerated.otherwise.items())
+        return f"{text}, but for one at their very end: {', '.join(values)}."
+    return f"{text}."
+
+
+def _is_far(value: float, to: float | None) -> bool:
+    """True of a change by more than a factor of `FAR`, or of what is zero."""
+    return to is None or not value or not to or not 1 / FAR <= abs(to / value) <= FAR
+
+
+def _cured(
+    analysis: Analysis, tolerances: Any, adjustable: Mapping[str, Adjustment], reached: str, at: str
+) -> Iterator[str]:  # fmt: skip
+    """HTML of what `cure` finds: the cheapest change, the cheapest pair, and the windows of each parameter.
+
+    What has the nearest edge is among the parameters, as the headline speaks of it.
+    """
+    rig: Any = analysis.rig
     present = {name: one for name, one in default_adjust(rig).items() if rig.parameters()[name].value}
+    named = next((one for one in analysis.margins if one.edge is not None and _cures(one)), None)
+    if named is not None and named.value and "friction." not in named.parameter:
+        present.setdefault(named.parameter, Adjustment())
     try:
         found = cure(rig, tolerances, sure=SURE, adjust=adjustable or present)
     except (NotAvailable, ParameterError) as refused:
@@ -117,34 +152,52 @@ def _cured(rig: Any, tolerances: Any, adjustable: Mapping[str, Adjustment], reac
     yield paragraph(text)
     if not tolerances and (pair or found.best):
         yield paragraph("These values are edges: go beyond them as far as you can.")
-    yield from _windows(found, at)
+    if named is not None and named.parameter not in (adjustable or present):
+        which = "one of friction, " if "friction." in named.parameter else ""
+        yield paragraph(f"The nearest edge is {which}that of {said(rig, named.parameter)}, which is not changed here.")
+    yield from _windows(found, at, bool(adjustable))
 
 
 def _moved(rig: Any, window: Window, to: float | None) -> str:
     return f"{said(rig, window.parameter)} from {window.written(window.value)} to {window.written(to or 0.0)}"
 
 
-def _windows(found: Cures, at: str) -> Iterator[str]:
-    """HTML table of the values of each parameter at which the chance is reached, and a line of those without any."""
+def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
+    """HTML table of the values of each parameter at which the chance is reached, and a line of those without any.
+
+    Changes by more than a factor of `FAR` are named only, unless `whole`.
+    """
     rig: Any = found.rig
-    able = sorted((one for one in found.windows if one.windows), key=lambda one: one.cost)
+    every = sorted((one for one in found.windows if one.windows), key=lambda one: one.cost)
+    able = [one for one in every if whole or one.nearest is None or not _is_far(one.value, one.nearest)] or every
     rows = [(said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
     words = "Values that are enough, each alone, the others unchanged, the cheapest first. "
     cost = "A cost of 1 is that of doubling or halving a value, 4 of the speed, unless the rig file gives another."
     yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
+    if far := [said(rig, one.parameter) for one in every if one not in able]:
+        yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
     if without := [said(rig, one.parameter) for one in found.windows if not one.windows]:
         yield paragraph(f"Not enough alone, whatever the value within range: {', '.join(without)}.", "small")
 
 
 def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Margin]:
-    """Margins that a document speaks of, nearest first: of what would make the rig stable, or keep it so.
+    """Margins that a document speaks of: of what would make the rig stable, or keep it so.
 
-    Of what is named in `adjustable`; else of all that the rig has but friction, and of that if there is nothing else.
+    Those that keep it so are nearest first; of the others those within a factor of `FAR` are first, and among them
+    settings of a drive, then parts, then the speed that is the rig's task. They are of what is named in `adjustable`;
+    else of all that the rig has but friction, and of that if there is nothing else.
     """
     edged = [one for one in analysis.margins if one.edge is not None and (analysis.stable or _cures(one))]
     chosen = [one for one in edged if one.parameter in adjustable]
     present = [one for one in edged if one.value]  # from zero it is no change, but a part to be added
-    return chosen or [one for one in present if "friction." not in one.parameter] or present
+    found = chosen or [one for one in present if "friction." not in one.parameter] or present
+    return found if analysis.stable or chosen else sorted(found, key=_in_order)
+
+
+def _in_order(margin: Margin) -> tuple[bool, int]:
+    """Sort key of a change in a designer's order: far ones last; settings, parts, speed."""
+    kind = 2 if margin.parameter == SPEED else 0 if margin.parameter.startswith("drive.") else 1
+    return _is_far(margin.value, margin.edge.value if margin.edge else None), kind
 
 
 def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:

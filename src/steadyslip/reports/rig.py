@@ -18,6 +18,7 @@ from steadyslip.core.roles import PARAMETER_KINDS
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import column_html, figure_html
+from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
 from steadyslip.machine.letters import letter_of, said, worded, words_of
@@ -49,7 +50,7 @@ from steadyslip.reports.sections import (
 )
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.whole_text import facts, meaning
-from steadyslip.verdict.words import edge_rows, headline
+from steadyslip.verdict.words import EDGE_WORDS, edge_rows, headline
 
 VALIDITY = (
     "The verdict is on small disturbances of steady sliding: it holds for the model and the inputs below, and says "
@@ -85,7 +86,7 @@ def input_table(
 ) -> str:
     """HTML table of the parameters of a rig: words, letter, value (totals if it has an area), meaning.
 
-    With its tolerance if one is given, and where it comes from: the comment behind it in the rig file, if there is one.
+    With its tolerance if any is given, and where it comes from: the comment behind it in the rig file, if there is one.
     """
     model = None if rig.holds or by_matrices(rig) else build_model(rig)
     rows = []
@@ -99,12 +100,13 @@ def input_table(
                 known,
                 format_quantity(one.value, one.role.unit, 6, rig.printed_area(name)),
                 stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)),
-                *((tolerances.get(name, ""),) if tolerances else ()),
+                *((tolerances.get(name, "none given"),) if tolerances else ()),
                 *((notes[name] or "rig file" if name in notes else "default",) if notes else ()),
             )
         )
     more = (*(("tolerance",) if tolerances else ()), *(("source",) if notes else ()))
-    return table(rows, ("input", "letter", "value", "meaning", *more), caption="Inputs.")
+    words = "Inputs." if tolerances else "Inputs. Tolerances: none given."
+    return table(rows, ("input", "letter", "value", "meaning", *more), caption=words)
 
 
 def _meaning(one: Address, letter: str) -> str:
@@ -118,10 +120,14 @@ def _meaning(one: Address, letter: str) -> str:
 def edge_table(analysis: Analysis) -> Iterator[str]:
     """HTML table of the nearest edge of every parameter, and a line of the parameters without one."""
     rig, (rows, without) = analysis.rig, edge_rows(analysis)
-    if rows:
+    far = [one.parameter for one in analysis.margins if one.remote]
+    if rows := [row for row in rows if row[0] not in far]:
         head = ("parameter", "now", "edge", "change", "beyond it")
         yield paragraph("The nearest edge in each parameter, the others unchanged.")
         yield table(((said(rig, name), *rest) for name, *rest in rows), head, caption="Nearest edges.")
+    if far:
+        words = EDGE_WORDS["far"].format(remote=REMOTE).capitalize()
+        yield paragraph(f"{words}: {', '.join(said(rig, name) for name in far)}.", "small")
     if without:
         names = ", ".join(said(rig, name) for name in without)
         yield paragraph(f"No edge within range: {names}.", "small")

@@ -100,9 +100,13 @@ def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
     if run is None:
         yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
         return
-    faster = f"After the drive was faster by {100 * (STEP - 1):.0f} % for a while"
-    yield paragraph(f"{faster}: {_told(run, analysis)}.")
-    over = "Motion after the drive was faster for a while, over time."
+    begin, end = (format_quantity(piece.at, "s") for piece in run.protocol.pieces[:2])
+    kick = f"the drive runs {100 * (STEP - 1):.0f} % faster from {begin} to {end}"
+    yield paragraph(
+        f"A small disturbance shows what the verdict means: {kick}, and at its own speed again from then on. The "
+        f"{'machine' if rig.in_forces else 'rig'} itself is not changed. What follows: {_told(run, analysis)}."
+    )
+    over = "Motion after this disturbance, over time."
     words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
     if run.status == BLOWN_UP:
         words = "The same motion in the phase plane, which it leaves to the right."
@@ -137,8 +141,11 @@ def _of_structure(analysis: Analysis) -> str:
 
 
 def _told(run: History, analysis: Analysis) -> str:
-    """What a run did: its slip events and its early end, or else how near it comes to steady sliding."""
-    ended = [run.message.replace("_", " ")] if run.status != "done" else []
+    """What a run did: its slip events and its early end, or else how near it comes to steady sliding.
+
+    What would mend such an end is left out: what to change is recommended elsewhere.
+    """
+    ended = [run.message.partition("; ")[0].replace("_", " ")] if run.status != "done" else []
     if run.sentence or ended:
         return "; then ".join([run.sentence, *ended] if run.sentence else ended)
     steady: Any = getattr(analysis, "steady", None)

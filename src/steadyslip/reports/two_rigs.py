@@ -14,6 +14,7 @@ from steadyslip.reports.results import parts_of, rig_section
 from steadyslip.reports.rig import VALIDITY, edge_table
 from steadyslip.reports.sections import assumptions, motion, references
 from steadyslip.verdict import RigComparison, Tolerated
+from steadyslip.verdict.between import IMPOSSIBLE
 from steadyslip.verdict.words import headline
 
 
@@ -58,6 +59,8 @@ def _answer(result: RigComparison) -> str:
         return f"{'; '.join(decisive)}."
     if not result.differences:
         return "They have the same equations and numbers."
+    if not result.measure:
+        return "No difference decides, as the verdict is the same."
     one = result.differences[0]
     name = said(rig, one.parameter)
     part = f", by {result.part_in_words(one)} of {result.of}" if result.measure else ""
@@ -68,17 +71,26 @@ def _differences(result: RigComparison) -> Iterator[str]:
     """HTML table of the differences, with what each is worth, and what a part is."""
     rig: Any = result.verdicts[0].rig
     a, b = result.names
+    known = bool(result.measure)
     rows = [
-        (said(rig, one.parameter), one.first, one.second, result.part_in_words(one), one.first_with, one.second_with)
+        (said(rig, one.parameter), one.first, one.second, *([result.part_in_words(one)] if known else []),
+         one.first_with, one.second_with)
         for one in result.differences
-    ]
-    head = ("difference", a, b, f"its part in {result.of}", f"{a} with that of {b}", f"{b} with that of {a}")
-    yield table(rows, head, caption="Differences, the one with the largest part first.")
-    if result.measure:
+    ]  # fmt: skip
+    if not known:
+        lost = [one.parameter for one in result.differences if IMPOSSIBLE in (one.first_with, one.second_with)]
+        such = f", as with the {' or '.join(said(rig, name) for name in lost)} of the other alone" if lost else ""
+        yield paragraph(
+            f"How much each difference contributes is not told: that needs all mixtures of {a} and {b}, and some "
+            f"cannot be built or do not slide steadily{such}. The last two columns tell what each does alone."
+        )
+    part = [f"its part in {result.of}"] if known else []
+    head = ("difference", a, b, *part, f"{a} with that of {b}", f"{b} with that of {a}")
+    first = "Differences, the one with the largest part first." if known else "Differences."
+    yield table(rows, head, caption=first)
+    if known:
         of = "the factor of k/k_cr" if result.measure == "safety" else "the change of the growth rate"
         yield paragraph(f"A part is {of} in the mean over all orders of making the changes.", "small")
-    else:
-        yield paragraph("No parts are told, since some rig between the two has no growth rate.", "small")
 
 
 def _chart(result: RigComparison) -> str:

@@ -182,6 +182,13 @@ def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
     return f"{verdict}: with {_lengths(fit, longest)} the sum of squares is {_relative_change(fit, longest)}; {changes}"
 
 
+def better(fit: FitNumbers) -> Remedy | None:
+    """What to fit again with, as the values are not to be used: residuals have structure that it mends, or less."""
+    best = next(iter(fit.remedies), None)
+    left = fit.whiteness.p < STRUCTURE or forgets_changes(fit.plan)
+    return best if left and best is not None and best.gain >= STRONG_EVIDENCE else None
+
+
 def _structure(fit: FitNumbers) -> list[str]:
     """Warning on structure in the residuals, or on a normal stress that this law does not remember; what mends it."""
     plan = fit.plan
@@ -207,8 +214,13 @@ def _structure(fit: FitNumbers) -> list[str]:
 
 def _asked(fit: FitNumbers, one: Remedy) -> str:
     """What to ask for, with the values of what it adds."""
-    added = [f"{n.partition('.')[2] or n} {x:.3g}" for n, x in one.values.items()
-             if n not in fit.values and not n.startswith(("step.", "jump."))]  # fmt: skip
+    units = {name.rpartition(".")[2]: address.role.unit for name, address in fit.plan.rig.parameters().items()}
+    units |= {"lag": "s"}
+    added = []
+    for n, x in one.values.items():
+        if n not in fit.values and not n.startswith(("step.", "jump.")):
+            unit = units.get(n.partition("@")[0].rpartition(".")[2], "1")
+            added.append(f"{n.partition('.')[2] or n} {format_quantity(x, unit, 3)}")
     return f"{one.choice} ({', '.join(added)})" if added else one.choice
 
 

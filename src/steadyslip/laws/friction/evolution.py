@@ -1,6 +1,6 @@
 """Evolution laws of the state of rate-and-state friction at constant normal stress.
 
-Θ is the dimensionless state, −ln(v/v*) in steady sliding for every law, so slip, aging and PRZ laws have the same
+Θ is the dimensionless state, −ln(v/v_ref) in steady sliding for every law, so slip, aging and PRZ laws have the same
 linearisation and differ only in higher order.
 """
 
@@ -51,12 +51,12 @@ class Evolution(FrozenRecord, family="evolution law"):
         yield from ()
 
     def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
-        """State θ (s) in its usual form, from Θ = ln(v* θ/d_c) unless overridden."""
+        """State θ (s) in its usual form, from Θ = ln(v_ref θ/d_c) unless overridden."""
         return d_c / v_ref * sp.exp(state)
 
 
 class Slip(Evolution, name="slip"):
-    """Slip law (Ruina 1983; eq. 1 of Dupont & Bapna): Θ̇ = −(v/d_c)[ln(v/v*) + Θ]."""
+    """Slip law (Ruina 1983; eq. 1 of Dupont & Bapna): Θ̇ = −(v/d_c)[ln(v/v_ref) + Θ]."""
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         return -v / d_c * (sp.log(v / v_ref) + state)
@@ -68,14 +68,14 @@ class Slip(Evolution, name="slip"):
 
 
 class Aging(Evolution, name="aging"):
-    """Aging law (Dieterich 1979): θ̇ = 1 − vθ/d_c, with Θ = ln(v* θ/d_c)."""
+    """Aging law (Dieterich 1979): θ̇ = 1 − vθ/d_c, with Θ = ln(v_ref θ/d_c)."""
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         return v_ref / d_c * sp.exp(-state) - v / d_c
 
 
 class PRZ(Evolution, name="prz"):
-    """Perrin–Rice–Zheng law (1995): θ̇ = 1 − (vθ/2d_c)², with Θ = ln(v* θ/2d_c)."""
+    """Perrin–Rice–Zheng law (1995): θ̇ = 1 − (vθ/2d_c)², with Θ = ln(v_ref θ/2d_c)."""
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         return v_ref / (2 * d_c) * sp.exp(-state) - v**2 / (2 * d_c * v_ref) * sp.exp(state)

@@ -43,7 +43,7 @@ class RateState(FrictionLaw, name="rate-state"):
     mu_ref: float = parameter(
         "1", positive, "friction coefficient in steady sliding at v_ref", kind="friction level", size=0.01, standing=0.6
     )
-    v_ref: float = parameter("m/s", positive, "reference velocity v_ref, also v*", kind="reference rate", standing=1e-6)
+    v_ref: float = parameter("m/s", positive, "reference velocity v_ref", kind="reference rate", standing=1e-6)
     a_cutoff_velocity: float | None = parameter(
         "m/s", positive, "velocity v_a above which the direct effect fades; infinite unless given", default=None,
         kind="velocity scale", letter="v_a",

@@ -107,8 +107,8 @@ class Cures(ReadOnly):
             return "\n".join([*found, *alone])
         lines = [f"To be {wanted} (now {now})", *alone]
         if (best := self.best) is not None:
-            alone = best.parameter == SPEED and not any(one.nearest for one in self.windows if one is not best)
-            first = "no change of a part alone reaches it, another speed does" if alone else "cheapest single change"
+            only = best.parameter == SPEED and not any(one.nearest for one in self.windows if one is not best)
+            first = "no change of a part alone reaches it, another speed does" if only else "cheapest single change"
             lines.append(f"{first}: {best.parameter} {_change(best, best.nearest)}, cost {best.cost:.3g}")
         else:
             lines.append("no single change reaches it")

@@ -311,7 +311,10 @@ def fits(random, folder):
         law = {"slip": ss.laws.Slip(), "aging": ss.laws.Aging()}[evolution]
         lag, seed = float(random.uniform(0.1, 0.4)), int(random.integers(10**6))
         way = kind if kind in servo_records.WAYS else None
-        record, _ = asked(servo_records.record, seed, lag, 0.15, law, noise, way=way)
+        try:
+            record, _ = asked(servo_records.record, seed, lag, 0.15, law, noise, way=way)
+        except ValueError as burst:
+            raise NoCase from burst
     else:
         source = lab.two_states() if "states" in laws else lab.rig(alpha=0.3 if "normal_memory" in laws else None)
         record = lab.record(source, protocol, int(random.integers(10**6)), noise, count=int(random.integers(400, 900)))

@@ -47,7 +47,8 @@ def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephon
     assert sketch < 0.35 * PAPER["height"]
     assert alone[0]["top"] < alone[1]["top"], "below each other where there is no room"
     least = 5.8 / 72 * 25.4 / 85  # letters of 5.8 points on a drawing of 85 mm, the smallest of a journal
-    assert min(texts_on_axes(found.html)) >= least
+    assert min(texts_on_axes(found.html)) >= 0.7 * least, "subscripts are .7 of their letters"
+    assert sorted(texts_on_axes(found.html))[len(texts_on_axes(found.html)) // 2] >= least
 
 
 def test_cells_of_wide_tables_have_the_names_of_their_columns():

@@ -41,6 +41,10 @@ def test_two_rigs_of_one_verdict_are_told_what_differs_most():
     found = ss.compare_rigs(rig, rig.with_values({"stiffness": "20 GPa/m"}), names=("old", "new"))
     text = words(ss.report(found).html)
     assert "No difference decides, as the verdict is the same; most of what differs comes from stiffness k" in text
+    assert "its part in k/k_cr" in text.replace("k/kcr", "k/k_cr")
+    other = ss.compare_rigs(rig, ss.read_rig("examples/two-states.toml"))
+    assert not other.measure
+    assert "its part in" not in words(ss.report(other).html), "there was a column without anything in it"
     same = words(ss.report(ss.compare_rigs(rig, rig)).html)
     assert "They have the same equations and numbers" in same
 

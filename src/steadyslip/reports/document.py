@@ -38,8 +38,10 @@ body { background: #fff; }
 @page { size: A4; margin: 16mm; @bottom-right { content: counter(page) " / " counter(pages); font: 9pt sans-serif; } }
 @media print {
   .report.steadyslip-told { padding: 0; font-size: 13px; max-width: none; }
-  .report.steadyslip-told h2 { margin-top: 16px; }
+  .report.steadyslip-told h2 { margin-top: 14px; }
   .report.steadyslip-told p { margin: 7px 0; }
+  .report.steadyslip-told figure { margin: 5px 0; }
+  .report.steadyslip-told figcaption { font-size: 12px; line-height: 1.35; }
   .report figure > svg:not(.sketch), .report figure > img { max-height: 78mm; width: auto !important; }
   .report.steadyslip-told .pair { grid-template-columns: 1fr 1fr; gap: 0 6mm; }
   .report .pair > figure > :is(svg, img) { max-height: none; width: 100% !important; }

@@ -75,3 +75,4 @@ def test_no_line_breaks_within_a_value(text, unbroken):
     """Nor inside its unit, nor around its error."""
     assert unbroken.replace(" ", "\u00a0") in html_text(text)
     assert "5\u00a0s mass m" in html_text("after 5 s mass m")
+    assert html_text("7.9e-06. Then").endswith("10⁻⁶. Then")

@@ -23,7 +23,7 @@ def lab_results():
 
 
 LAB = {
-    "draws": ("16 draws, bootstrap", "error of the draws", "friction.d_c"),
+    "draws": ("16 draws, bootstrap", "error of the draws", "slip distance d_c"),
     "prediction": ("How sure is that?", "probability"),
     "population": ("Population of 3 experiments", "another experiment, 95 %", "with the others"),
     "comparison": ("2 laws compared", "aging"),
@@ -41,9 +41,14 @@ def test_answers_of_records_have_documents(lab_results, name, request):
     for part in LAB[name]:
         assert part in text, part
     if name == "fit":
-        assert (
-            words(html_text(f"friction.a {lab_results[name]['a'].shown()}, friction.b")) in text
-        )  # what it found, at once
+        found = lab_results[name]
+        told = f"Direct effect a {found['a'].shown()}, evolution effect b"  # what it found, at once
+        assert words(html_text(told)) in text
+        answer = words(html_text(f"a - b = {found['a - b'].shown()}"))
+        assert f"Friction falls with velocity, {answer}. Fit to synthetic" in text
+        above = text[: text.index("What was found")]
+        assert "Use these values with their errors" in above
+        assert "friction.a" not in above
     shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
     assert not re.search(r"\d um\b", shown)
     assert len(document.encode()) <= 500_000

@@ -18,7 +18,7 @@ _REPLACEMENTS = (
     (r"^x (?=-?\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
 )  # fmt: skip
 _EXPONENT, _SUPERSCRIPTS = (
-    re.compile(r"(?<![\w./=-])(−?\d(?:\.\d+)?)e([+-]\d+)(?![\w./-])"),
+    re.compile(r"(?<![\w./=-])(−?\d(?:\.\d+)?)e([+-]\d+)(?![\w/-]|\.\w)"),
     str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
 )
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone

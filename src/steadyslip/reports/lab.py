@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from steadyslip import figures
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments import Draws, Fit, LawComparison, MachineFit, Population, Prediction
-from steadyslip.experiments.fitting.words import warnings
+from steadyslip.experiments.fitting.words import better, warnings
 from steadyslip.figures.inline import figure_html
+from steadyslip.machine.letters import estimate_words
+from steadyslip.machine.rig import Rig
 from steadyslip.reports import rig as rig_report
 from steadyslip.reports.brief import result_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, result_listing, table
 from steadyslip.reports.results import parts_of
 from steadyslip.verdict import analyze
+
+_FOUND = ("parameter", "value", "95 %")
 
 
 def record_names(fit: Fit) -> str:
@@ -24,9 +29,9 @@ def record_names(fit: Fit) -> str:
 
 @parts_of.register
 def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | None = None) -> Parts:
-    rows = [(one.name, one.shown(), one.range() if one.determined else "not determined") for one in result.estimates]
+    rig, rows = result.rig(), _estimate_rows(result, result.rig())
     body = [
-        heading("What was found"), table(rows, ("parameter", "value", "95 %")),
+        *_use(result), heading("What was found"), table(rows, _FOUND),
         *(paragraph(text, "warning") for text in warnings(result)),
     ]  # fmt: skip
     if draws is not None:
@@ -43,25 +48,60 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
     for record in result.plan.records:
         body += [heading(f"Record {Path(record.source).name}", 3), result_listing(record)]
     question = f"Which friction do these records show, and how sure is that: {record_names(result)}?"
-    rig = result.rig()
-    lead = ", ".join(f"{one.name} {one.shown()}" for one in result.estimates if one.determined)
-    lead = f"{lead}." if lead else "No parameter is determined."
-    return Parts(f"Fit to {record_names(result)}", lead, question, body, rig)
+    values = _lead(result, rig)
+    lead = values if better(result) is None else f"For now: {values[:1].lower()}{values[1:]}"
+    return Parts(f"{_answer(result)}. Fit to {record_names(result)}", lead, question, body, rig)
+
+
+def _answer(fit: Fit) -> str:
+    """What a fit says of friction, in a few words."""
+    if better(fit) is not None:
+        return "Not to be used yet: this law leaves structure in the residuals"
+    found = next((one for one in fit.derived if one.name.partition("@")[0] == "a - b"), None)
+    if found is None or not found.determined or not found.low * found.high > 0:
+        return "It is not determined whether friction rises or falls with velocity"
+    return f"Friction {'falls' if found.high < 0 else 'rises'} with velocity, a - b = {found.shown()}"
+
+
+def _use(fit: Fit) -> Iterator[str]:
+    """HTML of what to do with the values of a fit."""
+    yield heading("The recommendation")
+    if (other := better(fit)) is not None:
+        yield paragraph(
+            f"Fit again with {other.choice}, as keys of the fit file or by --set: what these values leave unexplained "
+            "is no noise, and that explains more of it. Values and errors below are those of the simpler law."
+        )
+    elif warnings(fit):
+        yield paragraph("Read the warnings below before these values are used.")
+    else:
+        yield paragraph("Use these values with their errors: what they leave unexplained is noise.")
+
+
+def _estimate_rows(fit: Fit | MachineFit, rig: Rig) -> list[tuple[str, str, str]]:
+    """Rows of a table of what was fitted: words with letters, value with error, 95 % interval."""
+    return [
+        (estimate_words(rig, one.name), one.shown(), one.range() if one.determined else "not determined")
+        for one in fit.estimates
+    ]
+
+
+def _lead(fit: Fit | MachineFit, rig: Rig) -> str:
+    """Sentence with the values that are determined."""
+    told = ", ".join(f"{estimate_words(rig, one.name)} {one.shown()}" for one in fit.estimates if one.determined)
+    return f"{told[:1].upper()}{told[1:]}." if told else "No parameter is determined."
 
 
 @parts_of.register
 def _machine_fit(result: MachineFit, comparison: None = None, draws: None = None) -> Parts:
-    rows = [(one.name, one.shown(), one.range() if one.determined else "not determined") for one in result.estimates]
-    body = [heading("What was found"), table(rows, ("parameter", "value", "95 %"))]
+    rig = result.rig()
+    body = [heading("What was found"), table(_estimate_rows(result, rig), _FOUND)]
     for i, record in enumerate(result.plan.records):
         shown = figure_html(lambda i=i: figures.machine_fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
         body.append(figure(shown, f"{Path(record.source).name}: record and machine."))
     body += [heading("Details"), result_listing(result)]
-    lead = ", ".join(f"{one.name} {one.shown()}" for one in result.estimates if one.determined)
-    lead = f"{lead}." if lead else "No parameter is determined."
     names = ", ".join(Path(record.source).name for record in result.plan.records)
     question = f"Which machine do these records show, and how sure is that: {names}?"
-    return Parts(f"Machine fitted to {names}", lead, question, body, result.rig())
+    return Parts(f"Machine fitted to {names}", _lead(result, rig), question, body, rig)
 
 
 def _draws_section(result: Draws) -> list[str]:
@@ -70,7 +110,7 @@ def _draws_section(result: Draws) -> list[str]:
     for one in result.fit.estimates:
         low, high = (format_quantity(end, one.unit, area=one.area) for end in result.interval(one.name))
         error = format_quantity(result.error(one.name), one.unit, 3, one.area)
-        rows.append((one.name, one.shown(), error, f"{low} to {high}"))
+        rows.append((estimate_words(result.fit.rig(), one.name), one.shown(), error, f"{low} to {high}"))
     details = ", ".join(f"{name} {value:.4g}" for name, value in result.details.items())
     many = f"{len(result)} draws, {result.kind}{f' ({details})' if details else ''}."
     body = [
@@ -126,13 +166,13 @@ def _comparison(result: LawComparison) -> Parts:
 
 @parts_of.register
 def _population(result: Population) -> Parts:
-    rows, own = [], []
+    rows, own, rig = [], [], next(iter(result.fits.values())).rig()
     for name in result.axes.quantities:
-        mean, other = result.mean(name), result.another(name)
-        rows.append((name, mean.shown(), mean.range(), other.range()))
+        mean, other, words = result.mean(name), result.another(name), estimate_words(rig, name)
+        rows.append((words, mean.shown(), mean.range(), other.range()))
         for label, alone in result.alone(name).items():
             said = "not determined alone" if alone is None else alone.shown()
-            own.append((name, label, said, result.experiment(label, name).shown()))
+            own.append((words, label, said, result.experiment(label, name).shown()))
     body = [
         heading("What was found"), table(rows, ("parameter", "mean", "mean, 95 %", "another experiment, 95 %")),
         figure(figure_html(result.plot, "population"), "Every experiment alone and with the others."),

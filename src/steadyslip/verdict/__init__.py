@@ -7,7 +7,8 @@ from steadyslip.files.specifications.tolerance_tables import Adjustment, Toleran
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.analyze import analyze
 from steadyslip.verdict.compare import Difference, RigComparison, compare_rigs
-from steadyslip.verdict.cures import Cures, Window, cure
+from steadyslip.verdict.cure_window import Window
+from steadyslip.verdict.cures import Cures, cure
 from steadyslip.verdict.tolerances import Tolerated, tolerate
 from steadyslip.verdict.unknown import StableWithin, ValuesWithin, stable_within
 

@@ -128,8 +128,8 @@ def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
     if not margin.edges:
         if analysis.stable is None or analysis.on_edge or not (rig.in_forces or rig.area is not None):
             return []
-        low, high = (told(analysis.rig, margin.parameter, end) for end in margin.searched)
-        return [("stable speeds", f"{'all' if analysis.stable else 'none'} (searched from {low} to {high})")]
+        searched = " to ".join(told(analysis.rig, margin.parameter, end) for end in margin.searched)
+        return [("stable speeds", f"{'all' if analysis.stable else 'none'} (searched from {searched})")]
     ends = [0.0, *(edge.value for edge in margin.edges), math.inf]
     below = [edge.stable == "below" for edge in margin.edges] + [False]
     above = [False] + [edge.stable == "above" for edge in margin.edges]

@@ -273,8 +273,9 @@ def _course_from_json(one: list[Any]) -> Course:
         raise ValueError("has servos or shapes of other changes")
     shaped = any(change.pieces for change in made)
     parts = [np.split(np.array(own), ends[:-1]) for own in others if shaped]
+    counted = dict(zip(("strays", "slips", "glitches", "early", "late"), numbers, strict=True))
     return Course(
-        first, made, np.array(errors), curve, *numbers,
+        first, made, np.array(errors), curve, **counted,
         servos=() if shaped else tuple((lag, damping) for lag, damping in others),
         shapes=tuple((levels, shares) for levels, *shares in parts),
     )  # fmt: skip

@@ -204,11 +204,11 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "toml": file.pieces,
         "stiffness": ways_of(rig).compared(rig, names),
         **ways_of(rig).further(rig, facts),
-        "headlines": {kind: words for kind, words in HEADLINES.items() if kind != "undecided"},
+        "headlines": {kind: words for kind, words in HEADLINES.items() if kind not in _UNTOLD},
         "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints]},
         "remote": REMOTE,
         "written": _written_units(rig),
-        "beyond": BEYOND | EDGE_WORDS,
+        "beyond": {kind: words for kind, words in (BEYOND | EDGE_WORDS).items() if kind not in _UNTOLD},
         "pace": PACE,
         "judders": JUDDERS,
         "ends": causes(rig),
@@ -217,6 +217,8 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     }
 
 
+_UNTOLD = frozenset({"undecided", "undamped", "coupling"})
+"""Kinds of verdicts and edges that a page does not tell apart from others."""
 _TOLD_BESIDES = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N m", "Pa/m", "N/m", "N m/rad"})
 """SI units of what a page tells beside parameters: motion, times, rates, stresses, forces, stiffnesses."""
 

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+import sympy as sp
 
 import steadyslip as ss
 from read_pages import Balanced, words
@@ -76,3 +77,14 @@ def test_no_line_breaks_within_a_value(text, unbroken):
     assert unbroken.replace(" ", "\u00a0") in html_text(text)
     assert "5\u00a0s mass m" in html_text("after 5 s mass m")
     assert html_text("7.9e-06. Then").endswith("10⁻⁶. Then")
+
+
+def test_formulas_look_alike_in_every_font():
+    """No root sign, whose bar some fonts lack, no exponent of an exponent, and room before a function."""
+    a, b, v = sp.symbols("a b v", positive=True)
+    text = math(a * sp.sqrt(4 * v**2 + sp.exp(-2 * b / a)) + a * b * sp.asinh(v))
+    assert "msqrt" not in text
+    assert "<mi>exp</mi>" in text
+    assert "<mo>/</mo>" in text
+    assert text.count("<mfrac>") == 0  # within exp fractions stand on the line
+    assert '<mspace width=".2em"/><mrow><mi>arcsinh</mi>' in text

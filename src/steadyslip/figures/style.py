@@ -181,7 +181,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> str:
 
     fit = getattr(result, "fit", result)  # of draws
     plan = getattr(fit, "plan", None)
-    rig = getattr(plan if hasattr(plan, "records") else result, "rig", None)
+    rig = fit.rig() if hasattr(plan, "records") else getattr(result, "rig", None)
     parts = []
     if isinstance(rig, Rig):
         estimates = {one.name: one for one in getattr(fit, "estimates", ())}

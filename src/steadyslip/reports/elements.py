@@ -199,10 +199,60 @@ def _presented(expression: Any) -> str:
     """Presentation MathML of an expression without the element around it."""
     if isinstance(expression, sp.Basic):  # asinh_exp(x, y) avoids overflow in computing; print it as asinh(x exp(y))
         expression = expression.replace(asinh_exp, lambda x, y: sp.asinh(x * sp.exp(y)))
-    text: str = MathMLPresentationPrinter().doprint(expression)
+    text: str = _Printer().doprint(expression)
     for entity, character in _ENTITIES.items():
         text = text.replace(entity, character)
-    return text
+    return re.sub(r"(?<=<mo>\u2062</mo>)(?=<mrow><mi>[a-z]{3,}</mi>)", '<mspace width=".2em"/>', text)
+
+
+class _Printer(MathMLPresentationPrinter):
+    """Printer of MathML that looks alike in every font: no root signs, whose bar some lack, no towers of exponents."""
+
+    _inline = False  # fractions are on one line: within exp and log, where they would be too small to be read
+
+    def _print_exp(self, expression: sp.exp) -> Any:
+        return self._print_inline(sp.Function("exp")(*expression.args))
+
+    def _print_log(self, expression: sp.log) -> Any:
+        return self._print_inline(sp.Function("log")(*expression.args))
+
+    def _print_inline(self, function: Any) -> Any:
+        before, self._inline = self._inline, True
+        found = self._print(function)
+        self._inline = before
+        return found
+
+    def _print_Mul(self, expression: sp.Mul) -> Any:  # noqa: N802 -- SymPy's name
+        above, below = sp.fraction(expression)
+        if not self._inline or below == 1:
+            return super()._print_Mul(expression)
+        sign = above.could_extract_minus_sign() and not above.is_Add
+        parts = [self._sign("-")] * sign + [self._closed(-above if sign else above, above.is_Add)]
+        return self._row([*parts, self._sign("/"), self._closed(below, not below.is_Atom)])
+
+    def _print_Pow(self, expression: sp.Pow) -> Any:  # noqa: N802 -- SymPy's name
+        base, exponent = expression.as_base_exp()
+        if exponent != sp.S.Half:
+            return super()._print_Pow(expression)
+        whole = self.dom.createElement("msup")
+        whole.appendChild(self._closed(base, not base.is_Symbol))
+        whole.appendChild(self._row([self._print(sp.Integer(1)), self._sign("/"), self._print(sp.Integer(2))]))
+        return whole
+
+    def _closed(self, expression: Any, brackets: bool) -> Any:
+        inner = self._print(expression)
+        return self._row([self._sign("("), inner, self._sign(")")]) if brackets else inner
+
+    def _row(self, parts: Iterable[Any]) -> Any:
+        row = self.dom.createElement("mrow")
+        for part in parts:
+            row.appendChild(part)
+        return row
+
+    def _sign(self, text: str) -> Any:
+        element = self.dom.createElement("mo")
+        element.appendChild(self.dom.createTextNode(text))
+        return element
 
 
 def _mathml(text: str, display: bool) -> Markup:

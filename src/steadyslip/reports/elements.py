@@ -205,7 +205,7 @@ def _presented(expression: Any) -> str:
     return re.sub(r"(?<=<mo>\u2062</mo>)(?=<mrow><mi>[a-z]{3,}</mi>)", '<mspace width=".2em"/>', text)
 
 
-class _Printer(MathMLPresentationPrinter):
+class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types
     """Printer of MathML that looks alike in every font: no root signs, whose bar some lack, no towers of exponents."""
 
     _inline = False  # fractions are on one line: within exp and log, where they would be too small to be read

@@ -74,15 +74,15 @@ def recommendation(
     if not found:
         yield from _cured(analysis, {}, adjustable, "stable", "stable at")
         return
-    near = [one for one in found if adjustable or not _is_far(one.value, one.edge.value if one.edge else None)]
-    rows = [found[one] for one in near or found][:_ROWS]
+    close = [one for one in found if adjustable or not _is_far(one.value, one.edge.value if one.edge else None)]
+    rows = [found[one] for one in close or found][:_ROWS]
     name, now, to, *_ = rows[0]
     yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
-    order = "Changes that make it stable: first of settings, then of parts, last of the speed of the task."
-    yield table(rows, head, caption=order)
-    if near and (far := [row[0] for one, row in found.items() if one not in near]):
+    sequence = "Changes that make it stable: first of settings, then of parts, last of the speed of the task."
+    yield table(rows, head, caption=sequence)
+    if close and (far := [row[0] for one, row in found.items() if one not in close]):
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
 
 

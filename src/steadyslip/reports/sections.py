@@ -100,7 +100,8 @@ def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
     if run is None:
         yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
         return
-    begin, end = (format_quantity(piece.at, "s") for piece in run.protocol.pieces[:2])
+    pieces: Sequence[Any] = run.protocol.pieces
+    begin, end = (format_quantity(piece.at, "s") for piece in pieces[:2])
     kick = f"the drive runs {100 * (STEP - 1):.0f} % faster from {begin} to {end}"
     yield paragraph(
         f"A small disturbance shows what the verdict means: {kick}, and at its own speed again from then on. The "

@@ -68,7 +68,7 @@ DIMENSIONLESS = frozenset(
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
     sides conditions amplitudes speeds links steady characteristic_terms gain gains phase phases shift
     mean_friction steady_friction distortion status linear_to lost_at crossings e_folds unstable_roots
-    correlations cost otherwise sure chance windows limits pair pair_cost fails
+    correlations cost otherwise sure chance windows limits beyond pair pair_cost fails
     part kinetic elastic slope""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}

@@ -53,7 +53,12 @@ def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Questions about stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more."""
+    """Questions about stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more.
+
+    Of files that use other units than SI's own, as people do and programs do not.
+    """
+    if all(unit(name)[0] == 1.0 for name in rig.written_in):
+        return
     presses = max(
         (rig.load_of(f"{prefix}friction") or 0.0 for prefix, *_ in rig.laws_by_contact().values()), default=0.0
     )

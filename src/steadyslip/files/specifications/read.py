@@ -54,6 +54,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
 CHANGES = "changes (--set)"  # where faults of what they give are, in place of a file
+RIGID = 1e300  # N/m: read in place of "rigid", larger than any that is typed; the link is taken out of the machine
 LIKE = 0.6  # likeness of a misspelt table's name to the one that is meant: body and bodies
 
 
@@ -313,7 +314,7 @@ def _rigid(links: Any) -> tuple[Any, list[str]]:
     if not isinstance(links, dict):
         return links, []
     names = [name for name, one in links.items() if isinstance(one, dict) and one.get("stiffness") == "rigid"]
-    return links | {name: links[name] | {"stiffness": 1.0} for name in names}, names
+    return links | {name: links[name] | {"stiffness": RIGID} for name in names}, names
 
 
 def _joined(first: Table, second: Table) -> Table:

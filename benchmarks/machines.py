@@ -20,7 +20,7 @@ from delays import apart, some, spectral, winding
 from machine_onsets import compared
 from machines import at_random, same_block, three_bodies
 from moving_machines import slopes_of_motion
-from steadyslip.linear import quasipolynomial as quasi
+from steadyslip.linear import quasipolynomial as quasi, rightmost as late_roots
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.model.point import operating_point
 
@@ -131,7 +131,7 @@ def delays(count, first):
             continue
         good = int(quasi.count_right(c, h, apart(len(c)))) == np.sum(found.real > 0)
         good &= all(
-            np.min(np.abs(found - s)) < 1e-6 * max(1.0, abs(s)) for s in quasi.rightmost(c, h, apart(len(c)), 3)
+            np.min(np.abs(found - s)) < 1e-6 * max(1.0, abs(s)) for s in late_roots.rightmost(c, h, apart(len(c)), 3)
         )
         right, wrong = right + good, wrong + (not good)
         if not good:

@@ -47,28 +47,30 @@ def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
     values = np.array([one.values for one in told])
 
     def log_probability(z):
-        mean, log_spread, members = z[:, None, :2], z[:, 2:4], z[:, 4:10].reshape(-1, 3, 2)
+        mean, log_spread, u = (
+            z[:, None, :2],
+            z[:, 2:4],
+            z[:, 4:10].reshape(-1, 3, 2),
+        )  # members in spreads from the mean
         spread, correlation = np.exp(log_spread), z[:, 10]
         inside = np.all((log_spread > -16) & (log_spread < 4), axis=1) & (np.abs(correlation) < 1)
         left = 1 - np.where(inside, correlation, 0.0) ** 2
-        r = values - members
-        value = np.sum(0.5 * log_spread - 0.5 * spread**2, axis=1) - 3 * (
-            np.sum(log_spread, axis=1) + 0.5 * np.log(left)
-        )
-        u = (members - mean) / spread[:, None]
+        r = values - mean - u * spread[:, None]
+        value = np.sum(0.5 * log_spread - 0.5 * spread**2, axis=1) - 1.5 * np.log(left)
         value += 2 * np.log(left)  # the prior of the correlation
         square = np.sum(u**2, axis=2) - 2 * correlation[:, None] * u[:, :, 0] * u[:, :, 1]
         value -= 0.5 * np.sum(square, axis=1) / left + 0.5 * np.einsum("mjk,jkl,mjl->m", r, inverse, r)
         return np.where(inside, value, -np.inf)
 
     rng = np.random.default_rng(0)
-    centre = np.concatenate([MEAN, np.log([0.1, 0.1]), np.concatenate([one.values for one in told]), [0.0]])
+    centre = np.concatenate([MEAN, np.log([0.1, 0.1]), np.zeros(6), [0.0]])
     sampler = emcee.EnsembleSampler(
         64, 11, log_probability, vectorize=True, moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2)]
     )
     sampler._random = np.random.RandomState(4)
     sampler.run_mcmc(centre + 0.02 * rng.standard_normal((64, 11)), 3000)
     chain = sampler.get_chain(discard=700, flat=True)
+    chain[:, 4:10] = np.tile(chain[:, :2], 3) + chain[:, 4:10] * np.tile(np.exp(chain[:, 2:4]), 3)
     correlation = found.root[:, 1, 0] / found.spread[:, 1]
     ours = np.column_stack([found.mean[:, :, 0], np.log(found.spread), found.members.reshape(-1, 6), correlation])
     for level in (0.1, 0.5, 0.9):

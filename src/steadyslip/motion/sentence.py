@@ -55,7 +55,7 @@ def sentence(
     else:
         drop = _told([one.stress_drop for one in told if not isinstance(one, ContactSlip)], "Pa", area)
     holes = {
-        "every": _told([one.recurrence for one in told], "s"),
+        "every": _told([one.recurrence for one in told if math.isfinite(one.recurrence)] or [math.nan], "s"),
         "waits": JUDDERS["sticks" if _stuck(events, last) else "lags"],
         "slip": _told([abs(one.slip) for one in told], "m"), "within": _told([one.duration for one in told], "s"),
         "drop": drop, "rings": str(last.rings), "often": _told([last.ring_frequency], "Hz"), "backward": str(len(back)),

@@ -67,6 +67,8 @@ STYLE = """
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
 @media print { .steadyslip-told .formula math { font-size: 12px; } }
 @media screen and (max-width: 600px) {
+  .steadyslip-told table { font-size: 13px; }
+  .steadyslip-told.steadyslip-told :is(th, td) { padding-right: 8px; }
   .steadyslip-told .stacks thead { position: absolute; clip-path: inset(50%); }
   .steadyslip-told .stacks tr { display: block; border-bottom: 1px solid #d5dae1; padding: 4px 0; }
   .steadyslip-told.steadyslip-told .stacks :is(th, td) { display: inline-block; border: 0; padding: 0 14px 0 0; }

@@ -14,7 +14,6 @@ from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-RAMP_TOLERANCE = 1e-6  # relative decrease of the sum of squares below which they end: within .03 errors of the minimum
 RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
 
 
@@ -103,7 +102,7 @@ def with_ramps(
     held[:, lengths] = True
     z = space.coordinates(begin)
     lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
-    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=RAMP_TOLERANCE)
+    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
     return tuple(
         RampFit(share, float(ssq), dict(zip(names, map(float, row), strict=True)))

@@ -101,7 +101,8 @@ function zero(f, a, b, steps) {
  * SVG path of the line of a level over a grid of numbers, and the middles of its pieces; none in cells with a `jump`. It is straight
  * within cells, or with `exact`, numbers at positions from 0 to 1, crosses their sides where these are reached if they change by more
  * than `steep`; with `bends` in so many `steps` each, and with a vertex inside cells, which one step along the gradient finds.
- * @param {number[][]} grid @param {number} at @param {{jump?: number, exact?: ((x: number, y: number) => number) | null, steep?: number, steps?: number, bends?: boolean}} [how]
+ * @param {number[][]} grid @param {number} at @param {number} width @param {number} height
+ * @param {{jump?: number, exact?: ((x: number, y: number) => number) | null, steep?: number, steps?: number, bends?: boolean}} [how]
  */
 export function line(grid, at, width, height, { jump = Infinity, exact = null, steep = STEEP, steps = TRIES, bends = false } = {}) {
   const rows = grid.length - 1, columns = grid[0].length - 1, middles = /** @type {[number, number][]} */ ([]), known = /** @type {Record<string, number>} */ ({});
@@ -124,8 +125,8 @@ export function line(grid, at, width, height, { jump = Infinity, exact = null, s
         if (Math.hypot(off * gx, off * gy) < 0.5) [middle[0], middle[1]] = [middle[0] - off * gx, middle[1] - off * gy];
         ends.splice(1, 0, middle);
       }
-      path += `M${ends.map((one) => shown(one).map((value) => value.toFixed(1)).join(" ")).join("L")}`;
-      const [x, y] = shown(middle);
+      path += `M${ends.map((one) => shown(/** @type {[number, number]} */ (one)).map((value) => value.toFixed(1)).join(" ")).join("L")}`;
+      const [x, y] = shown(/** @type {[number, number]} */ (middle));
       middles.push([x, y]);
     }
   }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from steadyslip.core.dimensions import unit
@@ -22,7 +22,7 @@ FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than 
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
 
-def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
+def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iterable[str]) -> None:
     """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
 
     Also of stiffnesses without a unit that friction would stretch far, and of values that a friction law doubts.
@@ -32,9 +32,12 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> None:
     rig : Slider or Machine
     read : mapping of str to (object, str)
         Names of the values read, each as it was written and with its SI unit.
+    written : iterable of str
+        Units that stand in the file. Where all are SI's own, as programs write them, stiffnesses are not asked about.
     """
     doubts = (text for one in rig.laws_by_contact().values() for text in one.friction.doubts(one.prefix))
-    for text in (*_questions(rig, read), *_soft(rig, read), *doubts):
+    soft = () if all(unit(name)[0] == 1.0 for name in written) else _soft(rig, read)
+    for text in (*_questions(rig, read), *soft, *doubts):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -53,12 +56,7 @@ def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Questions about stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more.
-
-    Of files that use other units than SI's own, as people do and programs do not.
-    """
-    if all(unit(name)[0] == 1.0 for name in rig.written_in):
-        return
+    """Questions about stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more."""
     presses = max(
         (rig.load_of(f"{prefix}friction") or 0.0 for prefix, *_ in rig.laws_by_contact().values()), default=0.0
     )

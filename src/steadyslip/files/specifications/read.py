@@ -290,7 +290,7 @@ def read_tables(
         rig.told_in(sorted(units_in(tables))).named(Path(source).name if source.endswith(".toml") else "")
         faults += wrong_ends(rig, tolerances)
         if rig.written_in:  # numbers alone are SI units, as programs write them
-            question_values(rig, reader.questioned)
+            question_values(rig, reader.questioned, units_in(tables))
     wrong = {one.name for one in faults}  # told once, as a tolerance
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
     return RigFileContents(source, rig, protocol, said, problems, changed, lines, tables, tolerances)

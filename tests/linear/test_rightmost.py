@@ -46,3 +46,14 @@ def test_every_root_is_one_and_none_lies_further_right():
         s = first.real + np.linspace(1e-3, 3.0, 40)[:, None] * abs(first) + 1j * np.linspace(0.0, 40.0, 200)
         size = np.abs(value(*row, s)) / size_of_terms(*row, s)
         assert np.min(size) > 1e-9
+
+
+@pytest.mark.parametrize("delay", [30.0, 60.0, 90.0])
+def test_roots_that_ratios_miss_are_found_by_bisection(delay):
+    """Rightmost of s² + 0.02 s + 1 + 0.3 exp(−s delay): an oscillation of many turns within the delay."""
+    c, h = np.array([[1.0, 0.02, 1.0], [0.3, 0.0, 0.0]]), np.array([0.0, delay])
+    (found,) = late_roots.rightmost(c[None], h[None], ONE, 1)[0]
+    assert found == pytest.approx(late_roots._rightmost_of_one(c, h, ONE, 1)[0], rel=1e-9)
+    s = found.real + 1e-3 + 1j * np.linspace(0.0, 3.0, 100_000)  # no root lies right of this line: no turn along it
+    turns = np.unwrap(np.angle(value(c, h, s)))[-1] / np.pi  # of the half line; two quarters of s² beyond
+    assert turns == pytest.approx(1.0, abs=0.05)

@@ -11,6 +11,7 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, plain_guide, rig
 from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
+from steadyslip.motion.sentence import sentence
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -297,6 +298,9 @@ def test_ringing_is_told_beside_a_slip_event(changes, slip, drop, recurrence, ri
     assert run.sentence.startswith(
         f"judders: every {recurrence:.2f} s it sticks, then slips {1e6 * slip:.3g} um within "
     )
+    whole = sentence(run.events, run.slip_events, a_rig.area, since=-1.0)  # of all, the first of which follows none
+    assert whole.startswith("judders: every ")
+    assert "nan" not in whole
     many = ss.simulate_many(a_rig, {}, until=run.slip_events[-1].begin - 1.0, initial=kick).events
     assert many["events"] == len(run.slip_events) - 1
     assert many["event_rings"] == rings

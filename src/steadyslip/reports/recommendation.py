@@ -16,7 +16,7 @@ from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why
 from steadyslip.verdict import Cures, Tolerated, Window, cure
 from steadyslip.verdict.analysis import Analysis
-from steadyslip.verdict.cures import SPEED, default_adjust
+from steadyslip.verdict.cures import SPEED, SPEED_COST, default_adjust
 from steadyslip.verdict.tolerances import LEAST, format_chance
 from steadyslip.verdict.words import told
 
@@ -172,7 +172,7 @@ def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
     able = [one for one in every if whole or one.nearest is None or not _is_far(one.value, one.nearest)] or every
     rows = [(said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
     words = "Values that are enough, each alone, the others unchanged, the cheapest first. "
-    cost = "A cost of 1 is that of doubling or halving a value, 4 of the speed, unless the rig file gives another."
+    cost = f"Doubling or halving a value costs 1, the speed {SPEED_COST:g}, unless the rig file gives another cost."
     yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
     if far := [said(rig, one.parameter) for one in every if one not in able]:
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.loading import Pieces
-from steadyslip.experiments.loading.servo import DAMPINGS, rate_share, travel
+from steadyslip.experiments.loading.servo import DAMPINGS, late_response
 
 OUTLIER = 3.0  # standard deviations from which a sample weighs less
 ROUNDS = 3  # of weights for one linear fit, which is but a start
@@ -146,7 +146,7 @@ def fit_servo(samples: SensorSamples, step: JointFit, shortest: float, longest: 
 
     def responses(t: Array, x: Array) -> tuple[Array, Array]:
         lag, damping = np.exp(np.clip(x[-2:], low, high))
-        return _late(t, x[:-2] - lag, lag, damping)
+        return late_response(t[:, None] - (x[:-2] - lag), lag, damping)
 
     best: _Found | None = None
     for rings in (True, False):
@@ -206,7 +206,7 @@ def _starts(
     found = []
     for lag in np.geomspace(shortest, longest, LAGS):
         for damping in DAMPINGS:
-            late = travel(t[:, None] - (step.times - lag), lag, damping)
+            late, _ = late_response(t[:, None] - (step.times - lag), lag, damping)
             beyond = (late - moved) @ jumps / samples.scale
             beyond -= base @ (base.T @ beyond)
             amount, size = float(beyond @ left), float(beyond @ beyond)
@@ -226,12 +226,6 @@ def ramp_responses(t: Array, begins: Array, durations: Array) -> tuple[Array, Ar
     since = t[:, None] - begins
     share = np.clip(since / durations, 0.0, 1.0)
     return np.where(share < 1, 0.5 * share * since, since - 0.5 * durations), share
-
-
-def _late(t: Array, commands: Array, lag: float, damping: float) -> tuple[Array, Array]:
-    """Travel (s) and rate share after unit steps at `commands`, each (n, changes)."""
-    since = t[:, None] - commands
-    return travel(since, lag, damping), rate_share(since, lag, damping)
 
 
 def joint_columns(samples: SensorSamples, moved: Array) -> Array:

@@ -30,19 +30,21 @@ def _poles(lag: float, damping: float) -> tuple[complex, complex]:
     return complex(omega * (root - damping)), complex(omega * (-root - damping))
 
 
-def rate_share(since: Array, lag: float, damping: float) -> Array:
-    """Share of a step of rate that a servo has made at times `since` the command (s)."""
+def late_response(since: Array, lag: float, damping: float) -> tuple[Array, Array]:
+    """Displacement (s) and share of the rate that a servo has made at times `since` the command (s) of a step of 1.
+
+    Solution of x'' + 2 ζ ω x' + ω² (x - t) = 0 from rest, with ω = 2 ζ/lag.
+    """
     one, other = _poles(lag, damping)
     t = np.maximum(since, 0.0)
-    return np.asarray(1 - np.real((other * np.exp(one * t) - one * np.exp(other * t)) / (other - one)))
-
-
-def travel(since: Array, lag: float, damping: float) -> Array:
-    """Displacement at times `since` the command (s) by a step of rate of 1, in s: the integral of `rate_share`."""
-    one, other = _poles(lag, damping)
-    t = np.maximum(since, 0.0)
-    late = other / one * np.expm1(one * t) - one / other * np.expm1(other * t)
-    return np.asarray(t - np.real(late / (other - one)))
+    if damping < 1:
+        decayed = np.exp(one.real * t)
+        even, odd = decayed * np.cos(one.imag * t), decayed * np.sin(one.imag * t) / one.imag
+    else:
+        slow, fast = np.exp(one.real * t), np.exp(other.real * t)
+        even, odd = 0.5 * (slow + fast), (slow - fast) / (one.real - other.real)
+    decay = -0.5 * (one + other).real
+    return t - lag + lag * even + (decay * lag - 1) * odd, 1 - even - decay * odd
 
 
 def settling(lag: float, damping: float) -> float:
@@ -54,10 +56,10 @@ def settling(lag: float, damping: float) -> float:
 def ramps(lag: float, damping: float) -> tuple[tuple[float, float, float], ...]:
     """Straight ramps that stand for a response: begin after the command (s), duration (s) and share of the step."""
     t = np.linspace(0.0, settling(lag, damping), 4000)
-    bend = np.sqrt(np.abs(np.gradient(np.gradient(rate_share(t, lag, damping), t), t)))
+    bend = np.sqrt(np.abs(np.gradient(np.gradient(late_response(t, lag, damping)[1], t), t)))
     along = np.concatenate([[0.0], np.cumsum(0.5 * (bend[1:] + bend[:-1]) * np.diff(t))])
     nodes = np.interp(np.linspace(0.0, along[-1], PIECES + 1), along, t)
-    share = rate_share(nodes, lag, damping)
+    _, share = late_response(nodes, lag, damping)
     share[0], share[-1] = 0.0, 1.0
     return tuple(zip(nodes[:-1].tolist(), np.diff(nodes).tolist(), np.diff(share).tolist(), strict=True))
 

@@ -27,8 +27,8 @@ def test_the_response_is_that_of_a_second_order_system(lag, damping):
 
     found = solve_ivp(rates, (0, times[-1]), [0, 0, 0], t_eval=times, rtol=1e-10, atol=1e-13, method="Radau").y
     moved, share = late_response(times, lag, damping)
-    np.testing.assert_allclose(share, found[1], atol=2e-5)  # a double pole is taken as two, a ten-thousandth apart
-    np.testing.assert_allclose(moved, found[0], atol=2e-5 * lag)
+    np.testing.assert_allclose(share, found[1], atol=1e-7)
+    np.testing.assert_allclose(moved, found[0], atol=1e-7 * lag)
     late = 50 * settling(lag, damping)
     assert late_response(np.array([late]), lag, damping)[0][0] == pytest.approx(late - lag, rel=1e-9)
 

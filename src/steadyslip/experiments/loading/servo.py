@@ -25,7 +25,7 @@ PIECES = 24  # straight ramps that stand for a response: its rate is then right 
 
 def _poles(lag: float, damping: float) -> tuple[complex, complex]:
     """Poles s₁, s₂ (1/s) of a servo."""
-    damping = damping if abs(damping - 1) > 1e-4 else 1 + 1e-4  # a double pole divides by zero
+    damping = damping if abs(damping - 1) > 1e-8 else 1 + 1e-8  # a double pole divides by zero
     omega, root = 2 * damping / lag, np.sqrt(complex(damping**2 - 1))
     return complex(omega * (root - damping)), complex(omega * (-root - damping))
 

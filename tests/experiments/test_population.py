@@ -145,6 +145,17 @@ def test_experiments_that_say_little_are_drawn_to_the_others():
     assert np.std(members) > 0.8 * SPREAD[0]
 
 
+def test_an_experiment_that_determines_nothing_is_one_more_rock():
+    """The others are drawn as without it, and it as a rock that is not among them."""
+    told, _ = experiments(11, 8, errors=(0.05, 0.05))
+    none = ExperimentEstimate(np.array([], dtype=int), np.empty(0), np.empty((0, 0)), np.array([1.0]))
+    found = pooled([*told, none], 2, np.ones(2), 1000, 0)
+    np.testing.assert_array_equal(found.root, pooled(told, 2, np.ones(2), 1000, 0).root)
+    other, member = found.another(1), found.members[:, -1]
+    np.testing.assert_allclose(np.mean(member, axis=0), np.mean(other, axis=0), atol=0.2 * np.std(other, axis=0).max())
+    np.testing.assert_allclose(np.std(member, axis=0), np.std(other, axis=0), rtol=0.15)
+
+
 @pytest.fixture(scope="module")
 def fits():
     """Six experiments on one rock at three normal stresses; a rises with the stress."""

@@ -228,13 +228,15 @@ def _conditional_draws(
     mean = (best + np.linalg.solve(upper, noise)[:, :, 0]).reshape(count, size, -1)
     members = np.empty((count, len(experiments), size))
     for j, one in enumerate(experiments):  # a draw from the prior, moved by what it misses (Hoffman & Ribak 1991)
-        drawn = mean @ one.design + (root @ generator.standard_normal((count, size, 1)))[:, :, 0]
+        members[:, j] = drawn = mean @ one.design + (root @ generator.standard_normal((count, size, 1)))[:, :, 0]
+        if not len(one.indices):  # an experiment that determines nothing adds nothing
+            continue
         seen = drawn[:, one.indices] + generator.multivariate_normal(
             np.zeros(len(one.indices)), one.covariance, size=count, method="eigh"
         )
         variance = one.covariance + covariance[:, one.indices[:, None], one.indices]
         missed = np.linalg.solve(variance, (one.values - seen)[:, :, None])
-        members[:, j] = drawn + (covariance[:, :, one.indices] @ missed)[:, :, 0]
+        members[:, j] += (covariance[:, :, one.indices] @ missed)[:, :, 0]
     return mean, members
 
 

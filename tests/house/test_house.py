@@ -37,6 +37,22 @@ def test_no_three_folders_have_a_file_of_the_same_name():
     assert {name: own for name, own in folders.items() if len(own) > 2 and name != "__init__.py"} == {}
 
 
+OVER_ALL = ("reports", "reproduce")
+"""Folders that may import from the package's own list of public names, which imports nearly everything else."""
+
+
+def test_modules_name_the_module_they_need():
+    """`from steadyslip import units` anywhere below makes one circle of all stubs: mypy would check the whole anew."""
+    found = [
+        f"{path}:{node.lineno}"
+        for path, tree in trees().items()
+        for node in ast.walk(tree)
+        if path.parts[0] not in OVER_ALL
+        if isinstance(node, ast.ImportFrom) and node.module == "steadyslip"
+    ]
+    assert found == []
+
+
 KNOWS_LAWS = ("laws", "machine", "testing", "reproduce")
 """Folders that may name a law; and the figure of the paper that is about one."""
 OF_THE_PAPER = {Path("figures/mass.py"), Path("figures/critical.py"), Path("linear/paper.py")}

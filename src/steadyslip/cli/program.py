@@ -16,6 +16,7 @@ from steadyslip.cli.ending import end, print_message
 from steadyslip.cli.fits import fit
 from steadyslip.cli.mapping import map_, sensitivity
 from steadyslip.cli.starting import examples, init, reproduce, schema
+from steadyslip.core.version import version as program_version
 
 COMMANDS = (
     *(analyze, modes, cure, compare, fit, explore, report),
@@ -50,9 +51,7 @@ app = typer.Typer(
 @app.callback(invoke_without_command=True)
 def _start(version: Annotated[bool, typer.Option("--version", help="print the version and stop")] = False) -> None:
     if version:
-        from steadyslip import __version__
-
-        print_text(f"steadyslip {__version__}")
+        print_text(f"steadyslip {program_version()}")
         raise typer.Exit
 
 

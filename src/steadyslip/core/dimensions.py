@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from steadyslip import units
 from steadyslip.core.errors import QuantityError, repr_short
+from steadyslip.units import day, deg, hour, minute, year
 
 
 class Dimension(NamedTuple):
@@ -44,21 +44,21 @@ _TABLE: dict[str, tuple[float, Dimension]] = {
     "g": (1e-3, Dimension(1)),
     "kg": (1.0, Dimension(1)),
     "t": (1e3, Dimension(1)),
-    "min": (units.minute, Dimension(0, 0, 1)),
-    "h": (units.hour, Dimension(0, 0, 1)),
-    "hour": (units.hour, Dimension(0, 0, 1)),
-    "day": (units.day, Dimension(0, 0, 1)),
-    "yr": (units.year, Dimension(0, 0, 1)),
-    "year": (units.year, Dimension(0, 0, 1)),
+    "min": (minute, Dimension(0, 0, 1)),
+    "h": (hour, Dimension(0, 0, 1)),
+    "hour": (hour, Dimension(0, 0, 1)),
+    "day": (day, Dimension(0, 0, 1)),
+    "yr": (year, Dimension(0, 0, 1)),
+    "year": (year, Dimension(0, 0, 1)),
     "bar": (1e5, Dimension(1, -1, -2)),
     "rad": (1.0, Dimension(0, 0, 0, 1)),
-    "deg": (units.deg, Dimension(0, 0, 0, 1)),
-    "degree": (units.deg, Dimension(0, 0, 0, 1)),
-    "degrees": (units.deg, Dimension(0, 0, 0, 1)),
-    "°": (units.deg, Dimension(0, 0, 0, 1)),
+    "deg": (deg, Dimension(0, 0, 0, 1)),
+    "degree": (deg, Dimension(0, 0, 0, 1)),
+    "degrees": (deg, Dimension(0, 0, 0, 1)),
+    "°": (deg, Dimension(0, 0, 0, 1)),
     "rev": (2 * math.pi, Dimension(0, 0, 0, 1)),
     "turn": (2 * math.pi, Dimension(0, 0, 0, 1)),
-    "rpm": (2 * math.pi / units.minute, Dimension(0, 0, -1, 1)),
+    "rpm": (2 * math.pi / minute, Dimension(0, 0, -1, 1)),
     "%": (1e-2, Dimension()),
     "1": (1.0, Dimension()),
 }

@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping
 from functools import lru_cache
 
-from steadyslip import units
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
 from steadyslip.core.written import display_load, display_names
+from steadyslip.units import day, deg, hour, year
 
 _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "N s/mm"))}
 """Units of the force of bristles and of viscous friction, by the dimension that they have per load."""
@@ -86,11 +86,11 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < _LONGEST):
         return f"{_few(value / unit(own)[0], digits)} {own}"
     if si_unit == "rad":
-        return f"{_few(value / units.deg, digits)} deg"
+        return f"{_few(value / deg, digits)} deg"
     if si_unit == "m/rad":
         value, si_unit = value * 2 * math.pi, "m/rev"
     if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:  # times below 10 min stay in s
-        for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
+        for size, name in ((year, "yr"), (day, "days"), (hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
                 return f"{_few(value / size, digits)} {name}"
     if scaled is None or value == 0 or not math.isfinite(value):

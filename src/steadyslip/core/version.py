@@ -54,6 +54,4 @@ def stamped(answer: Any) -> Any:
 
 def of_another(made: str) -> str:
     """Note that a result was computed by another version, empty if by this one."""
-    from steadyslip import __version__
-
-    return "" if made == __version__ else f"computed by steadyslip {made}, this is {__version__}"
+    return "" if made == (own := version()) else f"computed by steadyslip {made}, this is {own}"

@@ -18,6 +18,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import own_units
 from steadyslip.core.palette import DARK, FORCED, LIGHT
 from steadyslip.core.records import Address
+from steadyslip.core.version import version
 from steadyslip.core.written import display_names
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
@@ -183,8 +184,6 @@ def _read_web(name: str) -> str:
 
 def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any], text: str) -> dict[str, Any]:
     """Data of the page of a rig: parameters, rig file, sentences, checks."""
-    from steadyslip import __version__
-
     names = list(_variable_parameters(rig, facts))
     places = [names.index(name) if name in names else name for name in facts["parameters"]]
     point = operating_point(rig, None, rig.kept_zeros(), branch)
@@ -192,7 +191,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     axial, file = "slider.axial_stiffness", own_file(rig, names, text)
     return {
         "title": title,
-        "version": __version__,
+        "version": version(),
         "branch": branch,
         "area": rig.area,
         "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],

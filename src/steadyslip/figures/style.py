@@ -24,6 +24,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, STABLE, UNSTABLE
 from steadyslip.core.records import records_in
+from steadyslip.core.version import version
 from steadyslip.linear.status import (
     ABSENT as ABSENT_CODE,
     STABLE as STABLE_CODE,
@@ -177,8 +178,6 @@ def _part_ticks(figure: Any, bins: int) -> None:
 
 def _footer(result: Any, axes: Sequence[Axes]) -> str:
     """File and law of a result, its values with their letters: fitted, or held; version of the program, and date."""
-    from steadyslip import __version__
-
     fit = getattr(result, "fit", result)  # of draws
     plan = getattr(fit, "plan", None)
     rig = fit.rig() if hasattr(plan, "records") else getattr(result, "rig", None)
@@ -196,7 +195,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> str:
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
         file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # that of a map
         parts = [file, *words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
-    parts.append(f"steadyslip\xa0{__version__}, {datetime.now(UTC):%Y-%m-%d}")
+    parts.append(f"steadyslip\xa0{version()}, {datetime.now(UTC):%Y-%m-%d}")
     return ". ".join(one for one in parts if one)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from steadyslip.core.errors import NotAvailable, ParameterError, RigFileError
+from steadyslip.core.version import version
 from steadyslip.explorer.assembly import document, fragment, style
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.read import read_whole, text_of
@@ -161,12 +162,10 @@ def _provenance(texts: Sequence[str], sources: Sequence[Path]) -> str:
     import scipy
     import sympy as sp
 
-    from steadyslip import __version__
-
     versions = (
         f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}, SymPy {sp.__version__}"
     )
-    rows = [("steadyslip", __version__), ("with", versions), ("made on", f"{datetime.now(UTC):%Y-%m-%d}")]
+    rows = [("steadyslip", version()), ("with", versions), ("made on", f"{datetime.now(UTC):%Y-%m-%d}")]
     for one in sources:
         if one.is_file():
             rows.append((f"SHA-256 of {one.name}", hashlib.sha256(one.read_bytes()).hexdigest()))

@@ -14,6 +14,7 @@ import numpy as np
 from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
+from steadyslip.core.version import version
 from steadyslip.linear.boundary import Margin, margins, margins_and_missing, oscillatory_edge
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.mode_table import growth_origin
@@ -77,8 +78,6 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     >>> verdict.stable, round(verdict.critical_stiffness / 1e9, 3)
     (False, 29.07)
     """
-    from steadyslip import __version__
-
     if not isinstance(rig, Rig):
         raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider or a Machine, such as read_rig gives")])
     rig.check_branch(branch)
@@ -89,7 +88,7 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
         except NoSteadySliding as error:
             why = str(error).removeprefix("no steady sliding: ")
             found = Analysis(rig=rig, stable=None, reason=why, margins=margins(rig))
-    return replace(found, version=__version__)
+    return replace(found, version=version())
 
 
 class _Linear(NamedTuple):

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.version import version
 from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
 from steadyslip.experiments.fitting.estimates import combinations, prior_information
 from steadyslip.experiments.fitting.fitted import Fitted
@@ -81,8 +82,6 @@ def fit_with_errors(
     bounds: tuple[Array, Array],
 ) -> F:  # fmt: skip
     """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and what is not determined."""
-    from steadyslip import __version__
-
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
     free = len(z)
@@ -111,4 +110,4 @@ def fit_with_errors(
     if search.converged:
         covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
         undetermined += opened
-    return made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, __version__).with_memories()
+    return made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, version()).with_memories()

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.version import version
 from steadyslip.files.inputs import read_bytes
 from steadyslip.files.sealed import fingerprint
 from steadyslip.files.specifications import stored_text
@@ -240,8 +241,6 @@ def _seal(document: dict[str, Any]) -> str:
 
 def new_layout(plan: Map) -> MapLayout:
     """Layout of a new map."""
-    from steadyslip import __version__
-
     try:
         rig = stored_text(plan.rig, plan.protocol)
     except ParameterError:
@@ -249,7 +248,7 @@ def new_layout(plan: Map) -> MapLayout:
     outputs = plan.outputs()
     sampled = tuple(plan.sampling.names) if plan.sampling else ()
     layout = MapLayout(
-        plan.definition(), versions(), __version__, str(plan), rig, tuple(plan.dims), tuple(o.name for o in outputs),
+        plan.definition(), versions(), version(), str(plan), rig, tuple(plan.dims), tuple(o.name for o in outputs),
         sampled, sampled if isinstance(plan.sampling, Generated) else (), tuple(plan.shape), tuple(plan.chunks), {},
     )  # fmt: skip
     known = roles(plan)

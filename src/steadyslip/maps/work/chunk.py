@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import OutOfRangeWarning, SteadyslipError
+from steadyslip.core.version import version
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Generated
@@ -65,10 +66,8 @@ class Done:
 
 def job_of(plan: Map, path: Path) -> Job:
     """Job for a map stored at `path`."""
-    from steadyslip import __version__
-
     sampling = plan.sampling if isinstance(plan.sampling, Generated) else None
-    return Job(str(path.absolute()), plan.rig, plan.protocol, tuple(plan.compute), sampling, __version__)
+    return Job(str(path.absolute()), plan.rig, plan.protocol, tuple(plan.compute), sampling, version())
 
 
 def do_chunk(job: Job, number: int) -> Done:
@@ -76,12 +75,10 @@ def do_chunk(job: Job, number: int) -> Done:
 
     Errors are returned as `Done.problem`, because exceptions lose their text on the way through some engines.
     """
-    from steadyslip import __version__
-
     began = time.perf_counter()
     try:
-        if job.version != __version__:
-            message = f"this worker has steadyslip {__version__}, the map was started with {job.version}"
+        if job.version != version():
+            message = f"this worker has steadyslip {version()}, the map was started with {job.version}"
             return Done(number, 0, 0.0, message)
         if not Path(job.path).exists():
             message = f"a worker does not see {job.path!r}; give a folder that all machines share"

@@ -11,6 +11,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import DURATION, checked
+from steadyslip.core.version import version
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -177,8 +178,6 @@ def _result(
     rig: Slider | Machine, protocol: Protocol, motion: Motion, at_rest: bool, errors: tuple[float, float],
     since: float,
 ) -> Hunt:  # fmt: skip
-    from steadyslip import __version__
-
     close, rtol = errors
     table, strokes = motion.table(), motion.trace.strokes
     own = swings(one for one in strokes if one.start >= since)
@@ -206,7 +205,7 @@ def _result(
         period=float(period), repeats=bool(count), runs_away=motion.runs_away,
         strokes=tuple(_told(one, ratio) for one in strokes), time=table[:, 0], error=ratio * table[:, 1],
         velocity=ratio * table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol, settled_at=float(settled),
-        unit="rad" if turns else "m", force_unit=force, version=__version__,
+        unit="rad" if turns else "m", force_unit=force, version=version(),
     )  # fmt: skip
 
 

@@ -338,7 +338,8 @@ class Routines(NamedTuple):
     rates_lanes, see_lanes : rates; observables (all lanes)
     extend_lanes, look_lanes : `extend`; observables at `Row.NEXT_TIME`, within the last step (all lanes)
     bristles : of a held rig, whose record is constants: ``array`` = slip rates and memories of its m contacts, then
-        friction forces and rates of the memories, then their slopes (m, m)
+        friction forces and rates of the memories, then their slopes; after the slip rate of a contact that a load
+        presses comes its normal stress
     """
 
     step: Routine

@@ -148,11 +148,15 @@ def test_a_motion_that_is_cut_short_says_what_it_did_so_far(sampled):
     )
 
 
-def test_a_contact_that_follows_the_load_is_refused_with_the_way_out():
-    held = ss.read_rig(EXAMPLES / "hunting-axis.toml")
-    loaded = replace(held, contact=ss.laws.Transmitted(preload=1.0, transmitted=0.1))
-    with pytest.raises(ss.NotAvailable, match=r"'transmitted' lets .* law = 'constant' with the preload .* load held"):
-        ss.hunt(loaded)
+@pytest.mark.parametrize("sampled", [{}, {"sample_time": 0.05}], ids=["continuous", "sampled"])
+def test_a_target_that_steps_while_the_axis_rests_is_followed(sampled):
+    """It was told to rest where it was before the second step."""
+    held = axis(**THEORY | {"ki": 0.0, "kd": 1.0}, **sampled)
+    steps = [DisplacementStep(at=0, by=1.0), DisplacementStep(at=60.0, by=1.0)]
+    found = ss.hunt(held, steps)
+    assert found.hunts is False
+    assert found.strokes[-1].start == pytest.approx(60.0, abs=0.05)
+    assert abs(found.error[-1]) < 0.5
 
 
 LIMITED = {

@@ -23,8 +23,8 @@ SAFETY = 0.9
 def held_rates(layout: Layout, routines: Routines, bristles: Bristles, Y: Array, y: Array, rates: Array) -> None:
     """Rates of all variables; `y` is as the routine leaves it."""
     A, G, H = bristles[2], bristles[3], bristles[4]
-    size, count = Y.shape[0], G.shape[0]
-    for k in range(count):
+    size, inputs, outputs = Y.shape[0], G.shape[0], H.shape[1]
+    for k in range(inputs):
         total = 0.0
         for j in range(size):
             total += G[k, j] * Y[j]
@@ -34,22 +34,22 @@ def held_rates(layout: Layout, routines: Routines, bristles: Bristles, Y: Array,
         total = 0.0
         for j in range(size):
             total += A[i, j] * Y[j]
-        for k in range(count):
-            total += H[i, k] * y[count + k]
+        for k in range(outputs):
+            total += H[i, k] * y[inputs + k]
         rates[i] = total
 
 
 def held_jacobian(bristles: Bristles, y: Array, jacobian: Array) -> None:
     """Slopes of all rates at the state where `y` was computed."""
     A, G, H = bristles[2], bristles[3], bristles[4]
-    size, count = A.shape[0], G.shape[0]
+    size, inputs, outputs = A.shape[0], G.shape[0], H.shape[1]
     for i in range(size):
         for j in range(size):
             jacobian[i, j] = A[i, j]
-        for k in range(count):
+        for k in range(outputs):
             slope = 0.0
-            for m in range(count):
-                slope = y[2 * count + count * k + m]
+            for m in range(inputs):
+                slope = y[inputs + outputs + inputs * k + m]
                 for j in range(size):
                     jacobian[i, j] += H[i, k] * slope * G[m, j]
 
@@ -182,11 +182,11 @@ def bristle_step(
     """Rates and Jacobian at Y; with way 2 the dense output of a step of length `Held.STOP`, with way 1 of one that is
     not longer and whose error is allowed, with its length in `Held.STOP`. Returns 1 if steps become too short.
     """
-    size, count = Y.shape[0], G.shape[0]
+    size, inputs, outputs = Y.shape[0], G.shape[0], H.shape[1]
     bristles = (R, tableau, A, G, H, scale)
     space = (
         jacobian, np.zeros((size, size)), np.zeros(size), rates, np.zeros(size), np.zeros(size),
-        np.zeros(2 * count + count * count), np.zeros((tableau.shape[1], size)),
+        np.zeros(inputs + outputs + inputs * outputs), np.zeros((tableau.shape[1], size)),
     )  # fmt: skip
     most = clock[Held.STOP]
     if way == 1:

@@ -258,12 +258,12 @@ def follow_held(
     `fresh`, only the sample that is due is taken, and the step after it is left to the caller. `rows` has room for the
     steps up to `Held.MOST_STEPS` and one more span.
     """
-    size, count, number = Y.shape[0], G.shape[0], guards.shape[0]
+    size, count, outputs, number = Y.shape[0], G.shape[0], H.shape[1], guards.shape[0]
     coordinates = loops.shape[1] - 3
     bristles = (R, tableau, A, G, H, scale)
     space = (
         np.zeros((size, size)), np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size),
-        np.zeros(2 * count + count * count), np.zeros((tableau.shape[1], size)),
+        np.zeros(count + outputs + count * outputs), np.zeros((tableau.shape[1], size)),
     )  # fmt: skip
     found, values, out = np.zeros((5, size)), np.zeros((3, NODES)), np.zeros(passages.shape[1] + 5)
     degrees = (passages.shape[1] - size - 3 * NODES) // number if number > 0 else 0

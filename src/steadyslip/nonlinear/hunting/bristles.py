@@ -46,8 +46,6 @@ class Bristles:
     ----------
     arrays : tuple of ndarray
         Constants of the routine, and coefficients of Rodas5P.
-    maps : tuple of ndarray
-        G and H.
     clock : ndarray
         See `steadyslip.kernels.layout.Held`.
     code : Code
@@ -55,16 +53,25 @@ class Bristles:
 
     def __init__(self, plant: Plant, rtol: float, scale: Array) -> None:
         contacts = [one for one in plant.contacts if one.slow]
-        self.scale, self.clock, self.maps = scale.copy(), np.zeros(Held.SIZE), _maps(plant, contacts)
+        self.scale, self.clock, self._contacts = scale.copy(), np.zeros(Held.SIZE), contacts
+        self._out_of = _outputs(plant, contacts)
+        self._maps: dict[HeldPiece, tuple[Array, Array]] = {}
         self.clock[[Held.RTOL, Held.SHORTEST, Held.LENGTH]] = rtol, SHORTEST, np.nan
         if contacts:
             laws = tuple(one.port.friction for one in contacts)
-            routine = _routine(_Kinds(tuple(map(shape_of, laws)), laws))
+            loaded = tuple(bool(one.loads) for one in contacts)
+            routine = _routine(_Kinds(tuple(map(shape_of, laws)), loaded, laws))
             self.code, self.arrays = routine.code, (routine.constants(contacts), _tableau())
         else:
             layout = make_layout(lanes=1, size=0, kept=0, constants=0, inputs=0)
             self.code = Code(layout, Routines(*[0] * len(Routines._fields)), interpreting())  # type: ignore[arg-type]
             self.arrays = np.zeros(1), np.zeros((1, 1))
+
+    def maps(self, piece: HeldPiece) -> tuple[Array, Array]:
+        """G and H in a mode."""
+        if piece not in self._maps:
+            self._maps[piece] = _inputs(piece, self._contacts), self._out_of
+        return self._maps[piece]
 
 
 class BristleSteps(Bristles):
@@ -108,7 +115,7 @@ class BristleSteps(Bristles):
         width = len(state)
         found, rates, jacobian = np.zeros((5, width)), np.zeros(width), np.zeros((width, width))
         if self.code.bristle_step(
-            *self.arrays, piece.matrix, *self.maps, self.scale, state, self.clock, found, rates, jacobian, way
+            *self.arrays, piece.matrix, *self.maps(piece), self.scale, state, self.clock, found, rates, jacobian, way
         ):
             raise NotAvailable(TOO_SHORT)
         return found, rates, jacobian
@@ -117,19 +124,31 @@ class BristleSteps(Bristles):
 TOO_SHORT = "the motion of the bristles cannot be followed: steps become too short"
 
 
-def _maps(plant: Plant, contacts: Sequence[HeldContact]) -> tuple[Array, Array]:
-    """G, (m, width), and H, (width, m), for slip rate and memory of each contact in turn."""
-    count, n, place = plant.memory + len(contacts), plant.size, 2 * plant.size + 4
-    into, out_of, k = np.zeros((count, plant.width)), np.zeros((plant.width, count)), 0
+def _inputs(piece: HeldPiece, contacts: Sequence[HeldContact]) -> Array:
+    """G, (inputs, width): slip rate, normal stress if a load presses, and memory of each contact in turn."""
+    plant, found = piece.plant, []
+    place = 2 * plant.size + 4
     for one in contacts:
-        into[k] = plant.slip(one)
-        out_of[n : 2 * n, k] = -one.row / plant.inertia
+        found.append(plant.slip(one))
+        if one.loads:
+            found.append(piece.normal(plant.contacts.index(one)))
+        for _ in one.port.friction.memory():
+            found.append(np.eye(plant.width)[place])
+            place += 1
+    return np.array(found) if found else np.zeros((0, plant.width))
+
+
+def _outputs(plant: Plant, contacts: Sequence[HeldContact]) -> Array:
+    """H, (width, outputs), for friction force and rates of the memory of each contact in turn."""
+    found, n, place, k = np.zeros((plant.width, plant.memory + len(contacts))), plant.size, 2 * plant.size + 4, 0
+    for one in contacts:
+        found[n : 2 * n, k] = -one.row / plant.inertia
         for _ in one.port.friction.memory():
             k += 1
-            into[k, place] = out_of[place, k] = 1.0
+            found[place, k] = 1.0
             place += 1
         k += 1
-    return into, out_of
+    return found
 
 
 @lru_cache(maxsize=1)
@@ -148,33 +167,37 @@ class _Kinds:
     """Laws, equal if they are of the same kind."""
 
     shapes: tuple[Any, ...]
+    loaded: tuple[bool, ...]
     laws: tuple[FrictionLaw, ...] = field(compare=False)
 
 
 @lru_cache(maxsize=64)
 def _routine(kinds: _Kinds) -> _Routine:
-    return _Routine(kinds.laws)
+    return _Routine(kinds.laws, kinds.loaded)
 
 
 class _Routine:
-    """Compiled routine of some laws, whatever their numbers."""
+    """Compiled routine of some laws, whatever their numbers; of loaded contacts normal stress is a variable."""
 
-    def __init__(self, laws: Sequence[FrictionLaw]) -> None:
+    def __init__(self, laws: Sequence[FrictionLaw], loaded: Sequence[bool]) -> None:
         arguments: list[sp.Symbol] = []
         groups: list[list[sp.Symbol]] = []
         values: list[list[sp.Expr]] = []
-        for index, law in enumerate(laws):
+        for index, (law, has_load) in enumerate(zip(laws, loaded, strict=True)):
             names = _given(law)
             area, sigma, *given = own = [
                 inner_symbol(f"law{index}.{name}", real=True) for name in ("area", "sigma", *names)
             ]
             arguments += own
             symbolic = with_values(law, dict(zip(names, given, strict=True)))
-            group = [inner_symbol(f"bristle{index}.{k}", real=True) for k in range(1 + len(law.memory()))]
-            v, memory = group[0], tuple(group[1:])
-            strength = area * symbolic.strength(v, sigma, memory, sp.nan)
+            v, *memory = (inner_symbol(f"bristle{index}.{k}", real=True) for k in range(1 + len(law.memory())))
+            group = [v, *memory]
+            if has_load:
+                sigma = inner_symbol(f"load{index}", real=True)
+                group.insert(1, sigma)
+            strength = area * symbolic.strength(v, sigma, tuple(memory), sp.nan)
             groups.append(group)
-            values.append([strength, *map(sp.sympify, symbolic.rates(v, sigma, memory, sp.nan))])
+            values.append([strength, *map(sp.sympify, symbolic.rates(v, sigma, tuple(memory), sp.nan))])
         variables = [one for group in groups for one in group]
         slopes = [derivative(value, by) if by in group else sp.Integer(0)
                   for group, own in zip(groups, values, strict=True) for value in own for by in variables]  # fmt: skip

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.nonlinear.hunting.plant import Array, Plant
+from steadyslip.nonlinear.hunting.plant import Array, Load, Plant
 
 
 class Switch(NamedTuple):
-    """A change of mode: ``contact`` of some number, ``band``, ``clamp`` or ``limit``, to its new position."""
+    """A change of mode: ``contact`` or ``load`` of some number, ``band``, ``clamp``, ``limit``, to its new position."""
 
     name: str
     number: int
@@ -32,6 +32,8 @@ class HeldMode:
     ----------
     contacts : tuple of int
         -1, 0, 1: sliding back, at rest, sliding forward.
+    loads : tuple of int
+        -1, 1: sign of each load that presses a contact, of one contact after the other.
     band : int
         Side of the dead band on which the error is; 0 inside.
     clamp, limit : int
@@ -39,17 +41,19 @@ class HeldMode:
     """
 
     contacts: tuple[int, ...]
+    loads: tuple[int, ...] = ()
     band: int = 0
     clamp: int = 0
     limit: int = 0
 
     def switched(self, switch: Switch) -> HeldMode:
-        if switch.name != "contact":
-            change: Any = {switch.name: switch.to}
-            return replace(self, **change)
-        contacts = list(self.contacts)
-        contacts[switch.number] = switch.to
-        return replace(self, contacts=tuple(contacts))
+        change: Any = {switch.name: switch.to}
+        if switch.name in ("contact", "load"):
+            every = f"{switch.name}s"
+            positions = list(getattr(self, every))
+            positions[switch.number] = switch.to
+            change = {every: tuple(positions)}
+        return replace(self, **change)
 
 
 class HeldPiece:
@@ -61,10 +65,12 @@ class HeldPiece:
     mode : HeldMode
     acceleration : float
         Of the target, m/s².
+    least_load : float
+        Size of a load that presses a contact below which its sign does not matter.
     """
 
-    def __init__(self, plant: Plant, mode: HeldMode, acceleration: float) -> None:
-        self.plant, self.mode, self.acceleration = plant, mode, acceleration
+    def __init__(self, plant: Plant, mode: HeldMode, acceleration: float, least_load: float = 0.0) -> None:
+        self.plant, self.mode, self.acceleration, self.least_load = plant, mode, acceleration, least_load
         self.sampled = plant.limits.sample_time is not None
 
     @cached_property
@@ -103,6 +109,36 @@ class HeldPiece:
         return self.wanted
 
     @cached_property
+    def pulls(self) -> tuple[tuple[Load, Array], ...]:
+        """Loads that press contacts, of one contact after the other, and their rows."""
+        loads = [load for contact in self.plant.contacts for load in contact.loads]
+        return tuple((load, self.plant.passive(load) + load.controller * self.force) for load in loads)
+
+    @cached_property
+    def pressing(self) -> tuple[list[tuple[Load, Array]], ...]:
+        """Loads of every contact, and rows of the normal stresses that they add."""
+        sides = iter(zip(self.mode.loads, self.pulls, strict=True))
+        found = []
+        for contact in self.plant.contacts:
+            own = [next(sides) for _ in contact.loads]
+            found.append([(load, (load.forward if to > 0 else -load.back) * pull) for to, (load, pull) in own])
+        return tuple(found)
+
+    def normal(self, index: int) -> Array:
+        """Row of the normal stress of a contact."""
+        plant = self.plant
+        return sum((row for _, row in self.pressing[index]), plant.row(one=plant.contacts[index].normal))
+
+    def rest(self, index: int) -> Array:
+        """Row of the largest friction force at rest of a contact."""
+        own = self.plant.row(one=self.plant.contacts[index].rest)
+        return sum((load.rest * row for load, row in self.pressing[index]), own)
+
+    def _coulomb(self, index: int) -> Array:
+        own = self.plant.row(one=self.plant.contacts[index].coulomb)
+        return sum((load.coulomb * row for load, row in self.pressing[index]), own)
+
+    @cached_property
     def pushed(self) -> Array:
         """Rows of the accelerations without the friction of contacts at rest, (coordinates, width)."""
         plant, n = self.plant, self.plant.size
@@ -111,9 +147,9 @@ class HeldPiece:
         rows[:, 2 * n + 1], rows[:, 2 * n + 2] = -plant.target_stiffness, -plant.target_damping
         rows[:, -1] = plant.force
         rows += np.outer(plant.acts, self.force)
-        for contact, way in zip(plant.contacts, self.mode.contacts, strict=True):
+        for index, (contact, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True)):
             if way and not contact.slow:
-                friction = contact.drag * plant.slip(contact) + plant.row(one=way * contact.coulomb)
+                friction = contact.drag * plant.slip(contact) + way * self._coulomb(index)
                 rows -= np.outer(contact.row, friction)
         return rows / plant.inertia[:, None]
 
@@ -160,7 +196,7 @@ class HeldPiece:
     @cached_property
     def guards(self) -> tuple[Array, tuple[Switch, ...]]:
         """Rows that are not negative in this mode, (guards, width), and the switch that each one makes."""
-        found = [*self._of_contacts(), *(self._of_controller() if not self.sampled else ())]
+        found = [*self._of_contacts(), *self._of_loads(), *(self._of_controller() if not self.sampled else ())]
         rows = np.array([row for row, _ in found]) if found else np.zeros((0, self.plant.width))
         return rows, tuple(switch for _, switch in found)
 
@@ -172,9 +208,15 @@ class HeldPiece:
             if way:  # half the speed, so that a contact with memory does not switch to and fro
                 found.append((way * slip - plant.row(one=0.5 * contact.slow), Switch("contact", i, 0)))
                 continue
-            bound, row = (contact.slow, slip) if contact.slow else (contact.rest, self.resting[i])
-            found += [(plant.row(one=bound) - to * row, Switch("contact", i, to)) for to in (1, -1)]
+            bound, row = (plant.row(one=contact.slow), slip) if contact.slow else (self.rest(i), self.resting[i])
+            found += [(bound - to * row, Switch("contact", i, to)) for to in (1, -1)]
         return found
+
+    def _of_loads(self) -> list[tuple[Array, Switch]]:
+        """Guards of the loads, a little beyond zero, so that one without any does not switch to and fro."""
+        least = self.plant.row(one=self.least_load)
+        return [(to * pull + least, Switch("load", i, -to))
+                for i, (to, (_, pull)) in enumerate(zip(self.mode.loads, self.pulls, strict=True))]  # fmt: skip
 
     def _of_controller(self) -> list[tuple[Array, Switch]]:
         plant, limits = self.plant, self.plant.limits

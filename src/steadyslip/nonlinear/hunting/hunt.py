@@ -97,7 +97,7 @@ def hunt(
     if plant.delay and plant.limits.sample_time is None:
         raise NotAvailable("drive.delay: hunting takes a dead time only together with a sample_time")
     if not given.pieces:
-        step = DisplacementStep(at=0.0, by=_usual_step(plant))
+        step = DisplacementStep(at=0.0, by=_usual_step(plant, "deg" if rig.drive.turns else "mm"))
         given = Protocol(pieces=(step,), until=given.until)
     end = until if until is not None else given.until
     motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol)
@@ -107,7 +107,7 @@ def hunt(
     for done in motion.run():
         if done is not None and progress is not None:
             progress(motion.time, len(motion.trace.strokes))
-        if motion.time >= last_change and motion.at_rest:
+        if not motion.changes and motion.at_rest:
             at_rest = True
             break
         used_up = motion.steps >= MOST_STEPS or motion.core.steps >= IN_CORE
@@ -141,7 +141,7 @@ def _target(protocol: Protocol) -> Protocol:
     return protocol
 
 
-def _usual_step(plant: Plant) -> float:
+def _usual_step(plant: Plant, unit: str) -> float:
     """Twice the error (m or rad) that friction at rest holds against the controller's gain and the springs."""
     gain = sum(np.outer(plant.acts, place) * k for place, (k, _) in zip(plant.places, plant.gains, strict=True))
     pull = plant.acts * sum(k for k, _ in plant.gains) - plant.target_stiffness
@@ -149,12 +149,16 @@ def _usual_step(plant: Plant) -> float:
         moved = np.linalg.solve(plant.stiffness + gain, pull)
     except np.linalg.LinAlgError:
         moved = np.full(plant.size, np.nan)
-    held = sum(friction_at_rest(one) * abs(float(one.row @ moved)) for one in plant.contacts)
+    steady = float(np.abs(plant.force).sum())
+    held = sum(friction_at_rest(one, steady) * abs(float(one.row @ moved)) for one in plant.contacts)
     step = 2 * held / float(pull @ moved)
     if not (np.isfinite(step) and step > 0):
-        raise ParameterError(
-            [Problem("protocol", "missing; no gain kp or spring tells how far a step of the target is")]
+        missing = "no gain kp or spring tells" if held else "friction at rest without a load is 0 and does not tell"
+        message = (
+            f"missing; {missing} how far a step of the target is: give one, such as "
+            f"\"displacement-step at=0s by='1 {unit}'\""
         )
+        raise ParameterError([Problem("protocol", message)])
     return float(f"{step:.6g}")  # as people write it: how far exactly does not matter
 
 

@@ -94,7 +94,7 @@ class CompiledMotion:
         parts = int(lengths[:, 1].max(initial=1))
         rows = np.empty(((AT_ONCE + parts) * (1 + (NODES - 1) // int(clock[Held.EVERY])), 4))
         turn = bristles.code.follow_held(
-            *bristles.arrays, piece.matrix, *bristles.maps, bristles.scale, guards, watched, lengths, passages,
+            *bristles.arrays, piece.matrix, *bristles.maps(piece), bristles.scale, guards, watched, lengths, passages,
             self.loops, self.late, state, clock, self.control, rows, int(fresh),
         )  # fmt: skip
         if turn == Turn.STUCK:

@@ -7,7 +7,7 @@ target and its velocity, the force of a sampled controller, the memory of the co
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.laws.contact import Transmitted
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Limits, Mechanism
 from steadyslip.machine.slider import Slider
@@ -23,8 +24,33 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Load:
+    """Pull T that presses a contact besides its preload: its normal stress grows by `forward` T, or −`back` T, T < 0.
+
+    Attributes
+    ----------
+    places, speeds : ndarray (coordinates + 1,)
+        Shares of the coordinates, and of the target as the last one, in T.
+    controller : float
+        Share of the controller's force.
+    forward, back : float
+        Shares of T > 0 and of T < 0.
+    rest, coulomb : float
+        Friction force at rest and in sliding per normal stress; 0 for a law with memory.
+    """
+
+    places: Array
+    speeds: Array
+    controller: float
+    forward: float
+    back: float
+    rest: float = 0.0
+    coulomb: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class HeldContact:
-    """A contact: force −`row`·F with F = `coulomb` sign(v) + `drag` v, v = `row`·w − `belt` r'.
+    """A contact: force −`row`·F with F = `coulomb` sign(v) + `drag` v, v = `row`·w − `belt` r', without its loads.
 
     Attributes
     ----------
@@ -38,9 +64,10 @@ class HeldContact:
     port : ContactPort
         Law of friction, of a contact that is not linear in sliding.
     normal : float
-        Normal stress (Pa), or force.
+        Normal stress (Pa), or force, without its loads.
     slow : float
         Slip rate (m/s) below which a contact with memory counts as at rest; 0 for one without.
+    loads : tuple of Load
     """
 
     row: Array
@@ -51,6 +78,7 @@ class HeldContact:
     port: ContactPort
     normal: float
     slow: float = 0.0
+    loads: tuple[Load, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +141,10 @@ class Plant:
         """Row of its derivative, of the measured place alone where the limits say so."""
         return self.row(None, -self.places[loop], target_velocity=0.0 if self.limits.on_measurement else 1.0)
 
+    def passive(self, load: Load) -> Array:
+        """Row of a load without the controller's share in it."""
+        return self.row(load.places[:-1], load.speeds[:-1], target=load.places[-1], target_velocity=load.speeds[-1])
+
     def slip(self, contact: HeldContact) -> Array:
         """Row of the slip rate of a contact."""
         return self.row(None, contact.row, target_velocity=-contact.belt)
@@ -124,7 +156,7 @@ def plant_of(rig: Slider | Machine) -> Plant:
     Raises
     ------
     NotAvailable
-        If a coordinate has no inertia, or normal stress depends on the motion, or a law cannot hold.
+        If a coordinate has no inertia, or a law of contact or friction is not offered at rest.
     """
     mechanism = rig.mechanism()
     names = [one.name for one in mechanism.coordinates]
@@ -146,7 +178,7 @@ def plant_of(rig: Slider | Machine) -> Plant:
         stiffness=stiffness[:, :-1], damping=damping[:, :-1],
         target_stiffness=stiffness[:, -1], target_damping=damping[:, -1],
         force=np.array([float(one.force) for one in mechanism.coordinates]),
-        contacts=_merged([_contact(one, names) for one in mechanism.contacts]),
+        contacts=_merged([_contact(mechanism, one, names) for one in mechanism.contacts]),
         **_controller(mechanism, names),
     )  # fmt: skip
 
@@ -171,33 +203,63 @@ def _controller(mechanism: Mechanism, names: list[str]) -> dict[str, Any]:
     }
 
 
-def _contact(port: ContactPort, names: list[str]) -> HeldContact:
+def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldContact:
     label = f"contacts.{port.name}." if port.name else ""
     law, contact = port.friction, port.contact
     time = sp.Symbol("t")
     load, slow = contact.load(), law.slow_velocity()
-    if port.separation or contact.memory() or not contact.is_imposed() or contact.imposed(time) != 0:
+    follows = port.separation or contact.memory() or not contact.is_imposed() or contact.imposed(time) != 0
+    if follows and not isinstance(contact, Transmitted):
         raise NotAvailable(
-            f"{label}contact: the law {contact.name!r} lets the normal force change with the motion, and hunting needs "
-            "a constant one: write law = 'constant' with the preload that presses where the axis is held; for "
-            "'transmitted' that is preload + transmitted x the load held"
+            f"{label}contact: the law {contact.name!r} lets the normal force change with the motion, and hunting takes "
+            "'constant' with the preload that presses where the axis is held, or 'transmitted'"
         )
     if law.lateness() or (law.memory() and slow is None):
-        raise NotAvailable(
-            f"{label}friction: the law {law.name!r} is not offered at rest; allowed: coulomb, coulomb-stribeck, lugre"
-        )
+        raise NotAvailable(NOT_AT_REST.format(label, law.name))
     sigma = float((contact.steady_stress() if load is None else load) or 0.0)
     row, belt = _row(port.slip, names), -float(port.slip.get(LOAD_POINT, 0))
+    loads: tuple[Load, ...] = ()
+    if isinstance(contact, Transmitted):
+        loads = (_load(mechanism, port, contact, names),)
     if law.memory() and slow is not None:
-        return HeldContact(row, belt, 0.0, 0.0, 0.0, port, sigma, float(slow))
+        return HeldContact(row, belt, 0.0, 0.0, 0.0, port, sigma, float(slow), loads)
     v = sp.Symbol("v", positive=True)
-    sliding = sp.sympify(law.strength(v, sigma, (), sp.nan))
+    sliding = sp.sympify(law.strength(v, 1, (), sp.nan))  # friction without memory is in proportion to normal stress
     if sliding.diff(v, 2) != 0:
-        raise NotAvailable(f"{label}friction: the law {law.name!r} is not offered at rest; allowed: coulomb, lugre")
+        raise NotAvailable(NOT_AT_REST.format(label, law.name))
     rest, coulomb, drag = (
-        float(port.area * value) for value in (law.rest_strength(sigma), sliding.subs(v, 0), sliding.diff(v))
+        float(port.area * value) for value in (law.rest_strength(1), sliding.subs(v, 0), sliding.diff(v))
     )
-    return HeldContact(row, belt, rest, coulomb, drag, port, sigma)
+    if loads and drag:
+        raise NotAvailable(
+            f"{label}friction.viscous: with contact law = 'transmitted' its force is a product of speed and load, of "
+            "which hunting has no exact motion; write it in a second contact of the body, of law 'constant', or take "
+            "law = 'lugre'"
+        )
+    loads = tuple(replace(one, rest=rest, coulomb=coulomb) for one in loads)
+    return HeldContact(row, belt, sigma * rest, sigma * coulomb, sigma * drag, port, sigma, loads=loads)
+
+
+NOT_AT_REST = "{}friction: the law {!r} is not offered at rest; allowed: coulomb, lugre"
+
+
+def _load(mechanism: Mechanism, port: ContactPort, contact: Transmitted, names: list[str]) -> Load:
+    """Pull T of a contact as `steadyslip.model.forces` defines it."""
+    body, pulling = next(name for name in port.slip if name != LOAD_POINT), mechanism.pulling(port)
+    if port.loaded_by:
+        body = next(name for name in port.slip if name in pulling[0].acts)
+    lever = float(port.slip[body] * port.area)
+    places, speeds, controller = np.zeros(len(names) + 1), np.zeros(len(names) + 1), 0.0
+    for one in pulling:
+        share = float(one.acts.get(body, 0)) / lever
+        if one.active:
+            controller = share
+        else:
+            senses = _row(one.senses, names, True)
+            places -= share * float(one.stiffness or 0) * senses
+            speeds -= share * float(one.damping or 0) * senses
+    back = contact.transmitted if contact.transmitted_back is None else contact.transmitted_back
+    return Load(places, speeds, controller, float(contact.transmitted), float(back))
 
 
 def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
@@ -211,6 +273,10 @@ def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
                 found[i] = HeldContact(
                     other.row, other.belt, other.rest + abs(ratio) * one.rest, other.coulomb + abs(ratio) * one.coulomb,
                     other.drag + ratio**2 * one.drag, other.port, other.normal,
+                    loads=other.loads + tuple(
+                        replace(load, rest=abs(ratio) * load.rest, coulomb=abs(ratio) * load.coulomb)
+                        for load in one.loads
+                    ),
                 )  # fmt: skip
                 break
         else:

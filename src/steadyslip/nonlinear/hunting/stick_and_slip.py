@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.kernels.layout import Held
+from steadyslip.kernels.layout import Control, Held
 from steadyslip.nonlinear.hunting.bristles import Bristles, BristleSteps
 from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece, Switch
 from steadyslip.nonlinear.hunting.in_mode import CompiledMotion
@@ -24,6 +24,7 @@ AWAY = 1e4  # error over what friction, load or target account for, beyond which
 KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
 
 
+LEAST_LOAD = 1e-13  # of the largest load, below which its sign does not matter: rounding of the friction it causes
 RINGING = 0.1  # of the longest stroke of the later half: what sheds less is no event of a simulation either
 
 
@@ -80,6 +81,11 @@ class Motion:
         Target of one lane, to the end of the motion.
     rtol : float
         For contacts with memory.
+
+    Attributes
+    ----------
+    changes : int
+        Changes of the target that are still to come.
     """
 
     def __init__(self, plant: Plant, segments: Segments, rtol: float) -> None:
@@ -87,16 +93,18 @@ class Motion:
         self.state = np.zeros(plant.width)
         self.state[-1] = 1.0
         self.time, self.trace, self.steps, self.fastest, self.farthest = 0.0, Trace(), 0, 0.0, 0.0
-        gain = plant.gains[0][0]
-        loads = float(np.abs(plant.force).sum()) + sum(map(friction_at_rest, plant.contacts))
+        gain, steady = plant.gains[0][0], float(np.abs(plant.force).sum())
+        self.largest_load = steady + abs(gain) * _reach(segments)
+        loads = steady + sum(friction_at_rest(one, steady) for one in plant.contacts)
         self.expected = loads / gain if gain else 0.0
-        self.mode = HeldMode((0,) * len(plant.contacts))
+        self.mode = HeldMode((0,) * len(plant.contacts), (1,) * sum(len(one.loads) for one in plant.contacts))
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
         self.acceleration = 0.0
+        self.changes = len(segments.end[0])
         self.exact = not plant.memory
         self.still = STILL if self.exact else max(STILL, STILL_ERROR * rtol)
         self.stepper: ExactSteps | BristleSteps = (
-            ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant))
+            ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant, self.largest_load))
         )
         self.sampled = plant.limits.sample_time is not None
         own = self.stepper if isinstance(self.stepper, BristleSteps) else Bristles(plant, rtol, self.state)
@@ -115,6 +123,8 @@ class Motion:
         )  # fmt: skip
         n = self.plant.size
         for end, jump, velocity, slope in spans:
+            self.changes -= 1
+            self.core.control[Control.CONSTANT] = 0.0  # a sample has yet to see it
             self.state[2 * n + 1] += jump
             self.expected = max(self.expected, abs(self.state[2 * n + 1]))
             self.state[2 * n + 2] = velocity
@@ -168,7 +178,7 @@ class Motion:
     def _piece(self) -> HeldPiece:
         key = (self.mode, self.acceleration)
         if key not in self.pieces:
-            self.pieces[key] = HeldPiece(self.plant, *key)
+            self.pieces[key] = HeldPiece(self.plant, *key, LEAST_LOAD * self.largest_load)
         return self.pieces[key]
 
     def _step(self, end: float) -> Stroke | None:
@@ -225,8 +235,9 @@ class Motion:
     def _settle_contacts(self) -> None:
         """Let contacts at rest slide that would need more friction than there is at rest."""
         for _ in self.plant.contacts:
-            forces = {i: float(row @ self.state) for i, row in self._piece().resting.items()}
-            excess = {i: abs(force) / self.plant.contacts[i].rest - 1.0 for i, force in forces.items()}
+            piece = self._piece()
+            forces = {i: float(row @ self.state) for i, row in piece.resting.items()}
+            excess = {i: _excess(abs(force), float(piece.rest(i) @ self.state)) for i, force in forces.items()}
             worst = max(excess, key=excess.__getitem__, default=None)
             if worst is None or excess[worst] <= BEYOND:
                 return
@@ -247,6 +258,9 @@ class Motion:
             if limits.force is not None:
                 wanted = float(self._piece().wanted @ self.state)
                 self.mode = self.mode.switched(_side("limit", wanted, limits.force))
+        for i, (_, pull) in enumerate(self._piece().pulls):
+            if (now := float(pull @ self.state)) * self.mode.loads[i] < 0:
+                self.mode = self.mode.switched(Switch("load", i, int(np.sign(now))))
         self._settle_contacts()
         self._stroke(moved)
 
@@ -338,19 +352,33 @@ def _least(values: Array) -> float:
     return float(here - (after - before) ** 2 / (8 * bend)) if bend > 0 else float(here)
 
 
-def natural_sizes(plant: Plant) -> Array:
-    """Least sizes of the variables, from which errors of contacts with memory are counted."""
+def _excess(force: float, most: float) -> float:
+    """Share by which a force is beyond the largest friction at rest; infinite where there is no friction."""
+    return force / most - 1.0 if most > 0 else (np.inf if force > 0 else -1.0)
+
+
+def _reach(segments: Segments) -> float:
+    """Way (m or rad) of the target over all segments but the last, which may have no end."""
+    rates = np.abs(segments.value[0, :-1, 0]) * (segments.end - segments.start)[0, :-1]
+    return float(np.abs(segments.jump[0]).sum() + rates.sum())
+
+
+def natural_sizes(plant: Plant, pull: float) -> Array:
+    """Least sizes of the variables, from which errors of contacts with memory are counted.
+
+    `pull` is the size of the loads (N, or Pa) that may press contacts besides their preload.
+    """
     found = np.full(plant.width, 1.0)
     n = plant.size
     slow = [one for one in plant.contacts if one.slow]
     friction, speed = 0.0, 0.0
     place = 2 * n + 4
     for one in slow:
-        law = one.port.friction
-        memory = [float(value) for value in law.steady_memory(one.slow, one.normal)]
+        law, normal = one.port.friction, largest_normal(one, pull)
+        memory = [float(value) for value in law.steady_memory(one.slow, normal)]
         found[place : place + len(memory)] = np.abs(memory)
         place += len(memory)
-        friction = max(friction, float(one.port.area * law.steady_strength(one.slow, one.normal)))
+        friction = max(friction, float(one.port.area * law.steady_strength(one.slow, normal)))
         speed = max(speed, one.slow)
     stiff = plant.gains[0][0] + float(np.max(np.diag(plant.stiffness)))
     found[:n] = found[2 * n + 1] = friction / stiff if stiff else 1.0
@@ -360,9 +388,15 @@ def natural_sizes(plant: Plant) -> Array:
     return found
 
 
-def friction_at_rest(contact: HeldContact) -> float:
-    """Largest friction force at rest (N, or Pa), of bristles that of slow sliding."""
+def largest_normal(contact: HeldContact, pull: float) -> float:
+    """Normal stress of a contact with loads of a size `pull` (N, or Pa)."""
+    shares = (max(one.forward, one.back) / abs(contact.port.area) for one in contact.loads)
+    return contact.normal + pull * sum(shares)
+
+
+def friction_at_rest(contact: HeldContact, pull: float) -> float:
+    """Largest friction force at rest (N, or Pa) with loads of a size `pull`, of bristles that of slow sliding."""
     if not contact.slow:
-        return contact.rest
+        return contact.rest + pull * float(sum(one.rest * max(one.forward, one.back) for one in contact.loads))
     slow = contact.slow * 1e-6  # far below the velocity from which on friction depends on it
-    return float(contact.port.area * contact.port.friction.steady_strength(slow, contact.normal))
+    return float(contact.port.area * contact.port.friction.steady_strength(slow, largest_normal(contact, pull)))

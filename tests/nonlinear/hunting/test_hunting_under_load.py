@@ -1,0 +1,77 @@
+"""Hunting with a contact that a load presses (`transmitted`), by a second route."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from hunting_under_load import KINDS, compared, random_numbers, rig_of
+from steadyslip.protocol import DisplacementStep
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+CLOSE = {"coulomb": 1e-8, "lugre": 1e-6}
+"""Of SciPy's 1e-12 and 1e-10 a step, which begins anew at each of some hundred events or samples."""
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=" ".join)
+def test_an_axis_moves_as_by_scipy(kind):
+    difference, found = compared(np.random.default_rng([1, 3]), kind, until=6.0)
+    assert difference < CLOSE[kind[1]]
+    assert found.strokes
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("kind", KINDS, ids=" ".join)
+def test_random_axes_move_as_by_scipy(kind):
+    assert max(compared(np.random.default_rng([2, i]), kind)[0] for i in range(4)) < CLOSE[kind[1]]
+
+
+@pytest.mark.parametrize("law", ["coulomb", "lugre"])
+def test_a_preload_of_its_own_contact_is_the_same_axis(law):
+    """As servos are written: one contact with a preload, one that the load presses, on one body."""
+    one = rig_of(random_numbers(np.random.default_rng(8), "machine", law, "continuous"))
+    guide = one.contacts["guide"]
+    seals = replace(guide, loaded_by=None, contact=ss.laws.ConstantNormalStress(preload=guide.contact.preload))
+    mesh = replace(guide, contact=replace(guide.contact, preload=0.0))
+    two = replace(one, contacts={"seals": seals, "mesh": mesh})
+    found = [ss.hunt(rig, DisplacementStep(at=0, by=1.0), until=10.0) for rig in (one, two)]
+    assert found[0].strokes[-1].start == pytest.approx(found[1].strokes[-1].start, rel=1e-6)
+    assert found[0].error[-1] == pytest.approx(found[1].error[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("sampled", [{}, {"drive.sample_time": 0.05}], ids=["continuous", "sampled"])
+def test_without_a_share_the_preload_alone_presses(sampled):
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml").with_values(sampled)
+    loaded = replace(held, contact=ss.laws.Transmitted(preload=1.0, transmitted=0.0))
+    one, two = (ss.hunt(rig, until=60.0) for rig in (held, loaded))
+    assert [a.start for a in one.strokes] == pytest.approx([b.start for b in two.strokes], rel=1e-6)
+
+
+@pytest.mark.parametrize("sampled", [{}, {"sample_time": 0.05}], ids=["continuous", "sampled"])
+def test_a_load_that_turns_at_once_presses_at_once(sampled):
+    """From 1 N to -1.5 N the contact holds 1 + 0.5 · 1.5 N; it slid, pressed by 1 - 0.5 · 1.5 N for no time at all."""
+    drive = ss.machine.PID(0.0, kp=1.0, kd=0.0, ki=0.0, **sampled)
+    contact = ss.laws.Transmitted(preload=1.0, transmitted=0.5)
+    law = ss.laws.Coulomb(mu_coulomb=0.7, mu_static=1.0)
+    rig = ss.Slider(friction=law, contact=contact, mass=1.0, area=1.0, drive=drive)
+    turned = [DisplacementStep(at=0, by=1.0), DisplacementStep(at=1.0, by=-2.5)]
+    found = ss.hunt(rig, turned, until=3.0)
+    assert found.strokes == ()
+    assert found.force[-1] == pytest.approx(-1.5)
+
+
+def test_what_hunting_cannot_take_is_refused_with_the_way_out():
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml")
+    loaded = replace(held, contact=ss.laws.Transmitted(preload=1.0, transmitted=0.1))
+    viscous = replace(loaded, friction=ss.laws.Coulomb(mu_coulomb=1.0, viscous=0.4))
+    with pytest.raises(ss.NotAvailable, match=r"friction.viscous: with contact law = 'transmitted' .* second contact"):
+        ss.hunt(viscous)
+    inclined = replace(held, contact=ss.laws.InclinedSpring(preload=1.0, angle=-0.1))
+    with pytest.raises(ss.NotAvailable, match=r"'inclined-spring' lets .* takes 'constant' .* or 'transmitted'"):
+        ss.hunt(inclined)
+    free = replace(loaded, contact=ss.laws.Transmitted(transmitted=0.1))
+    with pytest.raises(ss.ParameterError, match=r"friction at rest without a load is 0 .*, such as .displacement-step"):
+        ss.hunt(free)
+    assert ss.hunt(free, DisplacementStep(at=0, by=1.0), until=5.0).error.size

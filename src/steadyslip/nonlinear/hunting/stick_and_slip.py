@@ -381,6 +381,7 @@ def natural_sizes(plant: Plant, pull: float) -> Array:
         friction = max(friction, float(one.port.area * law.steady_strength(one.slow, normal)))
         speed = max(speed, one.slow)
     stiff = plant.gains[0][0] + float(np.max(np.diag(plant.stiffness)))
+    friction = friction or stiff * float(np.max(found[2 * n + 4 : place]))  # nothing presses: as bristles bend at most
     found[:n] = found[2 * n + 1] = friction / stiff if stiff else 1.0
     found[n : 2 * n] = found[2 * n + 2] = speed
     found[2 * n] = friction / plant.integral if plant.integral else 1.0
@@ -390,8 +391,8 @@ def natural_sizes(plant: Plant, pull: float) -> Array:
 
 def largest_normal(contact: HeldContact, pull: float) -> float:
     """Normal stress of a contact with loads of a size `pull` (N, or Pa)."""
-    shares = (max(one.forward, one.back) / abs(contact.port.area) for one in contact.loads)
-    return contact.normal + pull * sum(shares)
+    shares = sum(max(one.forward, one.back) for one in contact.loads)
+    return contact.normal + pull * shares / float(contact.port.area)
 
 
 def friction_at_rest(contact: HeldContact, pull: float) -> float:

@@ -8,7 +8,7 @@ import pytest
 
 import steadyslip as ss
 from hunting_under_load import KINDS, compared, random_numbers, rig_of
-from steadyslip.protocol import DisplacementStep
+from steadyslip.protocol import DisplacementStep, VelocityStep
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 CLOSE = {"coulomb": 1e-8, "lugre": 1e-6}
@@ -74,4 +74,14 @@ def test_what_hunting_cannot_take_is_refused_with_the_way_out():
     free = replace(loaded, contact=ss.laws.Transmitted(transmitted=0.1))
     with pytest.raises(ss.ParameterError, match=r"friction at rest without a load is 0 .*, such as .displacement-step"):
         ss.hunt(free)
-    assert ss.hunt(free, DisplacementStep(at=0, by=1.0), until=5.0).error.size
+
+
+@pytest.mark.parametrize("sampled", [{}, {"drive.sample_time": 0.01}], ids=["continuous", "sampled"])
+@pytest.mark.parametrize("law", [ss.laws.Coulomb(mu_coulomb=0.5), None], ids=["coulomb", "lugre"])
+def test_an_axis_that_nothing_presses_at_first_moves(law, sampled):
+    """It follows a ramp, and the integral brings the error to zero."""
+    held = ss.read_rig(EXAMPLES / "hunting-axis.toml").with_values(sampled)
+    free = replace(held, friction=law or held.friction, contact=ss.laws.Transmitted(transmitted=0.1))
+    found = ss.hunt(free, VelocityStep(at=0, to=0.1), until=60.0)
+    assert np.abs(found.error).max() > 0.01
+    assert abs(found.error[-1]) < 1e-3

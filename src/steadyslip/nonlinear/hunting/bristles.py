@@ -80,7 +80,8 @@ class BristleSteps(Bristles):
     def begin(self, piece: HeldPiece, state: Array) -> None:
         """Choose the first step, unless one has been taken."""
         if np.isnan(self.clock[Held.LENGTH]):
-            self.clock[Held.LENGTH] = 1.0 / self.fastest(piece, state)
+            fastest = self.fastest(piece, state)  # 0 where no force presses a contact yet
+            self.clock[Held.LENGTH] = 1.0 / fastest if fastest else np.inf
 
     def step(self, piece: HeldPiece, state: Array, most: float) -> tuple[float, Array]:
         """Length of a step whose error is allowed, at most `most` (s), and its coefficients (5, width)."""

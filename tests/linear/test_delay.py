@@ -145,6 +145,41 @@ def test_windows_of_what_enters_linearly_are_those_of_counting():
     assert both > 10
 
 
+@pytest.mark.parametrize(("seed", "count"), [(1, 40), pytest.param(2, 400, marks=pytest.mark.campaign)])
+def test_windows_of_an_inertia_are_those_of_counting(seed, count):
+    """Where θ multiplies the highest powers, a pair of frequencies may be possible between two samples of θ alone."""
+    chance, seen = np.random.default_rng(seed), 0
+    for _ in range(count):
+        degree, terms, lowest = chance.integers([3, 2, 1], [7, 4, 3])
+        p = chance.normal(size=(terms, degree + 1)) * 10 ** chance.uniform(-3, 3, size=(terms, degree + 1))
+        p[0], p[1:, -2:] = abs(p[0]), 0.0
+        q = np.zeros_like(p)
+        q[0, -1 - lowest :] = abs(chance.normal(size=lowest + 1)) * 10 ** chance.uniform(-1.5, 1.5, size=lowest + 1)
+        h = np.append(0.0, 10 ** chance.uniform(-2, 0, size=terms - 1))
+        found = linear_windows(p, q, h, 1e-3, 1e3, apart(terms), 0)
+        if found is None:
+            continue
+        theta = np.geomspace(max(found.searched[0], 1e-3), min(found.searched[1], 1e3), 100)
+        right = quasi.count_right_if_feasible(p + theta[:, None, None] * q, h, apart(terms))
+        inside = np.any((found.intervals[:, :1] < theta) & (theta < found.intervals[:, 1:]), axis=0)
+        assert np.array_equal(inside[right >= 0], right[right >= 0] == 0)
+        seen += len(found.edges) > 0
+    assert seen > count // 10
+
+
+def test_an_inertia_has_edges_where_frequencies_are_possible_between_samples_alone():
+    """A telescope's axis behind a worm, held by a late controller on the axis: the motor's inertia, by counting."""
+    p = np.array([[0, 0, -5.49516254e7, 2.89469628e6, 8.45399289e5, 802.469136, 0],
+                  [1.46898168e9, 1.08244079e9, 2.75230501e8, 2.46211438e7, 2.32e4, 0, 0]])  # fmt: skip
+    q = np.array([[0, 0, 0, 1.46898168e5, 4.14616430e4, 76.3747846, 10.4], [0.0] * 7])
+    h = np.array([0.0, 1.5e-3])
+    found = linear_windows(p, q, h, 1e-3, 1e3, apart(2), 0)
+    np.testing.assert_allclose(found.intervals, [[0, 3.645], [110.37, 145.57]], rtol=1e-3)
+    sides = np.concatenate([found.edges * (1 - 1e-9), found.edges * (1 + 1e-9)])
+    right = quasi.count_right(p + sides[:, None, None] * q, h, apart(2)).tolist()
+    assert right == [0, 2, 0, 2, 0, 2]
+
+
 def test_stable_values_of_a_delay_among_others_are_those_of_counting():
     """On a grid of it, for random sums in which it comes on top of one or two of the others; alone by the formula."""
     changes = 0

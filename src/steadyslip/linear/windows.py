@@ -35,7 +35,8 @@ _FEW = 8  # largest number of growing roots at which a window may be near (as in
 _TOWARDS = 10.0 ** -np.arange(1, 9)  # distances from an edge, relative to it, at which the equations become ill-posed
 _CLOSE = 1e-3  # the same up to which roots near it must be counted, for it to be the next edge
 _HALVINGS = 50  # of a bracket of an eighth of a decade, down to rounding
-_SPARE = 1e-3  # share of what the term without delay has ahead, by which weights of terms that lack it exceed nothing
+_SPARE = 0.1  # share of what the term without delay has ahead, by which weights of terms that lack it exceed nothing
+_TIMES_CUT, _PIECES = 3, 4  # how often, and in how many, pieces between two values of θ are cut that have no bound
 _ON_AXIS = 1e-3  # relative error of a root of a polynomial that counts as real: that of a double one is some 1e-8
 _MANY = 20_000  # such periods of the rig itself beyond which the search is refused
 _ROUNDING, _CORNER = 1e-12, 1e-8  # relative distance of values of θ that rounding may make; at infinite s by products
@@ -117,7 +118,9 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: 
     if not most < turn * _MANY:
         return None
     start, end = _known(p, q, h, sets, theta, bound <= most, edges)
-    found = _windows(p, q, h, start, end, float(np.max(bound[bound <= most])), sets, spare, edges)
+    fast = _largest_between(p, q, sets, theta[(theta >= start) & (theta <= end)])
+    fast = max(float(np.max(bound[bound <= most])), min(fast, most))
+    found = _windows(p, q, h, start, end, fast, sets, spare, edges)
     if found is None:
         return None
     cut = (0.0 if start == low else start, np.inf if end == high else end)
@@ -228,7 +231,31 @@ def _count_by_crossings(
 
 def _frequency_bound(p: Array, q: Array, sets: Sets, theta: Array) -> Array:
     """Upper bound of frequencies of roots on the axis, for each θ; inf where there is none."""
-    c = p + theta[:, None, None] * q
+    return _bound_of_terms(p + theta[:, None, None] * q, sets)
+
+
+def _largest_between(p: Array, q: Array, sets: Sets, theta: Array) -> float:
+    """Upper bound of frequencies of roots on the axis between the first and the last θ, of pieces that have one.
+
+    Between two samples a pair of frequencies may appear at which terms are equal in size, far above those at both. What
+    θ Q changes within a piece is therefore one more term for each part of Q, with a phase of its own.
+    """
+    parts = np.any(q != 0, axis=-1)
+    own = np.eye(len(sets) + np.sum(parts), dtype=bool)[:, len(sets) :]
+    around = np.hstack([np.vstack([sets, sets[parts]]), own])
+    found, low, high = 0.0, theta[:-1], theta[1:]
+    for _ in range(_TIMES_CUT):
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        c = [p + middle[:, None, None] * q, half[:, None, None] * q[parts]]
+        bound = _bound_of_terms(np.concatenate(c, axis=1), around)
+        found = max(found, float(np.max(bound[np.isfinite(bound)], initial=0.0)))
+        cut = low + (high - low) * np.linspace(0, 1, _PIECES + 1)[:, None]
+        low, high = (one[:, np.isinf(bound)].ravel() for one in (cut[:-1], cut[1:]))
+    return found
+
+
+def _bound_of_terms(c: Array, sets: Sets) -> Array:
+    """Upper bound (rows,) of frequencies of roots on the axis, for c (rows, m, n+1); inf where there is none."""
     bound = bound_on_axis(c, sets)
     where = leads(c) & np.isfinite(bound)
     bound[where] = np.minimum(bound[where], _last_crossing(c[where]))

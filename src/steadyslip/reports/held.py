@@ -66,7 +66,8 @@ def recommendation(result: Hunt) -> Iterator[str]:
     """
     yield heading("The recommendation")
     if result.runs_away:
-        yield paragraph("It is not friction that has to change: the controller is unstable, or too weak for its load.")
+        why = result.unstable_loop or "the controller is too weak for its load"
+        yield paragraph(f"It is not friction that has to change: {why}.")
     elif result.hunts:
         yield from _cures(result)
     elif result.hunts is None:

@@ -25,6 +25,7 @@ from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
+from steadyslip.model.build import HELD
 from steadyslip.model.numeric import by_matrices, has_response, has_structure
 from steadyslip.model.numeric.measured import measured_machine
 from steadyslip.model.point import operating_point
@@ -82,6 +83,10 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
         raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider or a Machine, such as read_rig gives")])
     rig.check_branch(branch)
     kicks = (kick,) if isinstance(kick, str) else tuple(kick)
+    if rig.holds:
+        from steadyslip.nonlinear.hunting.free_loop import unstable_by_itself
+
+        raise NotAvailable("; ".join(filter(None, (HELD, unstable_by_itself(rig)))))
     with np.errstate(all="ignore"):
         try:
             found = _judged_by_response(rig, kicks) if has_response(rig) else _judged(rig, branch, kicks)

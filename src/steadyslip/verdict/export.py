@@ -107,6 +107,7 @@ def common_numbers(found: Findings) -> dict[str, Any]:
         "damping_ratio": found.damping_ratio,
         "time_to_halve": found.time_to_halve,
         "time_to_double": found.time_to_double,
+        **({"unstable_loop": found.unstable_loop} if found.unstable_loop else {}),
         "judders": found.judders or None,
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),

@@ -127,3 +127,10 @@ class Findings(Displayed):
 
         asked = self.stable is False and not self.on_edge and self.growth_rate != math.inf
         return judder_sentence(self.rig, self.eigenvalues, self.branch) if asked else ""
+
+    @cached_property
+    def unstable_loop(self) -> str:
+        """Clause on a controller that is unstable without any friction, with what to change; empty for others."""
+        from steadyslip.nonlinear.hunting.free_loop import unstable_by_itself
+
+        return unstable_by_itself(self.rig) if self.stable is False and not self.on_edge else ""

@@ -39,7 +39,9 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
     if analysis.steady is None:
         return stable_speeds(analysis)
     own = machine if analysis.rig.in_forces else slider
-    rows = [*own.sliding_rows(analysis), ("a disturbance", disturbance(analysis)), *own.stability_rows(analysis)]
+    rows = [*own.sliding_rows(analysis), ("a disturbance", disturbance(analysis))]
+    rows += [("the controller", words.removeprefix("the controller "))] if (words := analysis.unstable_loop) else []
+    rows += own.stability_rows(analysis)
     rows += stable_speeds(analysis)
     rows += [("onset", onset_words(analysis.onset))] if analysis.onset else []
     return rows + [("a kick", threshold_words(kick)) for kick in analysis.kicks]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from os import PathLike
 from typing import Any
 
@@ -15,6 +17,7 @@ from steadyslip.core.results import ReadOnly
 from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.hunting.free_loop import unstable_by_itself
 from steadyslip.nonlinear.hunting.plant import Array
 from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke, swings
 from steadyslip.protocol import Protocol
@@ -119,6 +122,11 @@ class Hunt(ReadOnly):
             return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
 
+    @cached_property
+    def unstable_loop(self) -> str:
+        """Clause on a controller that is unstable without any friction, with what to change; empty for others."""
+        return unstable_by_itself(self.rig)
+
     @property
     def _so_far(self) -> str:
         """What an axis has done by the end of its motion that neither rests nor hunts by then."""
@@ -138,6 +146,8 @@ class Hunt(ReadOnly):
 
     def __str__(self) -> str:
         lines = [self.sentence]
+        if self.unstable_loop:
+            lines += textwrap.wrap(f"{self.unstable_loop[0].upper()}{self.unstable_loop[1:]}.", 100)
         if own := self._swings:
             last = own[-1]
             again = f" starts {format_quantity(self.every, 's')} after the one before," if len(own) > 1 else ":"
@@ -166,6 +176,7 @@ class Hunt(ReadOnly):
         return {
             "hunts": self.hunts,
             "sentence": self.sentence,
+            "unstable_loop": self.unstable_loop or None,
             "lowest": self.lowest,
             "highest": self.highest,
             "runs_away": self.runs_away,

@@ -160,6 +160,19 @@ def plant_of(rig: Slider | Machine) -> Plant:
     """
     mechanism = rig.mechanism()
     names = [one.name for one in mechanism.coordinates]
+    return replace(free_plant(rig), contacts=_merged([_contact(mechanism, one, names) for one in mechanism.contacts]))
+
+
+def free_plant(rig: Slider | Machine) -> Plant:
+    """Matrices of a rig without its contacts, at any velocity.
+
+    Raises
+    ------
+    NotAvailable
+        If a coordinate has no inertia.
+    """
+    mechanism = rig.mechanism()
+    names = [one.name for one in mechanism.coordinates]
     for one in mechanism.coordinates:
         if not one.inertia:
             raise NotAvailable(
@@ -178,8 +191,7 @@ def plant_of(rig: Slider | Machine) -> Plant:
         stiffness=stiffness[:, :-1], damping=damping[:, :-1],
         target_stiffness=stiffness[:, -1], target_damping=damping[:, -1],
         force=np.array([float(one.force) for one in mechanism.coordinates]),
-        contacts=_merged([_contact(mechanism, one, names) for one in mechanism.contacts]),
-        **_controller(mechanism, names),
+        contacts=(), **_controller(mechanism, names),
     )  # fmt: skip
 
 

@@ -68,3 +68,20 @@ def test_friction_that_is_smaller_at_rest_is_asked_about():
     with pytest.warns(UnitWarning, match=words) as caught:
         ss.rig_from_text(text)
     assert len(caught) == 1
+
+
+def test_what_two_contacts_share_is_asked_once():
+    guide = """
+    [contacts.{}]
+    body = "table"
+    friction = {{law = "coulomb-stribeck", mu_coulomb = 0.1, mu_static = 0.05, v_stribeck = "1 mm/s"}}
+    contact = {{law = "constant", preload = "1 kN"}}
+    """
+    text = """
+    bodies = {table = {mass = "10 kg"}}
+    links = {screw = {between = ["drive", "table"], stiffness = "10 N/um"}}
+    drive = {velocity = "5 mm/s"}
+    """
+    with pytest.warns(UnitWarning, match=r"^contacts.front and contacts.rear: friction.mu_static = 0.05 is") as caught:
+        ss.rig_from_text(text + guide.format("front") + guide.format("rear"))
+    assert len(caught) == 1

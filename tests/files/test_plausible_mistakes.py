@@ -108,7 +108,10 @@ def test_a_mistake_has_one_message(right, wrong, answer):
 @pytest.mark.parametrize(
     ("wrong", "answer"),
     [
-        ("sample_time = 0", "drive.sample_time: got 0; allowed: a finite number > 0 in s, or text such as '1 ms'"),
+        (
+            "sample_time = 0",
+            "sample_time: got 0; allowed: a finite number > 0 in s, or text such as '1 ms'; for none leave it out",
+        ),
         ('sample_time = "1 mm"', "expected a quantity in s, for example '1 ms'"),
         ('delay = "2 mm"', "expected a quantity in s, for example '2 ms'"),
     ],

@@ -1,5 +1,6 @@
 """Slip events and what a run tells of itself: by their definition, whatever the steps, for laws that stick."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -322,3 +323,55 @@ def test_backward_strokes_mirror_forward_ones():
     many = ss.simulate_many(a_rig, {}, ss.protocol.VelocityStep(at=0.1, to=-1.01 * v), until=60.0).events
     assert many["events"] == len(back)
     assert many["event_slip"] == pytest.approx(back[-1].slip, rel=1e-5)
+
+
+def oscillating(share, periods):
+    """Run of a rig beside its edge in stiffness, after a small disturbance; and the period at the edge (s)."""
+    a_rig = ss.read_rig("examples/stick-slip.toml")
+    edge = next(one for one in ss.boundary(a_rig, "stiffness") if one.kind == "oscillatory")
+    period, speed = 2 * np.pi / edge.angular_frequency, a_rig.drive.velocity
+    nudge = [ss.protocol.VelocityStep(at=n * period, to=to * speed) for n, to in ((1, 1.1), (2, 1.0))]
+    return ss.simulate(a_rig.with_values({"stiffness": share * edge.value}), nudge, until=periods * period), period
+
+
+def test_an_oscillation_without_slip_events_is_told():
+    """That grows, or goes on, or dies out; by the extremes of the record itself."""
+    run, period = oscillating(0.97, 30)
+    assert run.slip_events == ()
+    told = "oscillates more and more: after {} s between ([\\d.]+) nm/s and ([\\d.]+) um/s, and still growing"
+    (found,) = re.findall(told.format(f"{run.end:.3g}"), run.sentence)
+    last = run["v"][run["t"] > run.end - 1.5 * period]
+    assert [1e-9 * float(found[0]), 1e-6 * float(found[1])] == pytest.approx([last.min(), last.max()], rel=0.02)
+    assert run.sentence in run.summary()
+    assert oscillating(0.997, 30)[0].sentence.startswith("oscillates more and more")
+    assert oscillating(1.05, 30)[0].sentence == ""
+
+
+def test_an_oscillation_that_goes_on_is_told_with_its_period():
+    """Of two guides of one body once; the drive's own oscillation, slow enough to be followed."""
+    guides = "".join(
+        f"""
+        [contacts.{name}]
+        body = "table"
+        contact = {{law = "constant", preload = "1 kN"}}
+        [contacts.{name}.friction]
+        law = "lugre"
+        mu_coulomb = 0.1
+        mu_static = 0.1
+        v_stribeck = "1 mm/s"
+        viscous = "1 s/m"
+        bristle_stiffness = "1e5 1/m"
+        """
+        for name in ("front", "rear")
+    )
+    a_rig = ss.rig_from_text(f"""
+    bodies = {{table = {{mass = "10 kg"}}}}
+    links = {{screw = {{between = ["drive", "table"], stiffness = "10 N/um", damping = "1 N s/mm"}}}}
+    drive = {{velocity = "5 mm/s"}}
+    {guides}
+    """)
+    wave = ss.protocol.VelocityHarmonic(amplitude=1e-3, period=2.0)
+    run = ss.simulate(a_rig, wave, until=40.0)
+    assert run.slip_events == ()
+    assert run.sentence == "table oscillates: every 2 s between 4 mm/s and 6 mm/s"
+    assert run.summary().count("oscillates: every 2 s") == 2

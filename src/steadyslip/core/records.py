@@ -124,8 +124,9 @@ def parameter(
     'm'
     """
     role = Parameter(
-        unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere, instance
-    )
+        unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere, instance,
+        optional=default is None,
+    )  # fmt: skip
     return field(default=default, metadata={_ROLE: role})
 
 

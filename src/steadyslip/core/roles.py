@@ -155,6 +155,8 @@ class Parameter(Entry):
         SI units of the parameter for other kinds of rig: forces, angles.
     instance : str
         Typical value with its unit, for messages, such as ``2 ms``; that of its SI unit by default.
+    optional : bool
+        The field may be left out, which messages on a zero say.
     """
 
     unit: str
@@ -170,6 +172,7 @@ class Parameter(Entry):
     idle: float | None = None
     elsewhere: tuple[str, ...] = ()
     instance: str = ""
+    optional: bool = False
 
     def __post_init__(self) -> None:
         if self.kind and self.kind not in PARAMETER_KINDS:
@@ -196,6 +199,8 @@ class Parameter(Entry):
                 bare = number <= 100 and "%" not in str(value)
                 meant = f"; write '{number:g} %'" if bare else ", or '0 %' to '100 %'"
                 raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}{meant}")
+            if self.optional and number == 0:
+                raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}; for none leave it out")
             raise self.refused(value)
         # + 0.0 turns -0.0 into 0.0, which equals the default when files are written
         return value if isinstance(value, Placeholder) else number + 0.0

@@ -20,7 +20,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
 from steadyslip.motion.events import AnySlip, ContactSlip, Event, SlipEvent, slip_events
 from steadyslip.motion.history import HistoryData
-from steadyslip.motion.sentence import joined, sentences
+from steadyslip.motion.sentence import joined, oscillations, sentences
 from steadyslip.motion.status import remedy
 
 NUDGED, FASTER = 0.1, 1.1  # when (share of a run) and by what factor a step of the drive's velocity is suggested
@@ -57,13 +57,16 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @cached_property
     def sentence(self) -> str:
-        """What the rig does, by its slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ..."."""
-        return joined(self._sentences)
+        """What the rig does, by its slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
+
+        Without slip events by the oscillation in which it ends, as "oscillates: every 75.5 s between ...".
+        """
+        return joined(self.rig, self._sentences)
 
     @cached_property
     def _sentences(self) -> dict[str, str]:
-        """Sentence of each contact, by name."""
-        return sentences(self.rig, self.events, self.slip_events)
+        """Sentence of each contact that slips or oscillates, by name."""
+        return sentences(self.rig, self.events, self.slip_events) or oscillations(self.events, self.end)
 
     def summary(self) -> str:
         """Summary in a few lines."""
@@ -132,10 +135,11 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             )
             low, high = format_quantity(float(forces.min()), "N"), format_quantity(float(forces.max()), "N")
             lines.append(f"{name:<15} slip rate {rates}; normal force {low} to {high}")
+            if name in self._sentences:
+                lines.append(f"{'':<15} {self._sentences[name]}")
             slips = [one for one in self.slip_events if isinstance(one, ContactSlip) and one.contact == name]
             if slips:
                 last = slips[-1]
-                lines.append(f"{'':<15} {self._sentences[name]}")
                 again = (
                     f", {format_quantity(last.recurrence, 's')} after the one before"
                     if np.isfinite(last.recurrence)
@@ -164,10 +168,10 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             stress = [*self.data["normal_stress"], *(e.normal_stress for e in self.events if isinstance(e, Event))]
             low, high = (format_quantity(float(x), "Pa", area=area) for x in (min(stress), max(stress)))
             lines.append(f"{stress_name('normal stress', area):<16}{low} to {high}")
+        lines += [self.sentence] if self.sentence else []
         slips = [one for one in self.slip_events if isinstance(one, SlipEvent)]
         if slips:
             last = slips[-1]
-            lines.append(self.sentence)
             lines.append(
                 f"slip events     {len(slips)}; the last: peak {format_quantity(last.peak_velocity, 'm/s')}, "
                 f"{stress_name('stress drop', area)} {format_quantity(last.stress_drop, 'Pa', area=area)}, "

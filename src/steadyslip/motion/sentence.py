@@ -1,9 +1,12 @@
-"""What a motion does, in one sentence, from its slip events."""
+"""What a motion does, in one sentence, from its slip events, or without them from its oscillation."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.machine.machine import Machine
@@ -20,7 +23,15 @@ JUDDERS = {
     "backward": "; backward strokes {backward}, the last {back} within {during}",
 }
 """Parts of the sentence, with holes that Python and the page fill."""
+OSCILLATES = "oscillates: every {every} between {speeds}"
+"""An oscillation that goes on without slip events."""
+GROWS = {True: "oscillates more and more", False: "leaves steady sliding"}
+"""What a disturbance that grows does, by whether it oscillates."""
+ON = ": after {time} between {speeds}, and still growing"
+"""A motion whose growth has no end in a run."""
 DIGITS = 3  # significant, of quantities in sentences
+TREND = 0.01  # relative growth or decay of swings in the last half of a run up to which they go on
+BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
 
 
 def sentence(
@@ -80,9 +91,95 @@ def sentences(
     return found
 
 
-def joined(sentences: Mapping[str, str]) -> str:
-    """One sentence from those of the contacts, each after the contact's name."""
-    return "; ".join(f"{name} {words}" if name else words for name, words in sentences.items())
+def joined(rig: Slider | Machine, sentences: Mapping[str, str]) -> str:
+    """One sentence from those of the contacts, each after the contact's name, or the body's whose contacts agree."""
+    held = {name: rig.contacts[name].held if name in rig.contacts else name for name in sentences}
+    told: dict[str, set[str]] = {}
+    for name, words in sentences.items():
+        told.setdefault(held[name], set()).add(words)
+    several = Counter(held.values())
+    found = {held[name] if several[held[name]] > 1 and len(told[held[name]]) == 1 else name: words
+             for name, words in sentences.items()}  # fmt: skip
+    return "; ".join(f"{name} {words}" if name else words for name, words in found.items())
+
+
+class Swings(NamedTuple):
+    """Oscillation of a contact in the last half of a run: mean period (s), lowest and highest velocity (m/s), trend.
+
+    The trend is the relative growth of the swings in that half; 0 where they become larger and smaller by turns.
+    """
+
+    period: float
+    low: float
+    high: float
+    trend: float
+
+
+def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
+    """Oscillation of each contact whose swings are alike in the last half of a run, by name."""
+    found = {}
+    for name in dict.fromkeys(one.contact for one in events):
+        peaks, troughs = _extremes(events, name, end)
+        sizes = [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
+        if len(sizes) > 1 and max(sizes) < BEATS * min(sizes):
+            period = (peaks[-1].time - peaks[0].time) / (len(peaks) - 1)
+            low, high = min(one.velocity for one in troughs), max(one.velocity for one in peaks)
+            found[name] = Swings(period, low, high, _trend(sizes))
+    return found
+
+
+def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
+    """Last swing of each contact that swings more than half a run before, by name."""
+    found = {}
+    for name in dict.fromkeys(one.contact for one in events):
+        peaks, troughs = _extremes(events, name, end)
+        if min(len(peaks), len(troughs)) > 1:
+            first, last = (peaks[i].velocity - troughs[i].velocity for i in (0, -1))
+            if last > first:
+                period = peaks[-1].time - peaks[-2].time
+                found[name] = Swings(period, troughs[-1].velocity, peaks[-1].velocity, last / first - 1)
+    return found
+
+
+def oscillations(events: Sequence[AnyEvent], end: float) -> dict[str, str]:
+    """Sentence of each contact that oscillates up to the `end` (s) of a run without slip events, by name.
+
+    Empty of those whose oscillation dies out, or is smaller than the digits that are told.
+    """
+    time = format_quantity(end, "s", DIGITS)
+    found = {name: GROWS[True] + ON.format(time=time, speeds=speeds(one))
+             for name, one in growing_swings(events, end).items() if _seen(one)}  # fmt: skip
+    steady = {name: oscillates(one) for name, one in steady_swings(events, end).items()
+              if _seen(one) and abs(one.trend) <= TREND}  # fmt: skip
+    return found | steady
+
+
+def _trend(sizes: Sequence[float]) -> float:
+    steps = [after - before for before, after in pairwise(sizes)]
+    one_way = all(step > 0 for step in steps) or all(step < 0 for step in steps)
+    return sizes[-1] / sizes[0] - 1 if one_way else 0.0
+
+
+def oscillates(swings: Swings) -> str:
+    """Sentence on an oscillation that goes on."""
+    return OSCILLATES.format(every=format_quantity(swings.period, "s", DIGITS), speeds=speeds(swings))
+
+
+def speeds(swings: Swings) -> str:
+    """Lowest and highest velocity of an oscillation in words."""
+    return " and ".join(format_quantity(one, "m/s", DIGITS) for one in (swings.low, swings.high))
+
+
+def _seen(swings: Swings) -> bool:
+    low, high = (format_quantity(one, "m/s", DIGITS) for one in (swings.low, swings.high))
+    return low != high
+
+
+def _extremes(events: Sequence[AnyEvent], name: str, end: float) -> tuple[list[AnyEvent], list[AnyEvent]]:
+    """Peaks and troughs of the velocity of a contact in the last half of a run."""
+    late = [one for one in events if one.contact == name and one.time > 0.5 * end]
+    peaks, troughs = ([one for one in late if one.kind == f"velocity {kind}"] for kind in ("peak", "trough"))
+    return peaks, troughs
 
 
 def _stuck(events: Sequence[AnyEvent], last: AnySlip) -> bool:

@@ -12,8 +12,20 @@ from steadyslip.core.format import format_quantity
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
-from steadyslip.motion.events import AnyEvent, AnySlip
-from steadyslip.motion.sentence import DIGITS, joined, sentences
+from steadyslip.motion.events import AnySlip
+from steadyslip.motion.sentence import (
+    BEATS,
+    DIGITS,
+    GROWS,
+    ON,
+    Swings,
+    growing_swings,
+    joined,
+    oscillates,
+    sentences,
+    speeds,
+    steady_swings,
+)
 from steadyslip.motion.status import BLOWN_UP, LOST
 from steadyslip.protocol import VelocityStep
 
@@ -22,16 +34,11 @@ PERIODS = 12  # length of the first run in periods of the leading disturbance, s
 BEGIN, END = 0.05, 0.1  # shares of the first run between which the drive is faster
 LONGER = 4.0  # length of a run over that of the run before
 MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
-BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 FEWEST = 8  # events in the second half of a run from which it is told that they have no trend
 TURNS = 0.25  # share of these, by trial, at which slips of irregular events turn from growing to shrinking or back
-GROWS = {True: "oscillates more and more", False: "leaves steady sliding"}
-"""What a disturbance that grows does, by whether it oscillates."""
 ENDINGS = {LOST: ", until contact is lost after {time}", BLOWN_UP: ", until it runs away after {time}"}
 """How a motion ends, by its status, with the time since the disturbance."""
-ON = ": after {time} between {speeds}, and still growing"
-"""A motion whose growth has no end within the work that `MOST_STEPS` allows."""
 
 
 def _first(eigenvalues: Sequence[complex]) -> float:
@@ -82,25 +89,14 @@ def repeats(run: History) -> bool:
     return bool(names) and all(_alike([one for one in late if one.contact == name]) for name in names)
 
 
-def swings(run: History, rate: float) -> dict[str, tuple[float, float, float]]:
-    """Mean period (s) and extremes of velocity of each contact whose oscillation grows no more, by name.
-
-    That is seen in the last half of the run.
+def swings(run: History, rate: float) -> dict[str, Swings]:
+    """Oscillation of each contact that grows no more in the last half of a run, by name.
 
     Empty in a run with slip events, and in one so short that small disturbances, which grow at `rate` (1/s), would
     not have doubled in that time: then nothing tells a cycle from slow growth.
     """
-    half = 0.5 * float(run["t"][-1])
-    if run.slip_events or rate * half < math.log(2):
-        return {}
-    found = {}
-    for name in dict.fromkeys(one.contact for one in run.events):
-        peaks, troughs = _extremes(run, name)
-        sizes = [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
-        if len(sizes) > 1 and max(sizes) < BEATS * min(sizes):
-            period = (peaks[-1].time - peaks[0].time) / (len(peaks) - 1)
-            found[name] = period, min(one.velocity for one in troughs), max(one.velocity for one in peaks)
-    return found
+    end = float(run["t"][-1])
+    return {} if run.slip_events or rate * 0.5 * end < math.log(2) else steady_swings(run.events, end)
 
 
 def _alike(events: list[AnySlip]) -> bool:
@@ -150,32 +146,8 @@ def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branc
     if repeats(run):
         return run.sentence
     if is_irregular(run):
-        return joined(sentences(rig, run.events, run.slip_events, 0.5 * float(run["t"][-1])))
+        return joined(rig, sentences(rig, run.events, run.slip_events, 0.5 * float(run["t"][-1])))
     if steady := swings(run, fastest.real):
-        return joined({
-            name: f"oscillates: every {format_quantity(period, 's', DIGITS)} between {_speeds(*ends)}"
-            for name, (period, *ends) in steady.items()
-        })  # fmt: skip
-    time, found = format_quantity(since, "s", DIGITS), _last_swings(run)
-    return joined({name: grows + ON.format(time=time, speeds=_speeds(*ends)) for name, ends in found.items()})
-
-
-def _last_swings(run: History) -> dict[str, tuple[float, float]]:
-    """Last trough and peak of the velocity (m/s) of each contact, by name, that swings more than half a run before."""
-    found = {}
-    for name in dict.fromkeys(one.contact for one in run.events):
-        peaks, troughs = ([one.velocity for one in several] for several in _extremes(run, name))
-        if min(len(peaks), len(troughs)) > 1 and peaks[-1] - troughs[-1] > peaks[0] - troughs[0]:
-            found[name] = troughs[-1], peaks[-1]
-    return found
-
-
-def _extremes(run: History, name: str) -> tuple[list[AnyEvent], list[AnyEvent]]:
-    """Peaks and troughs of the velocity of a contact in the last half of a run."""
-    late = [one for one in run.events if one.contact == name and one.time > 0.5 * float(run["t"][-1])]
-    peaks, troughs = ([one for one in late if one.kind == f"velocity {kind}"] for kind in ("peak", "trough"))
-    return peaks, troughs
-
-
-def _speeds(low: float, high: float) -> str:
-    return f"{format_quantity(low, 'm/s', DIGITS)} and {format_quantity(high, 'm/s', DIGITS)}"
+        return joined(rig, {name: oscillates(one) for name, one in steady.items()})
+    time, found = format_quantity(since, "s", DIGITS), growing_swings(run.events, float(run["t"][-1]))
+    return joined(rig, {name: grows + ON.format(time=time, speeds=speeds(one)) for name, one in found.items()})

@@ -35,9 +35,8 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
     written : iterable of str
         Units that stand in the file. Where all are SI's own, as programs write them, stiffnesses are not asked about.
     """
-    doubts = (text for one in rig.laws_by_contact().values() for text in one.friction.doubts(one.prefix))
     soft = () if all(unit(name)[0] == 1.0 for name in written) else _soft(rig, read)
-    for text in (*_questions(rig, read), *soft, *doubts):
+    for text in (*_questions(rig, read), *soft, *_doubts(rig)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -53,6 +52,17 @@ def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
                 yield f"{was}; other speeds of the file are in {', '.join(written)}: write the unit that is meant"
             elif name == "drive.velocity" and si == "m/s" and (law := _outrun(rig, abs(raw))):
                 yield f"{was}, {law}: write the unit that is meant"
+
+
+def _doubts(rig: Rig) -> Iterator[str]:
+    """What friction laws doubt, once for all contacts of which it is the same."""
+    found: dict[str, list[str]] = {}
+    for one in rig.laws_by_contact().values():
+        for text in one.friction.doubts():
+            found.setdefault(text, []).append(one.prefix)
+    for text, (first, *others) in found.items():
+        names = " and ".join(prefix.removesuffix(".") for prefix in (first, *others))
+        yield f"{names}: {text}" if others else f"{first}{text}"
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:

@@ -79,12 +79,11 @@ class StribeckCurve(FrictionLaw):
         letter="delta_S",
     )
 
-    def doubts(self, prefix: str = "") -> Iterator[str]:
+    def doubts(self) -> Iterator[str]:
         if self.mu_static < self.mu_coulomb:
-            rest = f"{prefix}friction.mu_static = {self.mu_static:.4g}"
             yield (
-                f"{rest} is smaller than mu_coulomb = {self.mu_coulomb:.4g}: friction rises with velocity; it is "
-                "usually larger at rest: exchange the two if that is meant"
+                f"friction.mu_static = {self.mu_static:.4g} is smaller than mu_coulomb = {self.mu_coulomb:.4g}: "
+                "friction rises with velocity; it is usually larger at rest: exchange the two if that is meant"
             )
 
     def _curve(self, v: Expression) -> Expression:

@@ -29,8 +29,8 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     decided_by_stress: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     decided_besides: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
-    def doubts(self, prefix: str = "") -> Iterator[str]:
-        """Yield what is unusual about allowed values, in a sentence each; `prefix` is put before ``friction.``."""
+    def doubts(self) -> Iterator[str]:
+        """Yield what is unusual about allowed values, in a sentence each that begins with a name in ``friction.``."""
         yield from ()
 
     def memory(self) -> tuple[str, ...]:

@@ -164,7 +164,8 @@ def own_motion(rig: Slider | Machine, along: str) -> str:
             return f"the rig itself {seen.words}"
         period = format_quantity(seen.cycle.period, "s", 7)
         sentence = slip_sentence(rig, seen.cycle)
-        return f"the rig itself comes to a stable cycle of period {period}" + (f"; it {sentence}" if sentence else "")
+        after = f"; {'' if rig.contacts else 'it '}{sentence}" if sentence else ""
+        return f"the rig itself comes to a stable cycle of period {period}{after}"
     return ""
 
 

@@ -195,7 +195,7 @@ Percent are of the value, also of a number without unit: `"0.19 ± 20 %"` is 0.1
 | `[adjust]` | `stiffness = { from = "5 N/um", to = "60 N/um", cost = 3 }`, by dotted name | what may be changed |
 
 Without correlations parameters are independent. The limits of `[adjust]` are those of a search unless given; `cost` is
-that of doubling or halving the value; unless given 1, and 4 of the drive's speed.
+that of doubling or halving the value; unless given 1, 0.25 of settings of the drive, and 4 of its speed.
 
 Commands other than `analyze`, `report`, `cure` and `compare` take the values alone.
 """

@@ -14,8 +14,10 @@ from machines import block
 from rigs_of_theory import rig
 from steadyslip.core.written import display_units
 from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
+from steadyslip.reports.recommendation import changeable
 from steadyslip.verdict import Adjustment
 from steadyslip.verdict.chances import chances_of
+from steadyslip.verdict.change_costs import unit_cost
 from steadyslip.verdict.cures import Window
 from toleranced import AXIS
 
@@ -52,7 +54,7 @@ def test_an_axis_is_cured_as_often_as_is_asked_for(axis):
     block, within = rig_and_tolerances(axis)
     found = ss.cure(block, within, sure="95 %")
     assert [one.parameter for one in found.windows] == [
-        "drive.velocity", "slider.stiffness", "slider.damping", "slider.mass", "contact.preload", "friction.viscous",
+        "slider.stiffness", "slider.damping", "slider.mass", "contact.preload", "friction.viscous", "drive.velocity",
     ]  # fmt: skip
     best = found.best
     assert best.parameter == "slider.stiffness"
@@ -169,6 +171,25 @@ def test_rigs_with_a_delay_are_drawn_less_often():
     assert chances_of(axis, {"drive.kp": "5 %"}).sizes == (4, 1, 0)
 
 
+def test_settings_cost_less_than_parts_and_these_less_than_the_speed():
+    """One order for cures and for the recommendations of reports."""
+    axis = ss.read_rig("examples/machines/feed-axis.toml", ["drive.kv=1.8 m/min/mm", "links.screw.stiffness=8 N/um"])
+    found = ss.cure(axis).windows
+    costs = [unit_cost(one.parameter) for one in found]
+    assert costs == sorted(costs)
+    assert {"drive.kp", "links.screw.stiffness"} < {one.parameter for one in found}
+    assert found[-1].parameter == "drive.velocity"
+    for one in found:
+        if one.nearest:
+            assert one.cost == pytest.approx(unit_cost(one.parameter) * abs(math.log2(one.nearest / one.value)))
+    judged = ss.analyze(axis)
+    assert judged.stable is False
+    close = [one for one in changeable(judged) if 0.1 < one.edge.value / one.value < 10]
+    told = [unit_cost(one.parameter) for one in close]
+    assert told == sorted(told)
+    assert len(set(told)) == 3
+
+
 def test_a_slower_feed_is_dearer_than_a_part_and_far_edges_are_named(axis):
     """A quarter of the feed and four times the stiffness are as far, but a machine is built for its feed."""
     block, _ = rig_and_tolerances(axis)
@@ -178,7 +199,7 @@ def test_a_slower_feed_is_dearer_than_a_part_and_far_edges_are_named(axis):
         assert found[name].cost == pytest.approx(each * abs(math.log2(found[name].nearest / found[name].value)))
     low, high = found["slider.stiffness"].nearest, 0.9 * found["slider.stiffness"].nearest
     text = str(ss.cure(block, adjust=plain | {"slider.stiffness": Adjustment(high=high)}))
-    assert "\nno change of a part alone reaches it, another speed does: drive.velocity from 0.5 mm/min to" in text
+    assert "\nno other change alone reaches it, another speed does: drive.velocity from 0.5 mm/min to" in text
     edge = re.search(r"beyond the range: the rig itself is stable above ([\d.]+) N/um$", text, re.MULTILINE)
     assert 1e6 * float(edge[1]) == pytest.approx(low * block.area, rel=1e-3)
     assert "cheapest single change: slider.stiffness" in str(ss.cure(block, adjust=plain))

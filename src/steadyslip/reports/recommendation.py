@@ -16,7 +16,8 @@ from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why
 from steadyslip.verdict import Cures, Tolerated, Window, cure
 from steadyslip.verdict.analysis import Analysis
-from steadyslip.verdict.cures import SPEED, SPEED_COST, default_adjust
+from steadyslip.verdict.change_costs import PART, SETTING, TASK, unit_cost
+from steadyslip.verdict.cures import default_adjust
 from steadyslip.verdict.tolerances import LEAST, format_chance
 from steadyslip.verdict.words import told
 
@@ -80,7 +81,7 @@ def recommendation(
     yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
-    sequence = "Changes that make it stable: first of settings, then of parts, last of the speed of the task."
+    sequence = "Changes that make it stable: first of settings, then of parts, last of the speed, which is the task."
     yield table(rows, head, caption=sequence)
     if close and (far := [row[0] for one, row in found.items() if one not in close]):
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
@@ -172,7 +173,10 @@ def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
     able = [one for one in every if whole or one.nearest is None or not _is_far(one.value, one.nearest)] or every
     rows = [(said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
     words = "Values that are enough, each alone, the others unchanged, the cheapest first. "
-    cost = f"Doubling or halving a value costs 1, the speed {SPEED_COST:g}, unless the rig file gives another cost."
+    cost = (
+        f"Doubling or halving a setting of the drive costs {SETTING:g}, a part {PART:g}, the speed, which is the task, "
+        f"{TASK:g}, unless the rig file gives another cost."
+    )
     yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
     if far := [said(rig, one.parameter) for one in every if one not in able]:
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
@@ -184,7 +188,7 @@ def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Mar
     """Margins that a document speaks of: of what would make the rig stable, or keep it so.
 
     Those that keep it so are nearest first; of the others those within a factor of `FAR` are first, and among them
-    settings of a drive, then parts, then the speed that is the rig's task. They are of what is named in `adjustable`;
+    what costs least by `steadyslip.verdict.change_costs`. They are of what is named in `adjustable`;
     else of all that the rig has but friction, and of that if there is nothing else.
     """
     edged = [one for one in analysis.margins if one.edge is not None and (analysis.stable or _cures(one))]
@@ -194,10 +198,9 @@ def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Mar
     return found if analysis.stable or chosen else sorted(found, key=_in_order)
 
 
-def _in_order(margin: Margin) -> tuple[bool, int]:
-    """Sort key of a change in a designer's order: far ones last; settings, parts, speed."""
-    kind = 2 if margin.parameter == SPEED else 0 if margin.parameter.startswith("drive.") else 1
-    return _is_far(margin.value, margin.edge.value if margin.edge else None), kind
+def _in_order(margin: Margin) -> tuple[bool, float]:
+    """Sort key of a change: far ones last; then by what such a change costs."""
+    return _is_far(margin.value, margin.edge.value if margin.edge else None), unit_cost(margin.parameter)
 
 
 def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:

@@ -21,6 +21,7 @@ from steadyslip.linear.status import stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.chances import Chances, chances_of
+from steadyslip.verdict.change_costs import SPEED, unit_cost
 from steadyslip.verdict.cure_window import LEAST, Window, distance
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.tolerances import GIVEN, format_chance
@@ -35,13 +36,10 @@ FAR = math.log2(REMOTE)  # doublings beyond which no loss of stability is told
 PAIRS = 3  # cheapest pairs of the coarse search that are narrowed
 PRELOAD = "normal stress"  # kind of the parameters that press a contact, whatever a law calls them
 DESIGN = (
-    ("velocity",), ("stiffness", "axial_stiffness", "kp", "kv"), ("damping", "kd", "ki", "tn"), ("mass", "inertia"),
-    (PRELOAD,), ("viscous",),
+    ("stiffness", "axial_stiffness", "kp", "kv"), ("damping", "kd", "ki", "tn"), ("mass", "inertia"), (PRELOAD,),
+    ("viscous",), ("velocity",),
 )  # fmt: skip
-"""What a designer chooses, in the order of asking: speed, stiffness, damping, mass, preload, lubricant."""
-SPEED = "drive.velocity"
-SPEED_COST = 4.0
-"""Cost of doubling or halving the speed over that of a part, where none is given: a machine is built for its speed."""
+"""What a designer chooses, in the order of asking: stiffness, damping, mass, preload, lubricant, speed."""
 OWN_VALUES = (
     "without tolerances this is of the rig's own values, whatever chance is asked for;\n"
     'its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"'
@@ -64,7 +62,7 @@ class Cures(ReadOnly):
     chance, error : float
         Chance of the rig as it is, and half-width of its 95 % interval; 0 or 1 and 0 without tolerances.
     windows : tuple of Window
-        Of every adjustable parameter, in the order of the file or of `DESIGN`.
+        Of every adjustable parameter, in the order of the file or of `default_adjust`.
     pair : dict of str to float
         Values of the two parameters whose change together costs least, SI units; empty if one alone costs no more, or
         if no pair reaches it.
@@ -108,7 +106,7 @@ class Cures(ReadOnly):
         lines = [f"To be {wanted} (now {now})", *alone]
         if (best := self.best) is not None:
             only = best.parameter == SPEED and not any(one.nearest for one in self.windows if one is not best)
-            first = "no change of a part alone reaches it, another speed does" if only else "cheapest single change"
+            first = "no other change alone reaches it, another speed does" if only else "cheapest single change"
             lines.append(f"{first}: {best.parameter} {_change(best, best.nearest)}, cost {best.cost:.3g}")
         else:
             lines.append("no single change reaches it")
@@ -164,9 +162,10 @@ def cure(
     sure : float or str
         The chance, such as ``"95 %"``.
     adjust : mapping of str to Adjustment, optional
-        What may be changed; by default that of `tolerances`, or else what a designer chooses: speed, stiffness,
-        damping, mass, preload and lubricant, within three decades to each side. Each doubling costs 1, of the speed
-        4, unless a cost is given.
+        What may be changed; by default that of `tolerances`, or else what a designer chooses: gains of the drive,
+        stiffness, damping, mass, preload, lubricant and speed, within three decades to each side. Each doubling costs
+        1 of a part, 1/4 of a setting of the drive, 4 of the speed (`steadyslip.verdict.change_costs`), unless a cost
+        is given.
 
     Returns
     -------
@@ -222,7 +221,7 @@ def _share(sure: float | str) -> float:
 
 
 def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:
-    """What a designer chooses about a rig, in the order of `DESIGN`."""
+    """What a designer chooses about a rig, what costs least first, in the order of `DESIGN`."""
     found = {}
     for words in DESIGN:
         for name, one in rig.parameters().items():
@@ -230,7 +229,7 @@ def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:
             starts = one.value or (last in ("damping", "kd", "viscous") and one.value is not None)
             if last in words and starts and not (one.value == 0 and one.role.adds_state):
                 found[name] = Adjustment()
-    return found
+    return dict(sorted(found.items(), key=lambda one: unit_cost(one[0])))
 
 
 def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]:
@@ -301,8 +300,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
 
 
 def _unit_cost(name: str, one: Adjustment) -> float:
-    """Cost of doubling or halving a parameter."""
-    return one.cost if one.cost is not None else SPEED_COST if name == SPEED else 1.0
+    return unit_cost(name) if one.cost is None else one.cost
 
 
 def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[str, float] | None:

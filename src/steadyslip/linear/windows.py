@@ -40,6 +40,7 @@ _TIMES_CUT, _PIECES = 3, 4  # how often, and in how many, pieces between two val
 _ON_AXIS = 1e-3  # relative error of a root of a polynomial that counts as real: that of a double one is some 1e-8
 _MANY = 20_000  # such periods of the rig itself beyond which the search is refused
 _ROUNDING, _CORNER = 1e-12, 1e-8  # relative distance of values of θ that rounding may make; at infinite s by products
+_TOUCHED = 1e-7  # relative width of a window that rounding makes where a root only touches the axis: some sqrt(eps)
 _PLAIN = 1e-6  # share of ds/dθ across the axis below which a root may run along it, so that roots are counted anew
 
 
@@ -193,7 +194,13 @@ def _windows(
     count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay a count takes no time
     well_posed = ~is_ill_posed(columns(p[0] + probes[:, None] * q[0]), spare)
     right = count(p, q, h, sets, theta, beta, probes)
-    return None if np.any(right == UNKNOWN) else _set_of_cells(theta, beta, (right == 0) & well_posed)
+    if np.any(right == UNKNOWN):
+        return None
+    stable = (right == 0) & well_posed
+    inner, before, after = stable[1:-1], stable[:-2], stable[2:]
+    touched = (np.diff(theta) <= _TOUCHED * theta[1:]) & (before == after)
+    stable[1:-1] = np.where(touched, before, inner)
+    return _set_of_cells(theta, beta, stable)
 
 
 def _count_each(

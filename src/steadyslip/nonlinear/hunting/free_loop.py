@@ -9,6 +9,7 @@ from __future__ import annotations
 import cmath
 import itertools
 import math
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.errors import IllPosedWarning, NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
 from steadyslip.kernels.driver.holding import wanted_force
 from steadyslip.laws.friction import Coulomb
@@ -76,7 +77,8 @@ def growing_root(rig: Slider | Machine) -> complex | None:
     NotAvailable
         If it is not known.
     """
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IllPosedWarning)  # then infinitely many grow, which is no root to tell
         if _has_matrices(rig):
             plant = free_plant(rig)
             return _leading(plant) if plant.limits.sample_time is None else _leading_sampled(plant)

@@ -68,7 +68,8 @@ def history(one, until, start=None, rtol=1e-10):
             continue
         solver = (Radau if one.stiff else DOP853)(rates, times[-1], y, end, max_step=shortest, rtol=rtol, atol=1e-12)
         while solver.status == "running":
-            solver.step()
+            with np.errstate(over="ignore", invalid="ignore"):  # in a step that is tried and made shorter
+                solver.step()
             pieces.append(solver.dense_output())
             times.append(solver.t)
         if solver.status == "failed":

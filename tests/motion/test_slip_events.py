@@ -375,3 +375,39 @@ def test_an_oscillation_that_goes_on_is_told_with_its_period():
     assert run.slip_events == ()
     assert run.sentence == "table oscillates: every 2 s between 4 mm/s and 6 mm/s"
     assert run.summary().count("oscillates: every 2 s") == 2
+
+
+PRESS = """
+[friction]
+law = "rate-state"
+evolution = "aging"
+mu_ref = 0.6
+a = 0.009
+b = 0.014
+d_c = "12 um"
+v_ref = "1 um/s"
+[contact]
+law = "constant"
+preload = "50 MPa"
+[slider]
+area = "25 cm^2"
+stiffness = "45 MN/m"
+mass = "12 kg"
+[drive]
+velocity = "1 um/s"
+"""
+
+
+def test_events_that_grow_and_those_that_creep_first_are_told_so():
+    """A press: the slip of the event before is told until events repeat; the peak, where most of an event is creep."""
+    rig = ss.rig_from_text(PRESS)
+    push = [ss.protocol.VelocityStep(at=100.0, to=1.1e-6), ss.protocol.VelocityStep(at=200.0, to=1e-6)]
+    first, later = (ss.simulate(rig, push, until=until) for until in (2000.0, 20_000.0))
+    before, last = first.slip_events[-2:]
+    assert last.slip > 1.05 * before.slip
+    peak, slip = 1e3 * last.peak_velocity, 1e6 * before.slip
+    assert first.sentence.endswith(f", at up to {peak:.0f} mm/s ({slip:.0f} um the time before)")
+    assert later.sentence.endswith(f", at up to {1e3 * later.slip_events[-1].peak_velocity:.0f} mm/s")
+    guide = ss.simulate(plain_guide(), until=15.0)
+    assert guide.slip_events  # that rise and fall as evenly as an oscillation does
+    assert "at up to" not in guide.sentence

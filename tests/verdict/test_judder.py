@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import steadyslip as ss
 from command import run as cli
@@ -72,6 +73,47 @@ def test_what_still_grows_is_told_with_its_size():
     assert re.fullmatch(
         r"oscillates more and more: after .* between .* nm/s and .* um/s, and still growing", found.judders
     )
+
+
+CYLINDER = """
+[friction]
+law = "lugre"
+mu_coulomb = 0.097
+mu_static = 0.178
+v_stribeck = "0.705 mm/s"
+viscous = "0.156 s/m"
+stribeck_exponent = 0.66
+bristle_stiffness = "30 N/um at 1.9 kN"
+[contact]
+law = "constant"
+preload = "1.9 kN"
+[slider]
+area = "1 m^2"
+stiffness = "9 N/um"
+mass = "85 kg"
+[drive]
+velocity = "0.8 mm/s"
+"""
+
+
+def test_a_cycle_after_a_first_slip_is_told_as_one():
+    """The disturbance makes one slip event, the cycle none; equations typed by hand, by SciPy."""
+    found = ss.analyze(ss.rig_from_text(CYLINDER))
+    every, low, high = told(r"oscillates: every ([\d.]+) ms between (-[\d.]+) um/s and ([\d.]+) mm/s", found.judders)
+
+    def rates(_, y):
+        pull, v, z = y
+        g = 0.097 + 0.081 * np.exp(-((abs(v) / 0.705e-3) ** 0.66))
+        bend = v - abs(v) * z / g
+        return [9e6 * (0.8e-3 - v), (pull - 1900 * (z + 0.156 * v)) / 85, 30e6 / 1900 * bend]
+
+    start = [236.0, 0.0, 236.0 / 1900]
+    own = solve_ivp(rates, (0, 2.0), start, method="LSODA", rtol=1e-9, atol=1e-12, dense_output=True)
+    t = np.linspace(1.5, 2.0, 200_001)
+    v = own.sol(t)[1]
+    up = t[1:][(v[:-1] < 0.8e-3) & (v[1:] >= 0.8e-3)]
+    assert np.mean(np.diff(up)) == pytest.approx(1e-3 * every, rel=4e-3)
+    assert [1e6 * v.min(), 1e3 * v.max()] == pytest.approx([low, high], rel=6e-3)
 
 
 @pytest.mark.parametrize(

@@ -29,9 +29,15 @@ GROWS = {True: "oscillates more and more", False: "leaves steady sliding"}
 """What a disturbance that grows does, by whether it oscillates."""
 ON = ": after {time} between {speeds}, and still growing"
 """A motion whose growth has no end in a run."""
+CREEPS = ", at up to {peak}"
+"""Speed of an event most of whose time is creep: its peak is `SUDDEN` times its mean."""
+DIFFERS = " ({before} the time before)"
+"""Slip of the forward event before the last, where it differs by more than `ALIKE`."""
 DIGITS = 3  # significant, of quantities in sentences
 TREND = 0.01  # relative growth or decay of swings in the last half of a run up to which they go on
 BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
+SUDDEN = 10.0  # peak over mean speed of an event; a half sine has 1.6, stick-slip without creep before it 2 to 4
+ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
 def sentence(
@@ -40,9 +46,9 @@ def sentence(
 ) -> str:  # fmt: skip
     """Sentence on the slip events of a block or contact; empty if there are none.
 
-    It tells of the last forward event: how long after the one before, how far, how fast, how much the spring sheds and
-    how it rings; and of the last backward stroke. The block *sticks* if it was arrested since the event before, else it
-    *lags* behind the load point.
+    It tells of the last forward event: how long after the one before, how far, how fast, how much the spring sheds, how
+    far the one before slipped if that differs, and how it rings; and of the last backward stroke. The block *sticks* if
+    it was arrested since the event before, else it *lags* behind the load point.
 
     Parameters
     ----------
@@ -72,6 +78,11 @@ def sentence(
         "drop": drop, "rings": str(last.rings), "often": _told([last.ring_frequency], "Hz"), "backward": str(len(back)),
     }  # fmt: skip
     words = JUDDERS["again" if math.isfinite(last.recurrence) else "alone"]
+    if last.peak_velocity > SUDDEN * last.slip / last.duration > 0:
+        words += CREEPS.format(peak=_told([last.peak_velocity], "m/s"))
+    before = next((one for one in reversed(slips[: slips.index(last)]) if one.slip > 0), last)
+    if since == math.inf and not math.isclose(before.slip, last.slip, rel_tol=ALIKE):
+        words += DIFFERS.format(before=_told([before.slip], "m"))
     if math.isfinite(last.ring_frequency):
         words += JUDDERS["rings"]
     if back:

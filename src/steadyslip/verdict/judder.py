@@ -14,6 +14,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
 from steadyslip.motion.events import AnySlip
 from steadyslip.motion.sentence import (
+    ALIKE,
     BEATS,
     DIGITS,
     GROWS,
@@ -34,7 +35,6 @@ PERIODS = 12  # length of the first run in periods of the leading disturbance, s
 BEGIN, END = 0.05, 0.1  # shares of the first run between which the drive is faster
 LONGER = 4.0  # length of a run over that of the run before
 MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
-ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 FEWEST = 8  # events in the second half of a run from which it is told that they have no trend
 TURNS = 0.25  # share of these, by trial, at which slips of irregular events turn from growing to shrinking or back
 ENDINGS = {LOST: ", until contact is lost after {time}", BLOWN_UP: ", until it runs away after {time}"}
@@ -92,11 +92,13 @@ def repeats(run: History) -> bool:
 def swings(run: History, rate: float) -> dict[str, Swings]:
     """Oscillation of each contact that grows no more in the last half of a run, by name.
 
-    Empty in a run with slip events, and in one so short that small disturbances, which grow at `rate` (1/s), would
-    not have doubled in that time: then nothing tells a cycle from slow growth.
+    Empty in a run with slip events there, and in one so short that small disturbances, which grow at `rate` (1/s),
+    would not have doubled in that time: then nothing tells a cycle from slow growth.
     """
     end = float(run["t"][-1])
-    return {} if run.slip_events or rate * 0.5 * end < math.log(2) else steady_swings(run.events, end)
+    if any(one.begin > 0.5 * end for one in run.slip_events) or rate * 0.5 * end < math.log(2):
+        return {}
+    return steady_swings(run.events, end)
 
 
 def _alike(events: list[AnySlip]) -> bool:

@@ -411,3 +411,18 @@ def test_events_that_grow_and_those_that_creep_first_are_told_so():
     guide = ss.simulate(plain_guide(), until=15.0)
     assert guide.slip_events  # that rise and fall as evenly as an oscillation does
     assert "at up to" not in guide.sentence
+
+
+def test_an_oscillation_after_a_slip_event_is_told_as_well():
+    """A cylinder whose seal makes it swing between zero and twice its speed, after a step of the drive."""
+    law = ss.laws.LuGre(mu_coulomb=0.097, mu_static=0.178, v_stribeck=0.705e-3, stribeck_exponent=0.66, viscous=0.156,
+                        bristle_stiffness=30e6 / 1900)  # fmt: skip
+    a_rig = ss.Slider(friction=law, contact=ss.laws.ConstantNormalStress(preload=1900.0), stiffness=9e6, mass=85.0,
+                      area=1.0, drive=ss.machine.SteadyDrive(0.8e-3))  # fmt: skip
+    run = ss.simulate(a_rig, ss.protocol.VelocityStep(at=0.1, to=0.82e-3), until=5.0)
+    late = run["t"] > 4.0
+    assert all(one.begin < 2.5 for one in run.slip_events)
+    low, high = 1e6 * run["v"][late].min(), 1e3 * run["v"][late].max()
+    (found,) = re.findall(r"oscillates: every ([\d.]+) ms between (-[\d.]+) um/s and ([\d.]+) mm/s", run.sentence)
+    assert [float(one) for one in found[1:]] == pytest.approx([low, high], rel=0.01)
+    assert run.sentence.startswith("slips ") is bool(run.slip_events)

@@ -23,14 +23,13 @@ def told(pattern, text):
 def test_slips_that_alternate_are_told_by_their_ranges():
     """Every other slip of this carriage is longer; a run from another disturbance stays within what is told."""
     rig = ss.rig_from_text(GUIDE_AND_SEAL)
-    sentence, other = ss.analyze(rig).judders.split("; ")
+    sentence = ss.analyze(rig).judders  # once of both contacts of the carriage
     number = r"([\d.]+)"
     low, high, least, most, *_, drop = told(
-        rf"guide judders: every {number} to {number} ms it sticks, then slips {number} to {number} um within "
+        rf"carriage judders: every {number} to {number} ms it sticks, then slips {number} to {number} um within "
         rf"{number} to {number} ms, a drop of {number} to {number} N in the pull of belt",
         sentence,
     )
-    assert other == sentence.replace("guide", "seal")
     push = [ss.protocol.VelocityStep(at=0.01, to=3e-3), ss.protocol.VelocityStep(at=0.1, to=2e-3)]
     run = ss.simulate(rig, push, until=12.0)
     late = [one for one in run.slip_events if one.contact == "guide" and one.begin > 6.0]

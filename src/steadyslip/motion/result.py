@@ -59,14 +59,18 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def sentence(self) -> str:
         """What the rig does, by its slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
 
-        Without slip events by the oscillation in which it ends, as "oscillates: every 75.5 s between ...".
+        Without slip events in its last half by its oscillation there, as "oscillates: every 75.5 s between ...".
         """
         return joined(self.rig, self._sentences)
 
     @cached_property
     def _sentences(self) -> dict[str, str]:
         """Sentence of each contact that slips or oscillates, by name."""
-        return sentences(self.rig, self.events, self.slip_events) or oscillations(self.events, self.end)
+        slips = sentences(self.rig, self.events, self.slip_events)
+        if any(one.begin > 0.5 * self.end for one in self.slip_events):
+            return slips
+        swings = oscillations(self.events, self.end)
+        return slips | {name: f"{slips[name]}; then {own}" if name in slips else own for name, own in swings.items()}
 
     def summary(self) -> str:
         """Summary in a few lines."""

@@ -169,16 +169,18 @@ def _solve(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr]
     except TooManyTerms:
         return None
     symbols = sorted(_free_symbols(entry for row in (*matrix, *right) for entry in row), key=str)
-    field = QQ.frac_field(*symbols) if symbols else QQ
-    try:
-        table, known = (
-            DomainMatrix([[field.from_sympy(one) for one in row] for row in rows], (len(rows), len(rows[0])), field)
-            for rows in (matrix, right)
-        )
-        found = table.lu_solve(known).to_Matrix()
+    ring = QQ[tuple(symbols)] if symbols else QQ
+    field = ring.get_field()
+    table, known = (
+        DomainMatrix([[ring.from_sympy(one) for one in row] for row in rows], (len(rows), len(rows[0])), ring)
+        for rows in (matrix, right)
+    )
+    try:  # polynomials over one denominator: quotients at every step would be cancelled, which takes a thousand times
+        tops, below = table.solve_den(known, method="rref")
     except (DMNonInvertibleMatrixError, ZeroDivisionError):
         raise NotAvailable(UNHELD) from None
-    return [placeholders.restored(found[i, 0]) for i in range(len(unknowns))]
+    found = [field.convert_from(top, ring) / field.convert_from(below, ring) for top in tops.to_list_flat()]
+    return [placeholders.restored(field.to_sympy(one)) for one in found]
 
 
 def _free_symbols(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:

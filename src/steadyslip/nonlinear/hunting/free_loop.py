@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from steadyslip.core.errors import IllPosedWarning, NotAvailable, ParameterError
+from steadyslip.core.errors import IllPosedWarning, NotAvailable, ParameterError, UndecidedWarning
 from steadyslip.core.format import format_quantity
 from steadyslip.kernels.driver.holding import wanted_force
 from steadyslip.laws.friction import Coulomb
@@ -78,7 +78,8 @@ def growing_root(rig: Slider | Machine) -> complex | None:
         If it is not known.
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", IllPosedWarning)  # then infinitely many grow, which is no root to tell
+        for kind in (IllPosedWarning, UndecidedWarning):  # on roots that are not a number, which are none here
+            warnings.simplefilter("ignore", kind)
         if _has_matrices(rig):
             plant = free_plant(rig)
             return _leading(plant) if plant.limits.sample_time is None else _leading_sampled(plant)

@@ -9,6 +9,7 @@ from steadyslip.core.errors import UndecidedWarning
 from steadyslip.linear import paper
 from steadyslip.linear.boundary import Margin, boundary, margins
 from steadyslip.linear.formula import formula
+from steadyslip.linear.identification.identify import IdentifiedModes, identified_modes
 from steadyslip.linear.mode_changes import ModeChange
 from steadyslip.linear.mode_chart import ModeChart, mode_chart
 from steadyslip.linear.mode_origin import Origin
@@ -28,6 +29,7 @@ from steadyslip.linear.stiffness import (
 
 __all__ = [
     "Boundary",
+    "IdentifiedModes",
     "Margin",
     "Mode",
     "ModeChange",
@@ -41,6 +43,7 @@ __all__ = [
     "eigenvalues",
     "formula",
     "growth_rate",
+    "identified_modes",
     "margins",
     "mode_chart",
     "modes",

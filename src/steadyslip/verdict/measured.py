@@ -8,13 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_growth, format_quantity
 from steadyslip.linear.boundary import Margin
+from steadyslip.linear.identification.modal_machine import modal_machine
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 from steadyslip.verdict.numbers import rates_of
 
 _TOLD = 1e-4  # relative width of an edge's bracket above which it is told
+_EDGES = 3  # nearest edges that are asked of the modes as well
+_SURE = 4.0  # standard errors within which two routes agree
+_UNLIKE = (
+    " (more than errors away from the turns: modes near the ends of the band are not told apart from those beyond)"
+)
 _COUNTED = {0: "no root grows", 1: "a root grows without oscillating", 2: "a pair of roots grows"}
 
 
@@ -45,6 +52,7 @@ def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[st
     root, error = found.root() if growing == 2 else (None, 0.0)
     if root is not None and error > _TOLD * root.real:
         rows += [("its growth rate", f"{format_growth(root.real)} ± {format_growth(error)}")]
+    rows += [("its modes", _by_modes(machine, margins))]
     if not np.any(own.deviation):
         return [*rows, ("its errors", "not told, neither by coherence nor by repeats: taken as none")]
     wide = [one.edge for one in margins if one.edge and np.ptp(one.edge.bracket) > _TOLD * abs(one.edge.value)]
@@ -56,3 +64,31 @@ def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[st
         for edge in wide
     )
     return [*rows, ("its errors", f"leave open where edges lie: {text}")] if text else rows
+
+
+def _by_modes(machine: Machine, margins: Sequence[Margin]) -> str:
+    """What the modes identified from the response say, and whether it is what the turns of the determinant say."""
+    try:
+        found = modal_machine(machine)
+    except NotAvailable as why:
+        return str(why)
+    known, growing = found.modes, found.measured.count.growing
+    text = [f"{int(np.sum(known.inside))} identified in the band"]
+    roots = found.roots()
+    count = int(np.sum(roots.real > 0))
+    text += [_COUNTED.get(count, f"{count} roots grow") + " by them" + ("" if count == growing else _UNLIKE)]
+    if count == growing == 2:
+        root, error = found.root_near(complex(roots[0].real, abs(roots[0].imag)))
+        text[-1] += f", at {format_growth(root.real)} ± {format_growth(error)}"
+    edges = [one.edge for one in margins if one.edge and one.edge.angular_frequency]
+    for edge in edges[:_EDGES]:
+        area = machine.printed_area(edge.parameter)
+        near = found.edge_near(edge.parameter, edge.value, edge.angular_frequency)
+        if near is None:
+            text += [f"{edge.parameter} has no edge by them"]
+            continue
+        place, spread = (format_quantity(x, edge.unit, area=area) for x in (near.value, near.error))
+        apart = max(edge.bracket[0] - near.value, near.value - edge.bracket[1])
+        unlike = apart > _SURE * near.error + _TOLD * abs(near.value)
+        text += [f"edge of {edge.parameter} at {place} ± {spread}" + (_UNLIKE if unlike else "")]
+    return "; ".join(text)

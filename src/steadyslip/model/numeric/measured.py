@@ -133,8 +133,9 @@ class MeasuredMachine:
         rows = np.array([row for one in self.matrices.sites for row in (one.slip, one.apart)])
         used = np.any(rows != 0, axis=0)
         self._both = np.kron(rows[:, used], rows[:, used])  # from products of directions to those of contacts
-        same = like is not None and np.array_equal(used, like._used)
-        self._used: NDArray[np.bool_] = used
+        same = like is not None and np.array_equal(used, like.used)
+        self.rows: Array = rows
+        self.used: NDArray[np.bool_] = used
         self.samples: ReceptanceSamples = like.samples if like is not None and same else self._samples(used)
 
     def _samples(self, used: NDArray[np.bool_]) -> ReceptanceSamples:
@@ -165,7 +166,7 @@ class MeasuredMachine:
             error, between = np.concatenate([same, error]), np.concatenate([spread, between])
         return ReceptanceSamples(omega, r, error, between)
 
-    def _seen(self, receptance: ComplexArray) -> ComplexArray:
+    def seen(self, receptance: ComplexArray) -> ComplexArray:
         """Receptance in slips and distances of the contacts, (p, 2 contacts, 2 contacts)."""
         flat = receptance.reshape(len(receptance), -1) @ self._both.T
         return flat.reshape(-1, self.contacts.size, self.contacts.size)
@@ -218,7 +219,7 @@ class MeasuredMachine:
     def _determinants(self, at: ReceptanceSamples) -> tuple[ComplexArray, Array, Array]:
         """det(I + R G), its surely largest error by noise, and that by what lies between samples, each (p,)."""
         g = self.contacts(1j * at.omega)
-        inner = np.eye(self.contacts.size) + product(self._seen(at.receptance), g)
+        inner = np.eye(self.contacts.size) + product(self.seen(at.receptance), g)
         ratio = np.linalg.det(inner)
         by = np.swapaxes(product(g, np.linalg.inv(inner)), 1, 2).reshape(len(g), -1) @ self._both
         slope = np.abs(by).reshape(at.error.shape) * np.abs(ratio)[:, None, None]
@@ -269,7 +270,7 @@ class MeasuredMachine:
         """Why turns beyond the band are not known; empty if they are."""
         own, last = self.samples, self.samples.omega[-1]
         top = own.omega >= last / 2
-        s, r = 1j * own.omega[top], self._seen(own.receptance[top])
+        s, r = 1j * own.omega[top], self.seen(own.receptance[top])
         g, one = self.contacts(s), np.eye(self.contacts.size)
         without = np.linalg.det(one + product(r, self.contacts.storing(s, g)))
         pushed = float(np.max(np.abs(np.linalg.det(one + product(r, g)) / without - 1)))
@@ -291,7 +292,7 @@ class MeasuredMachine:
         """Angles of the eigenvalues of I + R G at the end of the band, with the storing part of G there."""
         last = 1j * self.samples.omega[-1:]
         stored = self.contacts.storing(last, self.contacts(last))
-        return np.asarray(np.angle(1 + np.linalg.eigvals(self._seen(self.samples.receptance[-1:]) @ stored)))
+        return np.asarray(np.angle(1 + np.linalg.eigvals(self.seen(self.samples.receptance[-1:]) @ stored)))
 
     def _turn_beyond(self, last: complex) -> float:
         """Turn (rad) of the determinant from the end of the band to infinite frequency, where it is 1."""
@@ -321,7 +322,7 @@ class MeasuredMachine:
 
     def determinant(self, s: complex) -> complex:
         """det(I + R G) near the imaginary axis, R from a polynomial through the nearest samples."""
-        r = self._seen(self.samples.at(np.array([s / 1j])).receptance)
+        r = self.seen(self.samples.at(np.array([s / 1j])).receptance)
         return complex(np.linalg.det(np.eye(self.contacts.size) + r @ self.contacts(np.array([s])))[0])
 
 

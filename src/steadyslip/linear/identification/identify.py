@@ -1,0 +1,313 @@
+"""Modes identified from measured responses: poles by vector fitting, refined by least squares with covariance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.pages import Displayed
+from steadyslip.core.questions import question
+from steadyslip.linear.identification.partial_fractions import ModalSum
+from steadyslip.linear.identification.vector_fitting import relocated, residues
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.responses import ResponseData
+from steadyslip.model.numeric import has_response
+from steadyslip.model.numeric.pencil import ComplexArray
+
+_PROMINENT = 0.5  # natural logarithm by which a peak rises above its surroundings; noise of 10 % does not
+_DAMPED = 0.01  # damping ratio of poles to begin with; vector fitting moves them
+_BESIDE = 1.2  # times the end of the band, where a mode beyond it is sought
+_NOTHING = 1e-9  # of the largest response, below which one is taken for rounding
+_SMOOTHED = 9  # frequencies over which misfits are averaged to find where a mode is missing
+_EVALUATIONS = 40  # of the modes in the least squares: from vector fitting some five do
+_EXACT = 1e-22  # mean square misfit relative to the response, from which it is rounding
+_SURE = 4.0  # standard errors by which a mode is damped, or it is a few errors of the response that it follows
+_MOST_MODES = 40
+_MOST_ENTRIES = 30_000_000  # of the table of derivatives: 240 MB
+_POOR = 3.0  # mean square of misfits over errors above which the modes do not describe the response
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedModes(Displayed):
+    """Modes of a structure, identified from its responses with open contacts.
+
+    Attributes
+    ----------
+    frequency, frequency_error : ndarray (k,)
+        Natural frequencies |p|/2π (Hz), rising, and their standard errors.
+    damping, damping_error : ndarray (k,)
+        Damping ratios, and their standard errors.
+    shape, shape_error : ndarray (k, d)
+        Complex shapes at the directions `names`, scaled to a modal mass of 1 kg, and standard errors of their moduli.
+    names : tuple of str
+        Points with directions: ``tip.x``.
+    inside : ndarray of bool (k,)
+        Modes within the band; those beyond it stand for all that are there.
+    misfit : float
+        Root mean square of what the modes leave, over the errors of the response (over the response where none are
+        told). Standard errors are multiplied by it where it is above one or errors are not told.
+    total : ModalSum
+    covariance : ndarray (n, n)
+        Of the unknowns of `total`.
+    """
+
+    frequency: Array
+    frequency_error: Array
+    damping: Array
+    damping_error: Array
+    shape: ComplexArray
+    shape_error: Array
+    names: tuple[str, ...]
+    inside: Array
+    misfit: float
+    total: ModalSum
+    covariance: Array
+
+    def __str__(self) -> str:
+        lines = [f"modes in the band, from responses of {', '.join(self.names)}"]
+        for i in np.flatnonzero(self.inside):
+            lines.append(
+                f"{self.frequency[i]:12.6g} ± {self.frequency_error[i]:.2g} Hz   "
+                f"damping ratio {self.damping[i]:.4g} ± {self.damping_error[i]:.2g}"
+            )
+        return "\n".join(lines)
+
+
+def identified_modes(machine: Machine) -> IdentifiedModes:
+    """Modes of the structure of a machine, from its measured response.
+
+    Parameters
+    ----------
+    machine : Machine
+        With a structure given by its response.
+
+    Returns
+    -------
+    IdentifiedModes
+
+    Raises
+    ------
+    NotAvailable
+        If there is no such structure, or no sum of modes describes the response.
+
+    Notes
+    -----
+    Poles common to all responses come from vector fitting (Gustavsen & Semlyen, IEEE Trans. Power Deliv. 14, 1999);
+    they and the shapes of reciprocal modes are then refined by least squares, weighted by the errors of the response,
+    whose covariance gives standard errors. A mode is added as long as the criterion of Schwarz (Ann. Stat. 6, 1978)
+    falls.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> omega = np.linspace(1, 60, 400)
+    >>> tip = 1 / (900 - omega**2 + 1j * omega)
+    >>> response = ss.machine.ResponseData(omega, tip[:, None, None], 0 * tip.real[:, None, None], ("tip.x",))
+    >>> surface = ss.machine.Surface(
+    ...     body="drive", against="s.tip", contact=ss.laws.ConstantNormalStress(preload=1e3),
+    ...     friction=ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.5, v_ref=0.01),
+    ... )
+    >>> body = ss.machine.StructureBody(response=response)
+    >>> machine = ss.machine.Machine(
+    ...     bodies={"s": body}, contacts={"c": surface}, drive=ss.machine.Pull(velocity=0.01)
+    ... )
+    >>> found = ss.linear.identified_modes(machine)
+    >>> (2 * np.pi * found.frequency).round(6), found.damping.round(6)
+    (array([30.]), array([0.016667]))
+    """
+    if not has_response(machine):
+        raise NotAvailable("modes are identified from measured responses: give a structure its `response`")
+    found: IdentifiedModes = _identified(machine)
+    return found
+
+
+@question
+def _identified(machine: Machine) -> IdentifiedModes:
+    return identify(next(iter(machine.bodies.values())).response)
+
+
+def identify(data: ResponseData) -> IdentifiedModes:
+    """Modes that describe measured responses; see `identified_modes`."""
+    known = _Known.of(data)
+    total, square = known.described()
+    if known.told and square > _POOR:
+        raise NotAvailable(
+            "no sum of reciprocal modes describes the response: "
+            f"what is left is {math.sqrt(square):.3g} times its errors"
+        )
+    order = np.argsort(np.abs(total.poles))
+    total = ModalSum(total.poles[order], total.shapes[order], total.rest)
+    covariance = known.covariance(total)
+    return _result(data, total, covariance, math.sqrt(square))
+
+
+def _result(data: ResponseData, total: ModalSum, covariance: Array, misfit: float) -> IdentifiedModes:
+    """Frequencies, dampings and shapes with the errors that follow from the covariance of the unknowns."""
+    size, poles = len(data.names), total.poles
+    turn = np.sqrt(2j * poles.imag)
+    shape, errors = turn[:, None] * total.shapes, np.empty((len(poles), 2 + size))
+    modulus = np.abs(poles)
+    for k, pole in enumerate(poles):
+        own = slice(k * (2 + 2 * size), (k + 1) * (2 + 2 * size))
+        slopes = np.zeros((2 + size, 2 + 2 * size))
+        slopes[0, :2] = np.array([pole.real, pole.imag]) / modulus[k]
+        slopes[1, :2] = np.array([-(pole.imag**2), pole.real * pole.imag]) / modulus[k] ** 3
+        for i in range(size):
+            unit = np.conj(shape[k, i]) / max(abs(shape[k, i]), np.finfo(float).tiny)
+            slopes[2 + i, 1] = abs(shape[k, i]) / (2 * pole.imag)
+            slopes[2 + i, 2 + 2 * i : 4 + 2 * i] = (unit * turn[k]).real, (1j * unit * turn[k]).real
+        errors[k] = np.sqrt(np.maximum(np.diag(slopes @ covariance[own, own] @ slopes.T), 0))
+    return IdentifiedModes(
+        frequency=modulus / (2 * np.pi), frequency_error=errors[:, 0] / (2 * np.pi),
+        damping=-poles.real / modulus, damping_error=errors[:, 1], shape=shape, shape_error=errors[:, 2:],
+        names=data.names, inside=poles.imag <= data.omega[-1], misfit=misfit, total=total, covariance=covariance,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Responses (p, d, d) and their weights: one over the deviation of each part, zero where nothing was measured."""
+
+    omega: Array
+    response: ComplexArray
+    weight: Array
+    told: bool
+
+    @classmethod
+    def of(cls, data: ResponseData) -> _Known:
+        """Where errors are not told anywhere, they are taken as a share of each response."""
+        response, deviation = data.full
+        error, told = deviation / math.sqrt(2), bool(np.any(deviation))
+        if not told:  # a share of the larger of a response and those at its own places
+            own = np.sqrt(np.abs(np.diagonal(response, axis1=1, axis2=2)))
+            error = np.maximum(np.abs(response), np.nan_to_num(own[:, :, None] * own[:, None, :]))
+        use = np.isfinite(response) & (error > 0)
+        if not np.all(np.any(use, axis=0)):
+            raise NotAvailable("modes are not identified: some pairs of directions were not measured")
+        return cls(data.omega, np.where(use, response, 0), np.where(use, 1 / np.where(use, error, 1), 0), told)
+
+    @property
+    def count(self) -> int:
+        """Real numbers that were measured."""
+        return 2 * int(np.count_nonzero(self.weight))
+
+    @property
+    def flat(self) -> tuple[ComplexArray, Array]:
+        """Responses and weights, (p, c)."""
+        return self.response.reshape(len(self.omega), -1), self.weight.reshape(len(self.omega), -1)
+
+    def described(self) -> tuple[ModalSum, float]:
+        """The sum of modes with the lowest criterion, and the mean square of what it leaves over the errors."""
+        poles = relocated(self.omega, *self.flat, self._peaks())
+        found, left = self._criterion(poles)
+        while len(poles) < _MOST_MODES and found > -math.inf:
+            places = self._worst(left), _BESIDE * self.omega[-1]
+            tried = [relocated(self.omega, *self.flat, np.append(poles, place * (1j - _DAMPED))) for place in places]
+            tried = [one for one in tried if len(one) > len(poles) and self._resolved(one)]
+            if not tried:
+                break
+            judged = [self._criterion(one) for one in tried]
+            first = min(range(len(tried)), key=lambda i: judged[i][0])
+            if judged[first][0] >= found:
+                break
+            poles, (found, left) = tried[first], judged[first]
+        best = self._refined(self._begin(poles))
+        while not np.all(kept := self._sure(best)):
+            best = self._refined(ModalSum(best.poles[kept], best.shapes[kept], best.rest))
+        return best, self._square(best)
+
+    def _sure(self, total: ModalSum) -> Array:
+        """True (k,) for modes beyond the band, and for those in it whose damping is larger than its errors."""
+        size = 2 + 2 * total.shapes.shape[1]
+        error = np.sqrt(np.maximum(np.diag(self.covariance(total)), 0))[: size * len(total.poles) : size]
+        return np.asarray((total.poles.imag > self.omega[-1]) | (-total.poles.real > _SURE * error))
+
+    def covariance(self, total: ModalSum) -> Array:
+        """Of the unknowns (n, n), for errors as told; where none are, or the modes leave more, for what they leave."""
+        rows = self.rows(total)
+        sizes = np.linalg.norm(rows, axis=0)
+        found = np.linalg.pinv((rows / sizes).T @ (rows / sizes), hermitian=True) / np.outer(sizes, sizes)
+        square = self._square(total)
+        return np.asarray(found * (max(square, 1.0) if self.told else square))
+
+    def _criterion(self, poles: ComplexArray) -> tuple[float, Array]:
+        """Criterion of Schwarz for any residues at poles, −inf at rounding, and squares (p,) of what is left."""
+        found, rest = residues(self.omega, *self.flat, poles)
+        near, far = (1 / (1j * self.omega[:, None] - one) for one in (poles, poles.conj()))
+        response, weight = self.flat
+        left = np.sum(np.abs((near @ found + far @ found.conj() + rest - response) * weight) ** 2, axis=1)
+        square, size = float(np.sum(left)) / self.count, self.response.shape[1]
+        if square < _EXACT:
+            return -math.inf, left
+        return self.count * math.log(square) + len(poles) * (2 + size * (size + 1)) * math.log(self.count), left
+
+    def _peaks(self) -> ComplexArray:
+        from scipy.signal import find_peaks  # slow to import
+
+        response, _ = self.flat
+        usual = np.median(np.abs(response), axis=0)
+        size = np.linalg.norm(response / np.maximum(usual, _NOTHING * np.max(usual)), axis=1)
+        at, _ = find_peaks(np.log(np.maximum(size, np.finfo(float).tiny)), prominence=_PROMINENT)
+        highest = np.sort(at[np.argsort(-size[at])][:_MOST_MODES])
+        places = self.omega[highest] if len(highest) else np.array([self.omega[-1] / 2])
+        return np.asarray(places * (1j - _DAMPED))
+
+    def _begin(self, poles: ComplexArray) -> ModalSum:
+        """Modes at poles, with the shapes nearest to their residues; beyond the band, where a pole stands for several
+        modes, as many as there are directions."""
+        size = self.response.shape[1]
+        found, rest = residues(self.omega, *self.flat, poles)
+        modes = []
+        for pole, one in zip(poles, found.reshape(-1, size, size), strict=True):
+            even = 0.5 * (one + one.T)
+            for first in np.linalg.svd(even)[0].T[: 1 if pole.imag <= self.omega[-1] else size]:
+                modes.append([pole, *(first * np.sqrt(first.conj() @ even @ first.conj()))])
+        table, square = np.array(modes, dtype=complex).reshape(-1, 1 + size), rest.reshape(size, size)
+        return ModalSum(table[:, 0], table[:, 1:], 0.5 * (square + square.T))
+
+    def _refined(self, begin: ModalSum) -> ModalSum:
+        """Least squares from there."""
+        from scipy.optimize import least_squares  # slow to import
+
+        count, size = begin.shapes.shape
+        if self.count * len(begin.unknowns) > _MOST_ENTRIES:
+            raise NotAvailable(
+                f"modes are not identified: {count} modes and {self.count} measured numbers are too many; "
+                "leave out points, or frequencies far from modes"
+            )
+        found = least_squares(
+            lambda x: self._left(ModalSum.from_unknowns(x, count, size)), begin.unknowns,
+            lambda x: self.rows(ModalSum.from_unknowns(x, count, size)),
+            x_scale="jac", xtol=1e-12, ftol=1e-6, gtol=None, max_nfev=_EVALUATIONS,
+        )  # fmt: skip
+        return ModalSum.from_unknowns(found.x, count, size)
+
+    def _resolved(self, poles: ComplexArray) -> bool:
+        """True if no mode in the band is narrower than the distance of the samples there, as single errors are."""
+        inside = poles[poles.imag < self.omega[-1]]
+        at = np.clip(np.searchsorted(self.omega, inside.imag), 1, len(self.omega) - 1)
+        return bool(np.all(-2 * inside.real > self.omega[at] - self.omega[at - 1]))
+
+    def _left(self, total: ModalSum) -> Array:
+        """What the modes leave, over its errors, (2 p d d,)."""
+        off = ((total(1j * self.omega) - self.response) * self.weight).ravel()
+        return np.concatenate([off.real, off.imag])
+
+    def rows(self, total: ModalSum) -> Array:
+        """Its derivatives by the unknowns, (2 p d d, n)."""
+        slopes = total.derivatives(1j * self.omega) * self.weight[..., None]
+        flat = slopes.reshape(-1, slopes.shape[-1])
+        return np.concatenate([flat.real, flat.imag])
+
+    def _square(self, total: ModalSum) -> float:
+        free = max(self.count - len(total.unknowns), 1)
+        return float(np.sum(self._left(total) ** 2)) / free
+
+    def _worst(self, left: Array) -> float:
+        """Frequency near which most is left."""
+        smooth = np.convolve(left, np.ones(_SMOOTHED) / _SMOOTHED, "same")
+        return float(max(self.omega[np.argmax(smooth)], self.omega[1]))

@@ -28,6 +28,14 @@ def test_the_cycle_of_theory_14():
     assert found.sentence == "HUNTS ±65.65 mm about the target every 24.01 s"
 
 
+@pytest.mark.parametrize("until", [30.0, 60.0, 80.0, 100.0])
+def test_strokes_that_shrink_towards_a_cycle_are_not_told_to_settle(until):
+    """Wherever the motion of an axis that hunts is cut; a later and larger step acts as one at the beginning does."""
+    for at in (0.0, 1.0):
+        assert ss.hunt(axis(**THEORY), DisplacementStep(at=at, by=1.0), until=until).hunts is not False
+    assert ss.hunt(axis(**THEORY), DisplacementStep(at=1.0, by=1.0)).sentence.startswith("HUNTS ±65.65 mm")
+
+
 def test_an_axis_that_slides_ever_slower_to_its_target_settles():
     """Coulomb friction is constant in sliding: with real roots the last stroke only creeps, and sticks nowhere."""
     held = {**THEORY, "kp": 9.0, "ki": 1.0}

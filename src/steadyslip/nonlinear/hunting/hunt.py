@@ -220,12 +220,21 @@ def _told(stroke: Stroke, ratio: float) -> Stroke:
 
 
 def _trend(strokes: Sequence[Stroke]) -> bool | None:
-    """True if the later strokes reach as far as those before, False if they shrink; None of fewer than six."""
+    """True if the later strokes reach as far as those before, False if they shrink to nothing.
+
+    None of fewer than six, and of strokes that shrink towards a size of their own, as before a cycle: that is told by
+    the limit of a geometric sequence (Aitken's).
+    """
     if len(strokes) < 6:
         return None
     third = len(strokes) // 3
-    reach = [max(abs(one.ends) for one in part) for part in (strokes[third : 2 * third], strokes[2 * third :])]
-    return reach[1] > SHRINKING * reach[0]
+    parts = strokes[:third], strokes[third : 2 * third], strokes[2 * third :]
+    early, middle, late = (max(abs(one.ends) for one in part) for part in parts)
+    if late > SHRINKING * middle:
+        return True
+    bend = (early - middle) - (middle - late)
+    limit = late - (middle - late) ** 2 / bend if bend > 0 else 0.0
+    return False if limit < (1 - SHRINKING) * late else None
 
 
 def _average_period(strokes: Sequence[Stroke]) -> float:

@@ -277,6 +277,14 @@ def test_unknown_names_and_missing_scales_are_said():
         figures.stability_chart(STRENGTHENING, "slider.mass", "stiffness")
 
 
+def test_a_far_edge_leaves_the_rig_in_the_middle_of_its_range():
+    """The edge of this gain is 30 times away: it stays in view, and the rig stays near the middle of the axis."""
+    rig = ss.read_rig("examples/slow-axis.toml")
+    axis, own = chart_axis(rig, "drive.kd", None), rig.value("drive.kd")
+    assert axis.low < own < max(ss.boundary(rig, "drive.kd")).value < axis.high
+    assert 0.4 < np.log(own / axis.low) / np.log(axis.high / axis.low) < 0.6
+
+
 def test_default_ranges_suit_the_parameter():
     rig = paper_rig()
     angle = chart_axis(rig, "angle", None)

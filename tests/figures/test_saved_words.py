@@ -33,6 +33,14 @@ def test_below_a_chart_stand_its_file_and_what_it_holds(tmp_path):
     assert "proportional gain" not in text
 
 
+def test_below_a_reopened_map_stands_the_file_of_its_rig(tmp_path):
+    rig = ss.read_rig(EXAMPLES / "slow-axis.toml")
+    grids = {"friction.b": ss.maps.Grid(0.011, 0.02, 3), "drive.kp": ss.maps.Grid("0.1 N/um", "2 N/um", 3)}
+    ss.run_map(ss.Map(rig, grids, ["status"]), tmp_path / "own.zarr", workers=1)
+    again = ss.open_map(tmp_path / "own.zarr")
+    assert footer_of(again.plot(), again, tmp_path).startswith("slow-axis.toml. held: ")
+
+
 @pytest.fixture(scope="module")
 def found():
     record = ss.read_record(EXAMPLES / "data/made_velocity_step.csv")

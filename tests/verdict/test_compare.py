@@ -144,6 +144,12 @@ def test_files_are_compared_with_their_tolerances(tmp_path):
     assert "a becomes stable with that of b in stiffness k" in page.read_text()
 
 
+def test_choices_are_told_in_plain_words():
+    done = run("compare", "examples/slow-axis.toml", "examples/inclined-spring.toml")
+    assert "friction.regularised      yes -> no" in done.stdout
+    assert not re.search(r"True|False| $", done.stdout, re.MULTILINE)
+
+
 def test_json_has_both_rigs_and_their_differences():
     done = run("compare", "examples/slow-axis.toml", "examples/slow-axis.toml", "--set", "drive.kp=2 N/um", "--json")
     data = json.loads(done.stdout)

@@ -16,7 +16,8 @@ from steadyslip.figures.style import axis_label, display_unit, parameter_label
 from steadyslip.linear.boundary import boundary
 from steadyslip.machine.slider import Slider
 
-_RANGE_FACTOR = 20.0  # default range of a positive parameter: lowest of value and edge / 20 to highest x 20 (by trial)
+_RANGE_FACTOR = 20.0  # default range of a positive parameter: value / 20 to value x 20 (by trial)
+_BESIDE_EDGE = 2.0  # what the range of a positive parameter reaches beyond the nearest edge, a factor (by trial)
 _MAX_EDGE_RATIO = 1e3  # edges further from the value than this factor do not widen the default range (by trial)
 _EXCLUDED_END_MARGIN = 1 / 18  # share of a domain left out at each excluded end: 10 deg of 180 for an angle
 
@@ -109,4 +110,7 @@ def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tup
         return min(ends) - margin, max(ends) + margin
     if value == 0 or nearest == 0:
         return 0.0, 3 * max(value, nearest)
-    return min(value, nearest) / _RANGE_FACTOR, max(value, nearest) * _RANGE_FACTOR
+    return (
+        min(value / _RANGE_FACTOR, nearest / _BESIDE_EDGE),
+        max(value * _RANGE_FACTOR, nearest * _BESIDE_EDGE),
+    )

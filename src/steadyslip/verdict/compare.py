@@ -122,7 +122,7 @@ class RigComparison(Displayed):
             yield from (
                 textwrap.wrap(text, 110, subsequent_indent=" " * (wide + 2), drop_whitespace=True)
                 if (len(text) > 110)
-                else [text]
+                else [text.rstrip()]
             )
         yield from self.decisive()
 
@@ -300,6 +300,8 @@ def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
         return ""
     if isinstance(value, FrozenRecord):
         return value.name or type(value).__name__
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, tuple):
         return "; ".join(_item_text(rig, f"{name}.{i}") for i in range(1, len(value) + 1))
     known = rig.parameters().get(name)

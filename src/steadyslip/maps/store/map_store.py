@@ -134,7 +134,7 @@ class Store:
         """
         if not self.rig_text:
             raise NotAvailable(f"the rig of {str(self.path)!r} has a law without a name, which cannot be read back")
-        return rig_from_text(self.rig_text, str(self.path))
+        return rig_from_text(self.rig_text, str(self.path)).named(self.layout.rig_file)
 
     def region(self, number: int) -> tuple[slice, ...]:
         """Region of a chunk, a slice per dimension."""

@@ -32,7 +32,8 @@ FORMAT = 2  # version of the layout
 MOST_CHUNK = 2**30  # bytes of a chunk of one array: fits into the memory of any machine
 MOST_EXTRA = 1000  # values of a result at one point; chosen by trial, far above those of any measure
 _VERSIONS = ("numpy", "scipy", "llvmlite", "zarr")
-_TEXTS = ("title", "rig", "definition", "dims", "results", "steadyslip", "versions", "coordinates", "seal")
+_TEXTS = ("title", "rig", "rig_file", "definition", "dims", "results", "steadyslip", "versions", "coordinates",
+          "seal")  # fmt: skip
 _ARRAY = {"shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes",
           "dimension_names", "zarr_format", "node_type", "storage_transformers"}  # fmt: skip
 _FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # fill values: nothing computed
@@ -73,7 +74,8 @@ class MapLayout:
     Attributes
     ----------
     definition, versions : dict
-    version, title, rig_text : str
+    version, title, rig_text, rig_file : str
+        The last is the name of the file that the rig was read from; empty if there is none.
     dims, results, sampled, generated : tuple of str
         Dimensions; results; parameters along the sample dimension, and those of them that are stored chunk by chunk.
     shape, chunks, grid : tuple of int
@@ -85,6 +87,7 @@ class MapLayout:
     version: str
     title: str
     rig_text: str
+    rig_file: str
     dims: tuple[str, ...]
     results: tuple[str, ...]
     sampled: tuple[str, ...]
@@ -135,7 +138,7 @@ def _layout(document: Any) -> MapLayout:
     _require(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
                                  "node_type": str}), "it is no Zarr group of format 3")  # fmt: skip
     _require((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
-    attributes = document["attributes"]
+    attributes = {"rig_file": ""} | document["attributes"]  # maps of earlier programs name no file
     _require("steadyslip_map" in attributes, "it has no steadyslip_map")
     version = attributes["steadyslip_map"]
     _require(version == FORMAT, f"its layout has version {version!r:.20}, and this program reads version {FORMAT}")
@@ -162,7 +165,8 @@ def _layout(document: Any) -> MapLayout:
     _require(len(chunks) == len(dims), f"{results[0]!r:.60} has {len(chunks)} dimensions")
     found = MapLayout(
         definition, _json(attributes, "versions", {str: str}), attributes["steadyslip"], attributes["title"],
-        attributes["rig"], dims, results, sampled, sampled if "method" in samples else (), tuple(sizes), chunks, arrays,
+        attributes["rig"], attributes["rig_file"], dims, results, sampled, sampled if "method" in samples else (),
+        tuple(sizes), chunks, arrays,
     )  # fmt: skip
     _check_arrays(found)
     return found
@@ -248,8 +252,9 @@ def new_layout(plan: Map) -> MapLayout:
     outputs = plan.outputs()
     sampled = tuple(plan.sampling.names) if plan.sampling else ()
     layout = MapLayout(
-        plan.definition(), versions(), version(), str(plan), rig, tuple(plan.dims), tuple(o.name for o in outputs),
-        sampled, sampled if isinstance(plan.sampling, Generated) else (), tuple(plan.shape), tuple(plan.chunks), {},
+        plan.definition(), versions(), version(), str(plan), rig, plan.rig.read_from, tuple(plan.dims),
+        tuple(o.name for o in outputs), sampled, sampled if isinstance(plan.sampling, Generated) else (),
+        tuple(plan.shape), tuple(plan.chunks), {},
     )  # fmt: skip
     known = roles(plan)
     for name in plan.varied:
@@ -278,6 +283,7 @@ def lay_out(path: Path, plan: Map) -> None:
             "steadyslip_map": FORMAT,
             "title": layout.title,
             "rig": layout.rig_text,
+            "rig_file": layout.rig_file,
             "definition": json.dumps(layout.definition),
             "dims": json.dumps(layout.dims),
             "results": json.dumps(layout.results),

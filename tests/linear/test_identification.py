@@ -135,3 +135,15 @@ def test_responses_of_no_reciprocal_modes_are_refused():
         identify(ResponseData(omega, response, 0.001 * np.abs(response), ("p.x", "p.y")))
     with pytest.raises(NotAvailable, match="give a structure its `response`"):
         ss.linear.identified_modes(reed())
+
+
+@pytest.mark.parametrize(("of", "share", "said"), [
+    (lambda omega, one: -np.ones_like(one) / omega[:, None, None] ** 2, 0.0, "describes the response"),
+    (lambda omega, one: 1e200 * one, 0.01, "check units"), (lambda omega, one: 1e-200 * one, 0.01, "check units"),
+    (lambda omega, one: 0 * one, 0.0, "never answer"), (lambda omega, one: one.conj(), 0.01, "times its errors"),
+])  # fmt: skip
+def test_what_holds_no_modes_is_refused_in_words(of, share, said):
+    omega = np.linspace(1, 100, 200)
+    one = of(omega, (1 / (900 - omega**2 + 0.6j * omega))[:, None, None] * np.array([[1, 0.3], [0.3, 0.09]]))
+    with pytest.raises(NotAvailable, match=said):
+        identify(ResponseData(omega, one, share * np.abs(one), ("p.x", "p.y")))

@@ -29,6 +29,9 @@ _SURE = 4.0  # standard errors by which a mode is damped, or it is a few errors 
 _MOST_MODES = 40
 _MOST_ENTRIES = 30_000_000  # of the table of derivatives: 240 MB
 _POOR = 3.0  # mean square of misfits over errors above which the modes do not describe the response
+_FAR = 1e100  # m/N, and its inverse: whose powers leave floating point
+_OUT_OF_RANGE = "modes are not identified: the response leaves the range of numbers; check units"
+_COARSE = 1e-2  # the same over the response where errors are not told: 10 % of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +136,14 @@ def _identified(machine: Machine) -> IdentifiedModes:
 def identify(data: ResponseData) -> IdentifiedModes:
     """Modes that describe measured responses; see `identified_modes`."""
     known = _Known.of(data)
-    total, square = known.described()
-    if known.told and square > _POOR:
-        raise NotAvailable(
-            "no sum of reciprocal modes describes the response: "
-            f"what is left is {math.sqrt(square):.3g} times its errors"
-        )
+    try:
+        with np.errstate(all="ignore"):  # numbers far outside the range of any structure, refused here
+            total, square = known.described()
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise NotAvailable(_OUT_OF_RANGE) from error
+    if not square <= (_POOR if known.told else _COARSE):
+        rest = f"{math.sqrt(square):.3g} times its errors" if known.told else f"{100 * math.sqrt(square):.3g} % of it"
+        raise NotAvailable(f"no sum of reciprocal modes describes the response: what is left is {rest}")
     order = np.argsort(np.abs(total.poles))
     total = ModalSum(total.poles[order], total.shapes[order], total.rest)
     covariance = known.covariance(total)
@@ -187,7 +192,10 @@ class _Known:
             error = np.maximum(np.abs(response), np.nan_to_num(own[:, :, None] * own[:, None, :]))
         use = np.isfinite(response) & (error > 0)
         if not np.all(np.any(use, axis=0)):
-            raise NotAvailable("modes are not identified: some pairs of directions were not measured")
+            raise NotAvailable("modes are not identified: some pairs of directions were not measured, or never answer")
+        largest = float(np.max(np.abs(response[use])))
+        if not 1 / _FAR < largest < _FAR:
+            raise NotAvailable(_OUT_OF_RANGE)
         return cls(data.omega, np.where(use, response, 0), np.where(use, 1 / np.where(use, error, 1), 0), told)
 
     @property

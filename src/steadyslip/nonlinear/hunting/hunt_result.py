@@ -113,7 +113,7 @@ class Hunt(ReadOnly):
             often += "" if self.repeats or np.isnan(self.period) else " on average"
             return f"HUNTS {size} about the target {often}"
         if self.hunts is None:
-            return f"NOT DECIDED by {format_quantity(self._end, 's')}: {self._so_far}"
+            return f"NOT DECIDED by {format_quantity(self._end, 's')}: {self._so_far}{self._of_late}"
         if np.isfinite(self.settled_at):
             there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # the rest is when it was stopped
             where = "on the target" if there else f"within {size} of the target"
@@ -139,6 +139,13 @@ class Hunt(ReadOnly):
             return f"so far it has made one stroke of {long}, and {off}"
         often = f"{format_quantity(self.every, 's')} after the one before"
         return f"so far it has made {len(own)} strokes, the last of {long}, {often}, and {off}"
+
+    @property
+    def _of_late(self) -> str:
+        """Range of places in the last third of the motion; empty where they are one place."""
+        places = -self.error[self.time >= self._end * 2 / 3]
+        low, high = (format_quantity(float(end(places)), self.unit) for end in (np.min, np.max))
+        return "" if low == high else f"; in the last third of this time from {low} to {high} of it"
 
     @property
     def _end(self) -> float:

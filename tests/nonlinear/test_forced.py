@@ -359,9 +359,44 @@ def test_refusals():
         ss.response(two_bodies(), [1.0])
     with pytest.raises(ss.NotAvailable, match="injection needs a contact of law pore-fluid; this rig has none"):
         ss.response(press(), [1.0], input="injection")
-    late = replace(press(), drive=ss.machine.PID(velocity=1e-5, kp=1e9, ki=1e8, delay=0.01))
-    with pytest.raises(ss.NotAvailable, match=r"^the response of a rig with a delay is not offered; set"):
-        ss.response(late, [1.0])
+
+
+def late_friction():
+    """A mass on a spring whose friction follows an earlier velocity, damped enough to slide steadily."""
+    law = ss.laws.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=1.0, lag=0.5)
+    contact = ss.laws.ConstantNormalStress(preload=1.0)
+    drive = ss.machine.SteadyDrive(1.0)
+    return ss.Slider(friction=law, contact=contact, stiffness=1.0, mass=1.0, damping=0.3, drive=drive)
+
+
+@pytest.mark.parametrize("input", ["normal-stress", "push", "drive-velocity"])
+def test_with_a_delay_by_hand(input):
+    """m x'' + c x' + k x = k w/(iω) + p − μ n − σ g' v e^(−iωτ), for small waves of velocity w, push p and load n."""
+    periods = np.array([3.0, 6.0, 12.0])
+    s = 2j * np.pi / periods
+    slope = -2 * 0.2 * np.exp(-1.0)
+    level = 0.3 + 0.2 * np.exp(-1.0)
+    pushed = {"normal-stress": -level, "push": 1.0, "drive-velocity": 1 / s + 0.3}[input]
+    velocity = s * pushed / (s**2 + 0.3 * s + 1 + s * slope * np.exp(-0.5 * s))
+    found = ss.response(late_friction(), periods, input=input, output="v")
+    phasor = found.gain * np.exp(1j * np.radians(found.phase))
+    np.testing.assert_allclose(phasor, velocity, rtol=1e-9)
+
+
+def test_with_a_delay_resonances_are_where_the_gain_is_largest():
+    found = ss.response(late_friction(), np.linspace(3.0, 12.0, 400))
+    assert len(found.resonances) == 1
+    at = np.argmax(found.gain)
+    assert found.resonances[0, 0] == pytest.approx(found.periods[at], abs=0.03)
+    assert found.resonances[0, 1] == pytest.approx(found.gain[at], rel=1e-3)
+
+
+@pytest.mark.campaign
+def test_with_a_delay_motion_answers_as_small_waves_do():
+    found = ss.response(late_friction(), [3.0, 6.0, 12.0], amplitudes=[1e-3])
+    assert np.all(found.status == "periodic")
+    np.testing.assert_allclose(found.gains[0], found.gain, rtol=1e-6)
+    np.testing.assert_allclose(found.phases[0], found.phase, atol=1e-3)
 
 
 def test_the_command(tmp_path):

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.linear.receptance import receptance
 from steadyslip.linear.state_space import state_matrices
+from steadyslip.linear.stiffness import eigenvalues
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import operating_point
 
 # Chosen by trial: computing time against missed resonances.
 PLACES = 200  # periods, evenly spaced in their logarithm, at which the gain is computed
@@ -17,16 +20,31 @@ SHARPNESS = 1e-5  # tolerance of a resonance's period, relative to the spacing o
 
 
 def transfer(rig: Slider | Machine, input: str, output: str, periods: Array) -> Array:
-    """G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space` at periods (s), complex, SI units."""
-    found = state_matrices(rig, (output,), (input,))
-    return _answer(found.blocks(), periods)
+    """Complex answer of an observable to a small wave of an input at periods (s), SI units; delays turn by e^(−iωτ)."""
+    return _Answer(rig, input, output)(periods)
 
 
-def _answer(blocks: tuple[Array, Array, Array, Array], periods: Array) -> Array:
-    a, b, c, d = blocks
-    swing = 2j * np.pi / periods
-    inner = np.linalg.solve(swing[:, None, None] * np.eye(len(a)) - a, np.broadcast_to(b, (len(periods), *b.shape)))
-    return np.asarray((c @ inner + d)[:, 0, 0])
+class _Answer:
+    """G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space`; with delays, which have none, by `receptance`."""
+
+    def __init__(self, rig: Slider | Machine, input: str, output: str) -> None:
+        self.point, self.names = operating_point(rig), ((output,), (input,))
+        self.late = bool(self.point.model.delays)
+        self.blocks = None if self.late else state_matrices(rig, *self.names).blocks()
+        self.rig = rig
+
+    def __call__(self, periods: Array) -> Array:
+        swing = 2 * np.pi / np.asarray(periods)
+        if self.blocks is None:
+            return np.asarray(receptance(self.point, swing, *self.names)[:, 0, 0])
+        a, b, c, d = self.blocks
+        pushed = np.broadcast_to(b, (len(swing), *b.shape))
+        inner = np.linalg.solve(1j * swing[:, None, None] * np.eye(len(a)) - a, pushed)
+        return np.asarray((c @ inner + d)[:, 0, 0])
+
+    def modes(self) -> Array:
+        """Eigenvalues (1/s); with delays the rightmost."""
+        return np.asarray(eigenvalues(self.rig) if self.blocks is None else np.linalg.eigvals(self.blocks[0]))
 
 
 def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, longest: float) -> Array:
@@ -37,23 +55,23 @@ def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, 
     from scipy.optimize import minimize_scalar  # slow to import
     from scipy.signal import find_peaks
 
-    blocks = state_matrices(rig, (output,), (input,)).blocks()
-    values = np.linalg.eigvals(blocks[0])
+    answer = _Answer(rig, input, output)
+    values = answer.modes()
     swinging = values[values.imag > 0]
     near = 2 * np.pi / swinging.imag * (1 + np.outer(BESIDE, np.abs(swinging.real) / np.abs(swinging)))
     within = near[(near > shortest) & (near < longest)]
     tried = np.unique(np.log(np.concatenate([np.geomspace(shortest, longest, PLACES), within])))
 
     def lowered(log_period: float) -> float:
-        return -float(np.abs(_answer(blocks, np.exp([log_period])))[0])
+        return -float(np.abs(answer(np.exp([log_period])))[0])
 
-    gain = np.abs(_answer(blocks, np.exp(tried)))
+    gain = np.abs(answer(np.exp(tried)))
     highest, _ = find_peaks(np.log(np.maximum(gain, np.finfo(float).tiny)), prominence=PROMINENCE)
     found = [
         minimize_scalar(lowered, bounds=(low, high), options={"xatol": SHARPNESS * (high - low)}).x
         for low, high in zip(tried[highest - 1], tried[highest + 1], strict=True)
     ]
     periods = np.exp(found)
-    answers = _answer(blocks, periods) if found else np.empty(0, dtype=complex)
+    answers = answer(periods) if found else np.empty(0, dtype=complex)
     rows = np.column_stack([periods, np.abs(answers), np.degrees(np.angle(answers))])
     return rows[np.argsort(-rows[:, 1])]

@@ -110,14 +110,15 @@ def response(
     NoSteadySliding
         If there is nothing to swing about.
     NotAvailable
-        If the rig has a delay, or numbers leave the range of floating point.
+        If numbers leave the range of floating point.
 
     Notes
     -----
-    Small amplitudes: G(iω) = C(iω − A)⁻¹B + D of `state_space`, exact. Large ones: the motion is run for 10 periods,
-    or as long as transients of small amplitude last, and for twice as long until two periods agree to 1e-7 of their
-    range and so does what is still to come of a transient; the last one is taken apart by a discrete Fourier transform.
-    After 2560 periods, and where errors of the integration are not less even with a smaller tolerance, 1e-5 will do.
+    Small amplitudes: G(iω) = C(iω − A)⁻¹B + D of `state_space`, exact; with delays late forces are turned by e^(−iωτ)
+    instead. Large ones: the motion is run for 10 periods, or as long as transients of small amplitude last, and for
+    twice as long until two periods agree to 1e-7 of their range and so does what is still to come of a transient; the
+    last one is taken apart by a discrete Fourier transform. After 2560 periods, and where errors of the integration
+    are not less even with a smaller tolerance, 1e-5 will do.
 
     Examples
     --------
@@ -182,11 +183,6 @@ class _Forced:
         model = build_model(rig)
         if self.kind not in INPUTS:
             raise UnknownNameError("input", input, INPUTS)
-        if model.delays:
-            raise NotAvailable(
-                "the response of a rig with a delay is not offered; set the delay to 0, or ask for its stability with "
-                "analyze, stable_values or boundary"
-            )
         name, self.on = self._input(model, on)
         self.output = self._output(model, output)
         self.names = (name, self.output)

@@ -51,6 +51,26 @@ def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephon
     assert sorted(texts_on_axes(found.html))[len(texts_on_axes(found.html)) // 2] >= least
 
 
+def test_letters_of_the_verdict_on_a_machine_can_be_read_on_a_telephone(tmp_path):
+    """Half of the letters of a figure 8 inches wide are 7 pixels high there; a broad window and paper keep it."""
+    found = ss.report(ss.analyze(ss.read_rig("examples/machines/two-guides.toml")), explorer=False)
+    found.save(tmp_path / "a.html")
+    heights = """[...document.querySelectorAll("figure:has(> .narrow) text")]
+        .map(one => one.getBoundingClientRect().height).filter(one => one > 0)"""
+    with driver() as play:
+        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 390, "height": 740})
+        page.goto((tmp_path / "a.html").as_uri())
+        letters = sorted(page.evaluate(heights))
+        for width, media in ((390, "screen"), (1024, "screen"), (PAPER["width"], "print")):
+            page.set_viewport_size({"width": width, "height": 740})
+            page.emulate_media(media=media)
+            shown = [page.locator(f".{one}").first.is_visible() for one in ("narrow", "broad")]
+            assert shown == [width == 390, width != 390]
+        browser.close()
+    assert letters[len(letters) // 2] >= 8  # CSS pixels, of half of them
+
+
 def test_cells_of_wide_tables_have_the_names_of_their_columns():
     html = table([("a", "1 m", "", "2 m")], ("name", "now", "edge", "then"))
     assert html.count("data-head") == 2, "none before an empty cell"

@@ -66,7 +66,10 @@ STYLE = """
 .steadyslip-told sub { line-height: 0; }
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
 @media print { .steadyslip-told .formula math { font-size: 12px; } }
+.steadyslip-told .narrow { display: none; }
 @media screen and (max-width: 600px) {
+  .steadyslip-told .broad { display: none; }
+  .steadyslip-told .narrow { display: block; }
   .steadyslip-told table { font-size: 13px; }
   .steadyslip-told.steadyslip-told :is(th, td) { padding-right: 8px; }
   .steadyslip-told .stacks thead { position: absolute; clip-path: inset(50%); }

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from steadyslip import figures
 from steadyslip.core.format import format_quantity
-from steadyslip.figures.inline import figure_html
+from steadyslip.figures.inline import column_html, figure_html
 from steadyslip.figures.machine_verdict import undrawn_edges
 from steadyslip.machine.letters import said
 from steadyslip.reports import rig as rig_report
@@ -50,7 +50,9 @@ def _verdict_figure(analysis: Analysis) -> str:
             f" Not drawn, but named below, is the edge of {names}: a factor of 100 away or more, or not of a "
             "positive value."
         )
-    return figure(figure_html(lambda: figures.machine_verdict(analysis), words, 8.0), words)
+    broad = figure_html(lambda: figures.machine_verdict(analysis), words, 8.0)
+    narrow = column_html(lambda: figures.machine_verdict(analysis), words)  # the same, for a narrow window
+    return figure(f'<div class="broad">{broad}</div><div class="narrow">{narrow}</div>' if broad else "", words)
 
 
 def _verdict_section(analysis: Analysis) -> Iterator[str]:

@@ -426,3 +426,16 @@ def test_an_oscillation_after_a_slip_event_is_told_as_well():
     (found,) = re.findall(r"oscillates: every ([\d.]+) ms between (-[\d.]+) um/s and ([\d.]+) mm/s", run.sentence)
     assert [float(one) for one in found[1:]] == pytest.approx([low, high], rel=0.01)
     assert run.sentence.startswith("slips ") is bool(run.slip_events)
+
+
+@pytest.mark.parametrize("mass", ["0 kg", "12 kg"])
+def test_a_step_that_lifts_a_block_off_is_told_as_that(mass):
+    """Not as a velocity that cannot be found; a step that leaves some pressure goes on."""
+    rig = ss.rig_from_text(PRESS.replace("12 kg", mass))
+    for by, status in ((-51e6, "contact lost"), (-30e6, "done")):
+        run = ss.simulate(rig, ss.protocol.NormalStressStep(at=10.0, by=by), until=20.0)
+        assert run.status == status
+    many = ss.simulate_many(
+        rig, {"slider.stiffness": [1e10, 2e10]}, ss.protocol.NormalStressStep(at=10.0, by=-51e6), until=20.0
+    )
+    assert list(many.status) == ["contact lost"] * 2

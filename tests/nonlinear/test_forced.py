@@ -391,6 +391,13 @@ def test_with_a_delay_resonances_are_where_the_gain_is_largest():
     assert found.resonances[0, 1] == pytest.approx(found.gain[at], rel=1e-3)
 
 
+def test_a_delay_far_below_all_periods_changes_nothing():
+    servo = {"velocity": 1e-5, "kp": 1e9, "ki": 1e8}
+    rigs = [replace(press(), drive=ss.machine.PID(**servo, delay=delay)) for delay in (0.0, 1e-9)]
+    at_once, late = (ss.response(rig, [1.0, 10.0, 100.0]).gain for rig in rigs)
+    np.testing.assert_allclose(late, at_once, rtol=1e-6)
+
+
 @pytest.mark.campaign
 def test_with_a_delay_motion_answers_as_small_waves_do():
     found = ss.response(late_friction(), [3.0, 6.0, 12.0], amplitudes=[1e-3])

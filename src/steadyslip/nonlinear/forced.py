@@ -18,6 +18,8 @@ from steadyslip.linear.stiffness import growth_rate
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
+from steadyslip.model.point import operating_point
+from steadyslip.model.range import delays_of
 from steadyslip.motion import simulate
 from steadyslip.nonlinear.frequency_response import IRREGULAR, NOT_SETTLED, PERIODIC, TOO_MANY_STEPS, FrequencyResponse
 from steadyslip.protocol import DisturbanceHarmonic, InjectionHarmonic, NormalStressHarmonic, VelocityHarmonic
@@ -189,7 +191,11 @@ class _Forced:
         piece = self._piece(1.0, 1.0)
         unit = next(a.role.unit for name, a in parameters(piece).items() if name == "amplitude")
         self.units = (rig.protocol_unit(piece, unit), model.observables[self.output][1])
-        start = simulate(rig, until=1.0, times=[0.0], events=False)
+        late = np.ravel(delays_of(operating_point(rig)))
+        shortest = float(
+            min((1.0, *late[late > 0]))
+        )  # s: only the start is asked for, and short delays make small steps
+        start = simulate(rig, until=shortest, times=[0.0], events=False)
         self.steady = {name: float(start[name][0]) for name in model.observables}
         self.decay = float(growth_rate(rig))
 

@@ -3,7 +3,9 @@
 import json
 import math
 import re
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import steadyslip as ss
@@ -20,6 +22,8 @@ from steadyslip.verdict.chances import chances_of
 from steadyslip.verdict.change_costs import unit_cost
 from steadyslip.verdict.cures import Window
 from toleranced import AXIS
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.fixture
@@ -203,3 +207,40 @@ def test_a_slower_feed_is_dearer_than_a_part_and_far_edges_are_named(axis):
     edge = re.search(r"beyond the range: the rig itself is stable above ([\d.]+) N/um$", text, re.MULTILINE)
     assert 1e6 * float(edge[1]) == pytest.approx(low * block.area, rel=1e-3)
     assert "cheapest single change: slider.stiffness" in str(ss.cure(block, adjust=plain))
+
+
+def test_a_cure_holds_for_all_that_is_not_known(tmp_path):
+    """The stiffness that is enough is the largest critical one within the interval; by the file and by Python."""
+    text = (EXAMPLES / "inclined-spring.toml").read_text(
+        encoding="utf-8"
+    ) + "\n[unknown]\nfriction.b = [0.0155, 0.0175]\n"
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    own, interval = ss.read_rig(EXAMPLES / "inclined-spring.toml"), {"friction.b": (0.0155, 0.0175)}
+    needed = float(np.max(ss.critical_stiffness(own, {"friction.b": np.linspace(0.0155, 0.0175, 101)})))
+    found = ss.cure(own, adjust={"stiffness": Adjustment()}, unknown=interval)
+    assert found.best.nearest == pytest.approx(needed, rel=1e-9)
+    assert ss.cure(own, adjust={"stiffness": Adjustment()}).best.nearest < 0.9 * needed
+    told = run("cure", tmp_path / "rig.toml").stdout
+    assert "at every value of friction.b from 0.0155 to 0.0175" in told
+    assert f"{needed / 1e9:.4g} GPa/m" in told
+    run("report", tmp_path / "rig.toml", "-o", tmp_path / "rig.html")
+    page = (tmp_path / "rig.html").read_text(encoding="utf-8")
+    assert "It is not known how large" in page
+    assert f"{needed / 1e9:.4g}" in page
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_cure_with_tolerances_holds_for_all_that_is_not_known(seed):
+    """At nine values in the interval the chance is the one asked for, within its error, or more."""
+    chance = np.random.default_rng(seed)
+    a_rig = ss.read_rig(EXAMPLES / "inclined-spring.toml").with_values({"friction.a": chance.uniform(0.012, 0.015)})
+    own, spread = a_rig.value("friction.d_c"), {"friction.b": "3 %", "stiffness": "10 %"}
+    interval = {"friction.d_c": (own / chance.uniform(1, 3), own * chance.uniform(1, 3))}
+    found = ss.cure(a_rig, spread, adjust={"stiffness": Adjustment()}, unknown=interval, sure=0.9)
+    to = found.best.nearest
+    chances = []
+    for d_c in np.geomspace(*interval["friction.d_c"], 9):
+        one = ss.tolerate(a_rig.with_values({"stiffness": to, "friction.d_c": d_c}), spread)
+        chances.append(one.share)
+        assert one.share > 0.9 - 0.01
+    assert min(chances) == pytest.approx(0.9, abs=0.01)

@@ -51,7 +51,6 @@ def analyze(
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.files.output import FIGURES, check_output
     from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
-    from steadyslip.files.specifications.unknowns import intervals_of
     from steadyslip.verdict import analyze as run, stable_within, tolerate
 
     check_output(output or (), (".html", *FIGURES))
@@ -60,12 +59,11 @@ def analyze(
         _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, along, branch)
         return
     read, tolerances = rig_and_tolerances(rig, changes or ())
-    unknown = intervals_of(read, rig, changes or ())
     if along is not None:
         along = read.resolve(along)
     result = run(read, branch=branch, kick=kick or ())
     within = tolerate(read, tolerances) if tolerances else None
-    anywhere = stable_within(read, unknown) if unknown else None
+    anywhere = stable_within(read, tolerances.unknown) if tolerances.unknown else None
     if output:
         from steadyslip.reports.verdict_files import write_verdict
 

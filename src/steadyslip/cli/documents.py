@@ -80,7 +80,7 @@ def report(
     refuse_branch(fitted, branch)
     read, written = rig_and_tolerances(rig, changes or ())
     given: Any = dict(map(named_value, tolerance or ()))
-    if written or written.adjust:
+    if written or written.adjust or written.unknown:
         given = replace(written, values=dict(written.values) | {read.resolve(name): one for name, one in given.items()})
     options: dict[str, Any] = {"branch": branch, "tolerances": given, "charts": list(map(pair_of, chart or ()))}
     options |= {"project": project, "author": author, "revision": revision, "approval": approval}

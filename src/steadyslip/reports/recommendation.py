@@ -14,7 +14,7 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.linear.status import stability
 from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why
-from steadyslip.verdict import Cures, Tolerated, Window, cure
+from steadyslip.verdict import Cures, StableWithin, Tolerated, Window, cure, stable_within
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.change_costs import PART, SETTING, TASK, unit_cost
 from steadyslip.verdict.cures import default_adjust
@@ -40,11 +40,14 @@ class Order:
         What can be changed, by dotted name; if empty, all that the rig has but friction.
     source : str
         Text of the rig's file.
+    unknown : mapping of str to (float, float)
+        Intervals of parameters that are not known, SI units.
     """
 
     charts: Sequence[tuple[str, str]] = ()
     adjustable: Mapping[str, Adjustment] = field(default_factory=dict)
     source: str = ""
+    unknown: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 ORDER = Order()
@@ -59,6 +62,10 @@ def recommendation(
     """
     adjustable = order.adjustable
     yield heading(title)
+    anywhere = stable_within(analysis.rig, order.unknown) if order.unknown else None
+    if anywhere is not None and not anywhere.everywhere:
+        yield from _made_certain(analysis, anywhere, tolerated, order)
+        return
     if tolerated is not None and tolerated.share < SURE:
         yield from _made_sure(analysis, tolerated, adjustable)
         if analysis.stable:
@@ -85,6 +92,25 @@ def recommendation(
     yield table(rows, head, caption=sequence)
     if close and (far := [row[0] for one, row in found.items() if one not in close]):
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
+
+
+def _made_certain(
+    analysis: Analysis, anywhere: StableWithin, tolerated: Tolerated | None, order: Order
+) -> Iterator[str]:  # fmt: skip
+    """HTML of what makes a rig stable at all values of what is not known, and that measuring it may be enough."""
+    rig: Any = analysis.rig
+    for one in anywhere.each:
+        values = str(one).partition(": ")[2]
+        yield paragraph(
+            f"It is not known how large {said(rig, one.parameter)} is: {values}. Wanted is what holds for all."
+        )
+    reached = "stable" if tolerated is None else f"stable in {format_percent(SURE)} of all that are built"
+    tolerances = {} if tolerated is None else tolerated.tolerances
+    yield from _cured(
+        analysis, tolerances, order.adjustable, f"{reached}, whatever is not known", f"{reached} at", order.unknown
+    )
+    if analysis.stable or any(one.values for one in anywhere.each):
+        yield paragraph("Measuring what is not known may be enough, or make a smaller change do.")
 
 
 def _made_sure(analysis: Analysis, tolerated: Tolerated, adjustable: Mapping[str, Adjustment]) -> Iterator[str]:
@@ -124,7 +150,8 @@ def _is_far(value: float, to: float | None) -> bool:
 
 
 def _cured(
-    analysis: Analysis, tolerances: Any, adjustable: Mapping[str, Adjustment], reached: str, at: str
+    analysis: Analysis, tolerances: Any, adjustable: Mapping[str, Adjustment], reached: str, at: str,
+    unknown: Mapping[str, tuple[float, float]] | None = None,
 ) -> Iterator[str]:  # fmt: skip
     """HTML of what `cure` finds: the cheapest change, the cheapest pair, and the windows of each parameter.
 
@@ -136,7 +163,7 @@ def _cured(
     if named is not None and named.value and "friction." not in named.parameter:
         present.setdefault(named.parameter, Adjustment())
     try:
-        found = cure(rig, tolerances, sure=SURE, adjust=adjustable or present)
+        found = cure(rig, tolerances, sure=SURE, adjust=adjustable or present, unknown=unknown)
     except (NotAvailable, ParameterError) as refused:
         yield paragraph(f"No single change within range makes it stable, and several were not tried: {why(refused)}.")
         return

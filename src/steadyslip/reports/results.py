@@ -177,7 +177,7 @@ def _rig(
         found = predict(result, fit)
         result = found.rig
     within = tolerate(result, tolerances) if tolerances else None
-    order = Order(charts, getattr(tolerances, "adjust", {}), source)
+    order = Order(charts, getattr(tolerances, "adjust", {}), source, getattr(tolerances, "unknown", {}))
     return rig_report.verdict_parts(analyze(result, branch=branch), found, within, order)
 
 
@@ -193,7 +193,7 @@ def _machine(
             "a machine has one steady sliding, and fits and charts are of a slider; leave branch, fit and charts out"
         )
     within = tolerate(result, tolerances) if tolerances else None
-    order = Order((), getattr(tolerances, "adjust", {}), source)
+    order = Order((), getattr(tolerances, "adjust", {}), source, getattr(tolerances, "unknown", {}))
     return machine_report.verdict_parts(analyze(result), within, order)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
 from steadyslip.verdict.tolerances import LOG2_CLOSED, LOG2_OTHERS, chance_of, log2_of
 
+PLACES = 5  # of each interval of one or two unknown parameters, ends among them; of more their corners
 AT_ONCE = 2**20  # rigs judged together; bounds memory
 LOG2_FEW, LOG2_FEWEST = 7, 4  # rigs of one group in searches: of one parameter, of two; fewer without closed form
 
@@ -32,11 +34,14 @@ class Chances:
         None without tolerances: chances are 0 or 1.
     sizes : tuple of int
         Base-2 logarithms of the number of rigs of one group: of the whole sample, of few and of the fewest.
+    unknown : tuple of mapping of str to float
+        Values of parameters that are not known: chances are the least of these.
     """
 
     rig: Slider | Machine
     spreads: Spreads | None
     sizes: tuple[int, int, int]
+    unknown: tuple[Mapping[str, float], ...] = ({},)
 
     @property
     def single(self) -> bool:
@@ -67,6 +72,9 @@ class Chances:
 
     def whole(self, changes: Mapping[str, float]) -> tuple[float, float]:
         """Chance of one rig with other values from the whole sample, and half-width of its 95 % interval."""
+        return min(self._whole({**one, **changes}) for one in self.unknown)
+
+    def _whole(self, changes: Mapping[str, float]) -> tuple[float, float]:
         found, possible = self._judged({name: np.array([value]) for name, value in changes.items()}, self.sizes[0])
         if self.single:
             return float(found[0, 0]), 0.0
@@ -74,8 +82,12 @@ class Chances:
         return chance_of(found[0][possible[0]], possible[0].reshape(shape))
 
     def _chances(self, changes: Mapping[str, Array], log2: int) -> Array:
-        stable, possible = self._judged(changes, log2)
-        return np.asarray(np.sum(stable & possible, axis=1) / np.maximum(np.sum(possible, axis=1), 1))
+        rows = max((len(values) for values in changes.values()), default=1)
+        found = []
+        for one in self.unknown:
+            stable, possible = self._judged({name: np.full(rows, x) for name, x in one.items()} | dict(changes), log2)
+            found.append(np.sum(stable & possible, axis=1) / np.maximum(np.sum(possible, axis=1), 1))
+        return np.asarray(np.min(found, axis=0))
 
     def _judged(self, changes: Mapping[str, Array], log2: int) -> tuple[Array, Array]:
         """Whether each of n rigs about each of m values is stable, and whether it is possible, (m, n)."""
@@ -103,9 +115,22 @@ class Chances:
         return found.reshape(rows, size), possible.reshape(rows, size)
 
 
-def chances_of(rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances) -> Chances:
-    """Chances of a rig within tolerances; certain ones where these are empty."""
+def chances_of(
+    rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances,
+    unknown: Mapping[str, tuple[float, float]] | None = None,
+) -> Chances:  # fmt: skip
+    """Chances of a rig within tolerances, certain ones where these are empty; the least over intervals of `unknown`."""
     whole = log2_of(rig)
     few = {LOG2_CLOSED: (LOG2_FEW, LOG2_FEWEST), LOG2_OTHERS: (LOG2_FEW - 1, LOG2_FEWEST - 2)}.get(whole, (1, 0))
     sizes = (whole, *few)
-    return Chances(rig, spreads_of(rig, tolerances) if tolerances else None, sizes)
+    places = [spread_over(*ends, np.linspace(0.0, 1.0, PLACES if len(unknown or {}) < 3 else 2))
+              for ends in (unknown or {}).values()]  # fmt: skip
+    values = tuple(dict(zip(unknown or {}, map(float, row), strict=True)) for row in itertools.product(*places))
+    return Chances(rig, spreads_of(rig, tolerances) if tolerances else None, sizes, values)
+
+
+def spread_over(low: float, high: float, share: Array) -> Array:
+    """Values at shares of an interval, on a log scale where both ends are positive."""
+    if low > 0:
+        return np.asarray(np.clip(low * (high / low) ** share, low, high))
+    return np.asarray(low + (high - low) * share)

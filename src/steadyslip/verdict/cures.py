@@ -25,6 +25,7 @@ from steadyslip.verdict.change_costs import SPEED, unit_cost
 from steadyslip.verdict.cure_window import LEAST, Window, distance
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.tolerances import GIVEN, format_chance
+from steadyslip.verdict.unknown import ValuesWithin, stable_within
 
 DECADES = 3.0  # searched to each side of a value without limits
 SCANNED, COARSE = 97, 17  # values along one parameter, and of each of a pair: by trial, time against windows missed
@@ -73,6 +74,8 @@ class Cures(ReadOnly):
         smallest.
     without_tolerances : bool
         True if nothing of the rig varies: what is told is then of the rig itself, whatever chance is asked for.
+    unknown : tuple of ValuesWithin
+        Parameters whose values are not known, at all of which the chance is reached.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -84,6 +87,7 @@ class Cures(ReadOnly):
     pair_cost: float
     fails: tuple[Window, ...]
     without_tolerances: bool = False
+    unknown: tuple[ValuesWithin, ...] = ()
 
     @property
     def best(self) -> Window | None:
@@ -95,7 +99,8 @@ class Cures(ReadOnly):
         wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails))
         now = format_chance(self.chance, self.error) if self.error else stability(self.rig)
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
-        alone = [OWN_VALUES] if self.without_tolerances else []
+        alone = [f"at every value of {one.parameter} from {one.given}" for one in self.unknown]
+        alone += [OWN_VALUES] if self.without_tolerances else []
         if self.chance >= self.sure:
             already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
             near = [one for one in self.fails if one.leaves is not None and distance(one.value, one.leaves) <= FAR]
@@ -133,6 +138,7 @@ class Cures(ReadOnly):
             {
                 "sure": self.sure, "chance": self.chance, "error": self.error,
                 "without_tolerances": self.without_tolerances,
+                "unknown": {one.parameter: [one.low, one.high] for one in self.unknown},
                 "best": None if self.best is None else self.best.parameter,
                 "pair": dict(self.pair), "pair_cost": self.pair_cost,
                 "windows": [data(one) for one in self.windows], "fails": [data(one) for one in self.fails],
@@ -150,7 +156,7 @@ def _change(one: Window, to: float | None) -> str:
 @checked(tolerances=GIVEN, sure=SURE)
 def cure(
     rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances | None = None, *, sure: float | str = 0.95,
-    adjust: Mapping[str, Any] | None = None,
+    adjust: Mapping[str, Any] | None = None, unknown: Mapping[str, tuple[float, float]] | None = None,
 ) -> Cures:  # fmt: skip
     """Find what to change about a rig so that it is stable with a given chance.
 
@@ -166,6 +172,9 @@ def cure(
         stiffness, damping, mass, preload, lubricant and speed, within three decades to each side. Each doubling costs
         1 of a part, 1/4 of a setting of the drive, 4 of the speed (`steadyslip.verdict.change_costs`), unless a cost
         is given.
+    unknown : mapping of str to (float, float), optional
+        Least and largest value of parameters that are not known, SI units; by default those of `tolerances`. The chance
+        is to be reached at all values: five of each interval are tried, of more than two parameters the ends.
 
     Returns
     -------
@@ -191,7 +200,9 @@ def cure(
     contact.preload   5 MPa now; up to 1.548 MPa
     """
     wanted = _share(sure)
-    chances = chances_of(rig, tolerances or {})
+    unknown = unknown or (tolerances.unknown if isinstance(tolerances, Tolerances) else {})
+    within = stable_within(rig, unknown).each if unknown else ()
+    chances = chances_of(rig, tolerances or {}, {one.parameter: (one.low, one.high) for one in within})
     own = adjust or (tolerances.adjust if isinstance(tolerances, Tolerances) else {}) or default_adjust(rig)
     given = {rig.resolve(name): one for name, one in own.items()}
     if not given:
@@ -204,7 +215,7 @@ def cure(
         least = min((one.cost for one in windows), default=math.inf)
         pair, cost = _cheapest_pair(chances, windows, given, wanted, least)
     fails = _fails(chances, windows, wanted) if chance >= wanted else ()
-    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, chances.single)
+    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, chances.single, within)
 
 
 def _share(sure: float | str) -> float:

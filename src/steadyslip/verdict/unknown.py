@@ -21,6 +21,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
+from steadyslip.verdict.chances import spread_over
 
 VALUES = 129  # of each interval, between which changes are looked for; a window narrower than 1 % of it may be missed
 HALVINGS = 40  # of the spacing, around each change: far below the digits told
@@ -57,8 +58,13 @@ class ValuesWithin(Displayed):
         whole = format_quantity(value * self.load, PER_LOAD[self.unit])
         return f"{text} ({whole} at {format_quantity(self.load, 'N')})"
 
+    @property
+    def given(self) -> str:
+        """The interval in words."""
+        return f"{self.shown(self.low)} to {self.shown(self.high)}"
+
     def __str__(self) -> str:
-        given = f"{self.shown(self.low)} to {self.shown(self.high)}"
+        given = self.given
         if not self.values:
             return f"{self.parameter}: stable nowhere in {given}"
         if self.values == ((self.low, self.high),):
@@ -154,16 +160,9 @@ def stable_within(rig: Slider | Machine, intervals: Mapping[str, tuple[float, fl
         for end in ends:
             rig.with_values({name: end})
     even = qmc.Sobol(len(ranges), scramble=True, rng=np.random.default_rng(0)).random_base2(LOG2_RIGS)
-    varied = {name: _spread(*ends, even[:, i]) for i, (name, ends) in enumerate(ranges.items())}
+    varied = {name: spread_over(*ends, even[:, i]) for i, (name, ends) in enumerate(ranges.items())}
     each = tuple(_values(rig, name, *ends) for name, ends in ranges.items())
     return StableWithin(rig, each, _is_stable(rig, varied))
-
-
-def _spread(low: float, high: float, share: Array) -> Array:
-    """Values at shares of an interval, on a log scale where both ends are positive."""
-    if low > 0:
-        return np.asarray(np.clip(low * (high / low) ** share, low, high))
-    return np.asarray(low + (high - low) * share)
 
 
 def _is_stable(rig: Slider | Machine, varied: Mapping[str, Array]) -> Array:
@@ -172,14 +171,14 @@ def _is_stable(rig: Slider | Machine, varied: Mapping[str, Array]) -> Array:
 
 def _values(rig: Slider | Machine, name: str, low: float, high: float) -> ValuesWithin:
     share = np.linspace(0.0, 1.0, VALUES)
-    found = _is_stable(rig, {name: _spread(low, high, share)})
+    found = _is_stable(rig, {name: spread_over(low, high, share)})
     at = np.flatnonzero(found[1:] != found[:-1])
     left, right, first = share[at], share[at + 1], found[at]
     for _ in range(HALVINGS if len(at) else 0):
         middle = (left + right) / 2
-        same = _is_stable(rig, {name: _spread(low, high, middle)}) == first
+        same = _is_stable(rig, {name: spread_over(low, high, middle)}) == first
         left, right = np.where(same, middle, left), np.where(same, right, middle)
-    ends = [low, *_spread(low, high, (left + right) / 2).tolist(), high]
+    ends = [low, *spread_over(low, high, (left + right) / 2).tolist(), high]
     parts = tuple((a, b) for i, (a, b) in enumerate(pairwise(ends)) if bool(found[0]) != bool(i % 2))
     return ValuesWithin(name, rig.parameters()[name].role.unit, low, high, parts, _load(rig))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
@@ -21,6 +21,7 @@ from steadyslip.core.tolerances import Tolerance, read_tolerance
 from steadyslip.files.specifications.layout import nested_keys
 from steadyslip.files.specifications.read import read_whole
 from steadyslip.files.specifications.toml import Table
+from steadyslip.files.specifications.unknowns import intervals_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
@@ -56,11 +57,14 @@ class Tolerances(Displayed):
         Coefficients of correlation of two parameters each.
     adjust : dict of str to Adjustment
         Empty without a table ``[adjust]``.
+    unknown : dict of str to (float, float)
+        Intervals of the table ``[unknown]``, SI units.
     """
 
     values: Mapping[str, Tolerance] = field(default_factory=dict)
     correlations: tuple[tuple[str, str, float], ...] = ()
     adjust: Mapping[str, Adjustment] = field(default_factory=dict)
+    unknown: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """True if any parameter has a tolerance."""
@@ -99,6 +103,7 @@ def read_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -> T
 
 def rig_and_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -> tuple[Slider | Machine, Tolerances]:
     """Rig and tolerances of a rig file; see `read_tolerances`."""
+    changes = list(changes)
     contents = read_whole(path, changes)
     rig = contents.rig
     if rig is None:  # a faulty or absent rig
@@ -107,7 +112,7 @@ def rig_and_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -
     reader = _Reader(rig, contents.tables)
     found = Tolerances(reader.values(contents.tolerances), reader.correlations(), reader.adjust())
     contents.refuse(*reader.problems)
-    return rig, found
+    return rig, replace(found, unknown=intervals_of(rig, path, changes))
 
 
 class _Reader:

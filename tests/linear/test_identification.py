@@ -38,7 +38,7 @@ def test_the_reed_from_exact_responses():
     mass, _, stiffness = reed_matrices()
     omega = np.sqrt(la.eigvalsh(stiffness, mass)[:4])
     np.testing.assert_allclose(found.modes.frequency[:4], omega / (2 * np.pi), rtol=1e-9)
-    np.testing.assert_allclose(found.modes.damping[:4], (1 + 2e-6 * omega**2) / (2 * omega), rtol=1e-8)
+    np.testing.assert_allclose(found.modes.damping_ratio[:4], (1 + 2e-6 * omega**2) / (2 * omega), rtol=1e-8)
     root, _ = found.root_near(complex(10, 4560))
     assert abs(root - (12.4673358145 + 4565.039870161j)) < 1e-9 * abs(root)
     roots = found.roots()
@@ -97,7 +97,7 @@ def scores_of(chance, count):
             )
         ]
         damped = (poles.imag / own)[np.argsort(own)]
-        scores += [*((found.damping[found.inside] - damped) / found.damping_error[found.inside])]
+        scores += [*((found.damping_ratio[found.inside] - damped) / found.damping_ratio_error[found.inside])]
     return np.array(scores)
 
 

@@ -20,7 +20,24 @@ RIG = rig(friction=rate_state(evolution=ss.laws.Aging()), radiation_damping=1e5,
 FIRM = RIG.with_values({"stiffness": 5e10})
 OVER, FREE = {"stiffness": ss.maps.Grid(1e9, 5e10, 3)}, ("a", "b", "d_c")
 TRAJECTORIES = {"KickMargin", "Threshold"}  # whose kinds need many of them
+
+
+def measured():
+    """A machine with one measured mode."""
+    omega = np.linspace(1, 60, 400)
+    tip = 1 / (900 - omega**2 + 1j * omega)
+    response = ss.machine.ResponseData(omega, tip[:, None, None], 0 * tip.real[:, None, None], ("tip.x",))
+    law = ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.5, v_ref=0.01)
+    contact = ss.laws.ConstantNormalStress(preload=1e3)
+    return ss.machine.Machine(
+        bodies={"s": ss.machine.StructureBody(response=response)},
+        contacts={"c": ss.machine.Surface(body="drive", against="s.tip", contact=contact, friction=law)},
+        drive=ss.machine.Pull(velocity=0.01),
+    )
+
+
 QUICK = {
+    "IdentifiedModes": lambda: ss.linear.identified_modes(measured()),
     "Analysis": lambda: ss.analyze(RIG), "SteadySliding": lambda: made("Analysis").steady,
     "Margin": lambda: made("Analysis").margins[0], "Onset": lambda: made("Analysis").onset,
     "Boundary": lambda: made("Margin").edge, "Response": lambda: ss.small_signal(RIG),

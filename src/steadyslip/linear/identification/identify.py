@@ -42,7 +42,7 @@ class IdentifiedModes(Displayed):
     ----------
     frequency, frequency_error : ndarray (k,)
         Natural frequencies |p|/2π (Hz), rising, and their standard errors.
-    damping, damping_error : ndarray (k,)
+    damping_ratio, damping_ratio_error : ndarray (k,)
         Damping ratios, and their standard errors.
     shape, shape_error : ndarray (k, d)
         Complex shapes at the directions `names`, scaled to a modal mass of 1 kg, and standard errors of their moduli.
@@ -60,8 +60,8 @@ class IdentifiedModes(Displayed):
 
     frequency: Array
     frequency_error: Array
-    damping: Array
-    damping_error: Array
+    damping_ratio: Array
+    damping_ratio_error: Array
     shape: ComplexArray
     shape_error: Array
     names: tuple[str, ...]
@@ -75,7 +75,7 @@ class IdentifiedModes(Displayed):
         for i in np.flatnonzero(self.inside):
             lines.append(
                 f"{self.frequency[i]:12.6g} ± {self.frequency_error[i]:.2g} Hz   "
-                f"damping ratio {self.damping[i]:.4g} ± {self.damping_error[i]:.2g}"
+                f"damping ratio {self.damping_ratio[i]:.4g} ± {self.damping_ratio_error[i]:.2g}"
             )
         return "\n".join(lines)
 
@@ -119,7 +119,7 @@ def identified_modes(machine: Machine) -> IdentifiedModes:
     ...     bodies={"s": body}, contacts={"c": surface}, drive=ss.machine.Pull(velocity=0.01)
     ... )
     >>> found = ss.linear.identified_modes(machine)
-    >>> (2 * np.pi * found.frequency).round(6), found.damping.round(6)
+    >>> (2 * np.pi * found.frequency).round(6), found.damping_ratio.round(6)
     (array([30.]), array([0.016667]))
     """
     if not has_response(machine):
@@ -168,7 +168,7 @@ def _result(data: ResponseData, total: ModalSum, covariance: Array, misfit: floa
         errors[k] = np.sqrt(np.maximum(np.diag(slopes @ covariance[own, own] @ slopes.T), 0))
     return IdentifiedModes(
         frequency=modulus / (2 * np.pi), frequency_error=errors[:, 0] / (2 * np.pi),
-        damping=-poles.real / modulus, damping_error=errors[:, 1], shape=shape, shape_error=errors[:, 2:],
+        damping_ratio=-poles.real / modulus, damping_ratio_error=errors[:, 1], shape=shape, shape_error=errors[:, 2:],
         names=data.names, inside=poles.imag <= data.omega[-1], misfit=misfit, total=total, covariance=covariance,
     )  # fmt: skip
 

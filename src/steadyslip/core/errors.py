@@ -187,6 +187,11 @@ _LETTERS = str.maketrans(
 )  # fmt: skip
 
 
+def _letters(word: str) -> str:
+    """Last part of a dotted name without case and marks: ``dc`` of ``friction.d_c`` as of ``Dc``."""
+    return word.rpartition(".")[2].replace("_", "").replace("-", "").lower()
+
+
 def named_in(name: str, texts: Mapping[str, str]) -> list[str]:
     """Keys of the texts that have a word or a letter, such as ``mu_s`` for μ_S or ``ratio`` for a gear ratio.
 
@@ -208,7 +213,8 @@ def unknown_name(
     """
     allowed, taken = list(allowed), set(taken)
     free = [one for one in allowed if one not in taken]
-    meant = [one for one in named_in(str(name), meanings or {}) if one in free]
+    meant = [one for one in allowed if _letters(one) == _letters(str(name))]
+    meant = meant or [one for one in named_in(str(name), meanings or {}) if one in free]
     close = meant if len(meant) == 1 else get_close_matches(str(name), free, n=1, cutoff=0.5)
     close = close or get_close_matches(str(name), taken.intersection(allowed), n=1, cutoff=0.75)
     close = close if guess else []

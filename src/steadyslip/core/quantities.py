@@ -30,7 +30,15 @@ PER_LOAD = ("1", "1/m", "s/m")
 _COMMA = re.compile(r",(\d+)", re.A)
 _QUOTIENT = re.compile(r"/\s*(\d+\.?\d*)", re.A)
 _RATIO = re.compile(r":\s*(\d+\.?\d*)", re.A)
+_EXAMPLE = re.compile(r"(?<=['\"])[\d.eE+-]+(?= )")
+"""Number of an example in quotes."""
+_BETWEEN_DIGITS = re.compile(r"(?<=\d),(?=\d)", re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
+
+
+def decimal_comma(text: str) -> QuantityError:
+    """Error for a text in which numbers have decimal commas, with the text as it is to be written."""
+    return QuantityError(f"{text!r} has a decimal comma: write {_BETWEEN_DIGITS.sub('.', text)}")
 
 
 def parse(text: str, expected: str, instance: str = "") -> float:
@@ -61,8 +69,8 @@ def parse(text: str, expected: str, instance: str = "") -> float:
     if match is None:
         raise QuantityError(f"{repr_short(text)} is not {described(expected)}; write for example {shown}")
     digits, name = match.group(), cleaned[match.end() :].strip()
-    if comma := _COMMA.match(name):
-        raise QuantityError(f"{text!r} has a decimal comma: write {digits}.{comma[1]}")
+    if _COMMA.match(name):
+        raise decimal_comma(text)
     _, wanted = unit(expected)
     divisor = _QUOTIENT.fullmatch(name)
     if divisor and wanted == Dimension() and float(divisor[1]) > 0:  # a gear ratio, 1/360
@@ -72,7 +80,8 @@ def parse(text: str, expected: str, instance: str = "") -> float:
         raise QuantityError(message)
     if not name:
         if wanted != Dimension():
-            raise QuantityError(f"{text!r} has no unit; write for example {shown}")
+            own = f"0{digits}" if digits.startswith(".") else digits
+            raise QuantityError(f"{text!r} has no unit; write for example {_EXAMPLE.sub(own, shown, 1)}")
         return _scaled(digits, 1.0)
     try:
         if name == "1":

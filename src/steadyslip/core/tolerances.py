@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from steadyslip.core.errors import QuantityError, repr_short
+from steadyslip.core.quantities import decimal_comma
 
 NORMAL = "(normal)"
 EXAMPLES = "'12 ± 20 % N/um', '12 +5 % -1 % N/um', '12 ± 2 N/um (normal)' or '10..14 N/um'"
@@ -63,6 +64,8 @@ def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
     plain = re.sub(r"\+/?-", "±", text).strip()
     normal = NORMAL in plain
     plain = " ".join(plain.replace(NORMAL, " ", 1).split())
+    if re.search(r"\d,\d", plain) and (_MARK.search(plain) or normal):
+        raise decimal_comma(text)
     if found := _RANGE.fullmatch(plain):
         return _range(found, text, normal)
     if found := _SAME.fullmatch(plain):

@@ -24,6 +24,7 @@ _COMMA = re.compile(r"^[^#\"'\n=]+=[ \t]*+([-+]?\d++),(\d++)[ \t]*+(?:#.*)?$", r
 _SLIPS = (
     (re.compile(r"\s*(?://|;|--|%)"), "a comment begins with #"),
     (re.compile(r"\s*[\w.-]+\s*:"), "write KEY = VALUE"),
+    (re.compile(r"[^\"'#]*=\s*[-+]?\.\d"), "a number begins with a digit, as in 0.8"),
     (
         re.compile(r"[^\"'#]*=\s*[-+]?[.\d]+\s*[^\W\d_°%]"),
         "a number with a unit stands in quotes, as in velocity = '20 um/s'",

@@ -9,6 +9,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.linear.identification.partial_fractions import ModalSum
@@ -80,6 +81,7 @@ class IdentifiedModes(Displayed):
         return "\n".join(lines)
 
 
+@checked()
 def identified_modes(machine: Machine) -> IdentifiedModes:
     """Modes of the structure of a machine, from its measured response.
 

@@ -135,6 +135,37 @@ def test_a_stiffness_without_a_unit_is_asked_about():
     ss.rig_from_text(AXIS.replace('"12 ± 20 % N/um"', "12e6"))
 
 
+ROCK = (Path(__file__).parents[2] / "examples/inclined-spring.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "answer"),
+    [
+        (
+            r"d_c = .*",
+            "d_c = 12",
+            "friction.d_c = 12 is read as 12 m; the largest measured are some 100 mm: write the unit",
+        ),
+        (
+            r"\nb = .*",
+            "\nb = 1.6",
+            "friction.b = 1.6 is read as 1.6; the largest measured are some 0.05: a number in per",
+        ),
+        (
+            r"alpha = [\d.]*",
+            "alpha = 56",
+            "friction.normal_memory.alpha = 56 is read as 56; the largest measured are some 0.6",
+        ),
+    ],
+)
+def test_friction_far_above_all_that_was_measured_is_asked_about(right, wrong, answer):
+    mistaken, count = re.subn(right, wrong, ROCK, count=1)
+    assert count == 1
+    with pytest.warns(UnitWarning, match=re.escape(answer)):
+        ss.rig_from_text(mistaken)
+    ss.rig_from_text(ROCK)
+
+
 def test_advice_is_given_once():
     """Of a file without an area each force has the same: its first line has the advice, all have their fault."""
     with pytest.raises(ss.RigFileError) as raised:

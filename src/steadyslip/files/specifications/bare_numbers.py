@@ -15,17 +15,20 @@ from steadyslip.machine.rig import Rig
 
 SPEEDS = ("m/s", "rad/s")
 STIFFNESSES = ("N/m", "Pa/m")
-QUESTIONED = (*SPEEDS, *STIFFNESSES)
 STRETCHED = 1.0  # m: what friction stretches the softest of real axes and presses by is some 10 mm
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
+LARGEST = {"direct effect": 0.05, "evolution effect": 0.05, "slip distance": 0.1, "stress share": 0.6}
+"""Largest measured values of friction parameters, by kind, SI units."""
+ABOVE = (5.0, 1e4)  # factors above these between which another unit or per cent may be meant
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
 
 def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iterable[str]) -> None:
     """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
 
-    Also of stiffnesses without a unit that friction would stretch far, and of values that a friction law doubts.
+    Also of stiffnesses without a unit that friction would stretch far, of friction parameters far above all measured,
+    and of values that a friction law doubts.
 
     Parameters
     ----------
@@ -33,10 +36,11 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
     read : mapping of str to (object, str)
         Names of the values read, each as it was written and with its SI unit.
     written : iterable of str
-        Units that stand in the file. Where all are SI's own, as programs write them, stiffnesses are not asked about.
+        Units that stand in the file. Where all are SI's own, as programs write them, only speeds are asked about.
     """
-    soft = () if all(unit(name)[0] == 1.0 for name in written) else _soft(rig, read)
-    for text in (*_questions(rig, read), *soft, *_doubts(rig)):
+    by_programs = all(unit(name)[0] == 1.0 for name in written)
+    typed = () if by_programs else (*_soft(rig, read), *_large(rig, read))
+    for text in (*_questions(rig, read), *typed, *_doubts(rig)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -79,6 +83,17 @@ def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
             f"{name} = {raw:g} has no unit and is read as {raw:g} {unit_name}, which the load of the contact alone, "
             f"{format_quantity(presses, 'N')}, would stretch by {stretch}: write the unit that is meant"
         )
+
+
+def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    """Questions about friction parameters without a unit that are far above `LARGEST`."""
+    for name, one in rig.parameters().items():
+        raw, si = read.get(name, (None, ""))
+        most = LARGEST.get(one.role.kind, math.inf)
+        if isinstance(raw, (int, float)) and ABOVE[0] * most < raw < ABOVE[1] * most:
+            was, largest = (format_quantity(value, si) for value in (float(raw), most))
+            remedy = "a number in per cent is written as a share" if si == "1" else "write the unit that is meant"
+            yield f"{name} = {raw:g} is read as {was}; the largest measured are some {largest}: {remedy}"
 
 
 def _fits_better(number: float, texts: Sequence[str], si: str) -> bool:

@@ -14,7 +14,6 @@ from steadyslip.core.errors import ParameterError, Problem, legible, repr_short,
 from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
-from steadyslip.files.specifications.bare_numbers import QUESTIONED
 from steadyslip.files.specifications.layout import (
     Section,
     find_law,
@@ -42,7 +41,7 @@ class TableReader:
         self.sections: tuple[Section, ...] = ()
         """Tables of the file, where hints look for a key in the wrong one."""
         self.questioned: dict[str, tuple[Any, str]] = {}
-        """Speeds that were read: as written, and their SI unit."""
+        """Parameters that were read: as written, and their SI unit."""
         self.twisted = False
         """True while a torque is read in place of a force."""
 
@@ -224,7 +223,7 @@ class TableReader:
         except ParameterError as error:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
-        if isinstance(role, Parameter) and role.unit in QUESTIONED:
+        if isinstance(role, Parameter):
             self.questioned.setdefault(name, (raw, role.unit))
         if ratio == 1.0 or value is None:
             return value

@@ -194,10 +194,10 @@ def cure(
     its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"
     cheapest single change: slider.damping from 0 Pa s/m to 57.53 GPa s/m, cost 1
     no pair is cheaper
-    drive.velocity    1 um/s now; not reached from 1 nm/s to 1 mm/s
     slider.stiffness  9 GPa/m now; from 29.07 GPa/m up
     slider.damping    0 Pa s/m now; from 57.53 GPa s/m up
     contact.preload   5 MPa now; up to 1.548 MPa
+    drive.velocity    1 um/s now; not reached from 1 nm/s to 1 mm/s
     """
     wanted = _share(sure)
     unknown = unknown or (tolerances.unknown if isinstance(tolerances, Tolerances) else {})

@@ -9,7 +9,13 @@ from steadyslip.laws.friction.rate_state import RateState
 USUAL = RateState.name
 """Default friction law of rig files."""
 
+
+def weakest(share: float) -> FrictionLaw:
+    """Friction of a constant, usually tiny, share of the normal stress: for loops without any."""
+    return Coulomb(mu_coulomb=share)
+
+
 __all__ = [
     "PRZ", "USUAL", "Aging", "Coulomb", "CoulombStribeck", "Evolution", "FrictionLaw", "LinkerDieterich", "LuGre",
-    "Nagata", "NoMemory", "NormalMemory", "PrakashClifton", "RateState", "Slip", "State",
+    "Nagata", "NoMemory", "NormalMemory", "PrakashClifton", "RateState", "Slip", "State", "weakest",
 ]  # fmt: skip

@@ -20,7 +20,7 @@ import numpy as np
 from steadyslip.core.errors import IllPosedWarning, NotAvailable, ParameterError, UndecidedWarning
 from steadyslip.core.format import format_quantity
 from steadyslip.kernels.driver.holding import wanted_force
-from steadyslip.laws.friction import Coulomb
+from steadyslip.laws.friction import weakest
 from steadyslip.linear import eigenvalues, stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import Limits
@@ -90,7 +90,7 @@ def growing_root(rig: Slider | Machine) -> complex | None:
 
 def without_friction(rig: Slider | Machine) -> Any:
     """The rig with a friction force far below rounding."""
-    law = Coulomb(mu_coulomb=NOTHING)
+    law = weakest(NOTHING)
     if isinstance(rig, Slider):
         return replace(rig, friction=law)
     return replace(rig, contacts={name: replace(one, friction=law) for name, one in rig.contacts.items()})
@@ -177,7 +177,8 @@ def _moves(rig: Slider | Machine, root: complex) -> Iterator[_Move]:
     known = {name: one.value for name, one in rig.parameters().items() if name.startswith("drive.")}
     for name, value in known.items():
         own = float(value or 0.0)
-        if name == "drive.kd" and not own and (gain := known.get("drive.kp")):
+        path, _, last = name.rpartition(".")
+        if last == "kd" and not own and (gain := known.get(f"{path}.kp")):
             own = FROM_ZERO * float(gain) / abs(root)
         if name == "drive.velocity" or not own:
             continue

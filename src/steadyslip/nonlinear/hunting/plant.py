@@ -7,7 +7,7 @@ target and its velocity, the force of a sampled controller, the memory of the co
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.laws.contact import Transmitted
+from steadyslip.laws.contact import ContactInputs, ContactLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Limits, Mechanism
 from steadyslip.machine.slider import Slider
@@ -219,9 +219,8 @@ def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldC
     label = f"contacts.{port.name}." if port.name else ""
     law, contact = port.friction, port.contact
     time = sp.Symbol("t")
-    load, slow = contact.load(), law.slow_velocity()
-    follows = port.separation or contact.memory() or not contact.is_imposed() or contact.imposed(time) != 0
-    if follows and not isinstance(contact, Transmitted):
+    load, slow, shares = contact.load(), law.slow_velocity(), _pull_shares(contact)
+    if port.separation or contact.memory() or contact.imposed(time) != 0 or shares is None:
         raise NotAvailable(
             f"{label}contact: the law {contact.name!r} lets the normal force change with the motion, and hunting takes "
             "'constant' with the preload that presses where the axis is held, or 'transmitted'"
@@ -230,9 +229,7 @@ def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldC
         raise NotAvailable(NOT_AT_REST.format(label, law.name))
     sigma = float((contact.steady_stress() if load is None else load) or 0.0)
     row, belt = _row(port.slip, names), -float(port.slip.get(LOAD_POINT, 0))
-    loads: tuple[Load, ...] = ()
-    if isinstance(contact, Transmitted):
-        loads = (_load(mechanism, port, contact, names),)
+    loads: tuple[Load, ...] = (_load(mechanism, port, shares, names),) if any(shares) else ()
     if law.memory() and slow is not None:
         return HeldContact(row, belt, 0.0, 0.0, 0.0, port, sigma, float(slow), loads)
     v = sp.Symbol("v", positive=True)
@@ -255,7 +252,18 @@ def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldC
 NOT_AT_REST = "{}friction: the law {!r} is not offered at rest; allowed: coulomb, lugre"
 
 
-def _load(mechanism: Mechanism, port: ContactPort, contact: Transmitted, names: list[str]) -> Load:
+def _pull_shares(contact: ContactLaw) -> tuple[float, float] | None:
+    """Shares of T > 0, and of −T where T < 0, that press a contact besides its preload; None of other laws."""
+    letters: dict[str, Any] = {one.name: sp.Symbol(one.name) for one in fields(ContactInputs)}
+    pull = sp.Symbol("pull", real=True)
+    coupling = sp.sympify(contact.coupling(ContactInputs(**letters | {"spring": pull})))
+    if coupling.free_symbols - {pull}:
+        return None
+    forward, back, twice = (float(coupling.subs(pull, value)) for value in (1, -1, 2))
+    return (forward, back) if min(forward, back) >= 0 and twice == 2 * forward else None
+
+
+def _load(mechanism: Mechanism, port: ContactPort, shares: tuple[float, float], names: list[str]) -> Load:
     """Pull T of a contact as `steadyslip.model.forces` defines it."""
     body, pulling = next(name for name in port.slip if name != LOAD_POINT), mechanism.pulling(port)
     if port.loaded_by:
@@ -270,8 +278,7 @@ def _load(mechanism: Mechanism, port: ContactPort, contact: Transmitted, names: 
             senses = _row(one.senses, names, True)
             places -= share * float(one.stiffness or 0) * senses
             speeds -= share * float(one.damping or 0) * senses
-    back = contact.transmitted if contact.transmitted_back is None else contact.transmitted_back
-    return Load(places, speeds, controller, float(contact.transmitted), float(back))
+    return Load(places, speeds, controller, *shares)
 
 
 def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:

@@ -185,7 +185,10 @@ def named(family: type[FrozenRecord], doc: str, *, listed: bool = False) -> Any:
 
 
 def setting(role: Entry, *, default: Any = MISSING, key: str = "") -> Any:
-    """Declare a field with any other role; ``key`` is its name in files if that is a Python keyword."""
+    """Declare a field whose role is given as an `Entry`, where no function above fits.
+
+    ``key`` is its name in files if that is a Python keyword.
+    """
     return field(default=default, metadata={_ROLE: role, _KEY: key})
 
 

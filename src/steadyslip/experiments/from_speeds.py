@@ -115,7 +115,14 @@ def fit_friction_table(
     if loop is not None:
         measured = read_loop(loop)
         if measured.turns != read.turns:
-            raise ParameterError([Problem("loop", "turns where the table slides, or the other way round")])
+            raise ParameterError(
+                [
+                    Problem(
+                        "loop",
+                        "of a rotation where the table is of sliding, or the reverse; give both of the same motion",
+                    )
+                ]
+            )
         bristles = fit_loop(measured)
     return SpeedFit(read, law, sides.get(True), sides.get(False), bristles, errors == "relative")
 

@@ -217,7 +217,7 @@ class Search:
             if len(at) > _CHANGES:
                 at = at[(kind[at + 1] - kind[at]) % _BESIDE != 0]
             at = at[~_within(low, x[at], x[at + 1])]
-            if not 0 < at.size <= most:  # more beside the changes than there were: rounding decides them
+            if not 0 < at.size <= most:  # refining found more changes than before: these are rounding
                 break
             most = max(at.size, _MORE)
             lower, upper = self._narrowed(x[at], x[at + 1], kind[at], kind[at + 1])

@@ -46,7 +46,7 @@ def parts_anyway(run: History, finer: History, closer: History) -> bool:
 
 
 def _alike(run: History, other: History) -> int:
-    """How many slip events from the first on are known within the tolerance."""
+    """Number of leading slip events that agree in both runs within `LATE_TOLERANCE`."""
     count = 0
     for one, two in zip(run.slip_events, other.slip_events, strict=False):
         if max(float(_apart(getattr(one, name), getattr(two, name))) for name in NAMES) > LATE_TOLERANCE:

@@ -126,7 +126,7 @@ def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
     at: str | None = None, up_to: float | None = None,
 ) -> Thresholds:  # fmt: skip
-    """`thresholds_shown` for the rig of a file; for the usual kicks unless some are given."""
+    """Thresholds of the rig of a file, for the named kicks, or the usual ones if none is named."""
     rig = read_rig(path, changes)
     usual = tuple(name for name, kick in kicks_of(rig).items() if kick.usual)
     options = {"at": at, "direction": -1 if reverse else 1, "reference": reference, "up_to": up_to}

@@ -54,7 +54,7 @@ class Tried:
         if self.then.hunts is False and not self.then.runs_away:
             return "ends it" if self.reach <= allowed else "no cure: it rests, but farther off than that"
         if self.then.hunts and self.reach < allowed:
-            return "no cure: it still hunts, less far"
+            return "no cure: it still hunts, with a smaller amplitude"
         return "no cure"
 
 

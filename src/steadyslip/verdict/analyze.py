@@ -201,7 +201,7 @@ def _judged_by_response(rig: Any, kicks: Sequence[str]) -> Analysis:
 
 
 def _leading_mode(rig: Machine, linear: _Linear) -> tuple[dict[str, Any], tuple[Check, ...]]:
-    """Fields on the leading mode, and the check of why it grows; a reason that fails is left out."""
+    """Fields `mode` and `origin` of the verdict, and the check of `origin`, which is None if that fails."""
     known = linear.numbers["growth_rate"] not in (math.inf, None)
     first = next(iter(linear.numbers.get("eigenvalues", ()) if known else ()), None)
     if first is None:

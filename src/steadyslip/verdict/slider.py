@@ -100,7 +100,7 @@ def _stress(analysis: Findings, value: float) -> str:
 
 
 def _pull(rig: Slider) -> list[tuple[str, str]]:
-    """Row (label, text) on what T, the force that presses a contact, contains; none if the spring alone."""
+    """Row (label, text) naming what the pull T includes; empty if T is the force of the spring alone."""
     control = [rig.drive.proportional(), rig.drive.dashpot(), rig.drive.integral()]
     inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
     pulling = [f"the {name}" for name, there in inside.items() if there]

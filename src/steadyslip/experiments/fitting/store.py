@@ -64,7 +64,7 @@ F = TypeVar("F", bound=Fitted)
 
 
 def result_variables(fit: Fitted, samples: Sequence[str]) -> dict[str, Any]:
-    """Variables of any fit: estimates, and model and noise of each series, whose samples have these dimensions."""
+    """Variables that the files of all fits have; `samples` names the dimension of each series."""
     variables: dict[str, Any] = {
         "coordinates": ("parameter", fit.coordinates, {"long_name": "place of the minimum, logarithms where positive"}),
         "value": ("parameter", np.array(list(fit.values.values())), {}),

@@ -10,7 +10,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
 GAP = 10.0  # ratio to the usual spacing from which an interval is noted as a gap; chosen by trial
-RESTART = 0.02  # share of rows in a row with times before the latest one from which the clock has restarted; by trial
+RESTART = 0.02  # the clock restarted if more than this share of consecutive rows has times before the latest; by trial
 COARSE, EVEN = 0.6, 1.25  # share of distinct times below which a clock may be coarse; deviation of even rows, in ticks
 AROUND = 25  # rows on each side whose mean spacing is the usual one; chosen by trial
 LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay within floating point

@@ -316,7 +316,7 @@ class Whiteness:
 
 
 def whiteness(residuals: Iterable[Array]) -> Whiteness:
-    """Test the residuals (n,) of each record."""
+    """Whiteness of the residuals (n,) of all records: portmanteau statistic and its degrees of freedom."""
     statistic, degrees = 0.0, 0
     for own in residuals:
         lags = min(LAGS, len(own) // 10)

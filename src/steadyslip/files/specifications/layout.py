@@ -45,7 +45,7 @@ PROTOCOL = Section("protocol", Protocol)
 """Table for protocols, which a rig file may have besides those of the rig."""
 
 UNKNOWN = "unknown"
-"""Name of the table of intervals of what is not known, which others ignore."""
+"""Name of the table of intervals of unknown parameters; readers of the rig ignore it."""
 UNKNOWN_SCHEMA = {
     "type": "object",
     "description": "intervals of parameters that are not known, by dotted name: two numbers, or texts with units",

@@ -241,7 +241,7 @@ class Motion:
             worst = max(excess, key=excess.__getitem__, default=None)
             if worst is None or excess[worst] <= BEYOND:
                 return
-            self._stop(worst)  # from rounding
+            self._stop(worst)  # its slip rate is zero only to within rounding
             self.mode = self.mode.switched(Switch("contact", worst, 1 if forces[worst] > 0 else -1))
             self.fresh |= {("contact", worst)}
 

@@ -113,7 +113,7 @@ def _cut(record: MotionRecord, share: float, begin: float) -> MotionRecord:
 def find_near(
     plan: MachinePlan, starts: int, effort: Effort, progress: Progress | None
 ) -> tuple[Array, SearchSummary, MachineComparison]:
-    """Coordinates (p,) of the least sum of squares, how it was reached, and the comparison.
+    """Best-fit coordinates (p,), the summary of the search, and the comparison with the records.
 
     The first start is the machine itself. More follow, up to `starts`, until `MIN_ARRIVED` end at the best minimum.
 

@@ -9,21 +9,19 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.pages import Displayed
-from steadyslip.core.questions import question
 from steadyslip.laws.contact import ContactInputs
 from steadyslip.linear.pencil import matrix_function
 from steadyslip.linear.roots import ComplexArray
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, ContactPort, Mechanism
-from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
 from steadyslip.model.numeric.machine_point import MachinePoint
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import delays_of
+from steadyslip.model.start import coordinate_speeds
 
 WORDS = {
     "oscillate": "oscillates|oscillate", "drift": "drifts|drift", "still": "hardly moves|hardly move",
@@ -165,7 +163,7 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     if not np.all(np.isfinite(shape)):
         raise NotAvailable("the shape of this mode leaves the range of floating point")
     places = dict(zip((one.name for one in model.coordinates), shape, strict=False))
-    speeds = [float(x) for x in point.evaluate(_speed_function(model))]
+    speeds = [float(x) for x in point.evaluate(coordinate_speeds(model))]
     drive = float(point.drive)
     scaled = {
         one.name: places[one.name] * (drive / speed if speed else 1.0)
@@ -272,8 +270,3 @@ def _stiffness_of(touch: ContactPort) -> Any:
     at_rest = ContactInputs(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     apart = replace(at_rest, separation=1.0)
     return touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart)
-
-
-@question
-def _speed_function(model: Model) -> ArrayFunction:
-    return model.function(one.speed for one in model.coordinates)

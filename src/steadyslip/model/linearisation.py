@@ -236,13 +236,12 @@ def characteristic_rows(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> dict[
 
 
 @question
-def stiffness_split(model: Model, name: str = "slider.stiffness") -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
+def stiffness_split(model: Model) -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
     """Split the characteristic polynomial into p(s) + k q(s); coefficients of p and q, lowest power first.
 
-    Exact, because k enters by a rank-one term; `name` may be another parameter that enters linearly (a controller's
-    gain).
+    Exact, because the slider's stiffness k enters by a rank-one term.
     """
-    symbol = model.parameters[name]
+    symbol = model.parameters["slider.stiffness"]
     coefficients = characteristic_coefficients(model)
     without = tuple(c.xreplace({symbol: sp.Integer(0)}) for c in coefficients)
     slope = tuple(derivative(c, symbol) for c in coefficients)

@@ -67,7 +67,8 @@ def _steady_states(model: Model) -> ArrayFunction:
 
 
 @question
-def _steady_speeds(model: Model) -> ArrayFunction:
+def coordinate_speeds(model: Model) -> ArrayFunction:
+    """Array function of the velocities of the coordinates in steady sliding."""
     return model.function(one.speed for one in model.coordinates)
 
 
@@ -135,7 +136,7 @@ def _initial_values(
     own = [(item.name.removesuffix("x"), item) for item in model.variables if item.kind == "slip"]
     places = [_number(start.get(item.name, 0.0)) for _, item in own]
     alone = f"{own[0][0]}v"
-    steady = point.evaluate(_steady_speeds(model))
+    steady = point.evaluate(coordinate_speeds(model))
     speeds = [_number(start.get(f"{name}v", speed)) for (name, _), speed in zip(own, steady, strict=True)]
     slips = point.evaluate(_slip_rates(model), *speeds)
     for i, (slip, sliding) in enumerate(zip(slips, reduction.slidings, strict=True)):

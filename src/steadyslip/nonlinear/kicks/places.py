@@ -17,7 +17,9 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.scales import natural_scales
+from steadyslip.model.start import coordinate_speeds
 from steadyslip.motion.jobs import Jobs
+from steadyslip.motion.single import areas as areas_of
 from steadyslip.motion.status import THROUGH_DASHPOT
 from steadyslip.nonlinear.kicks.rest import Rest
 
@@ -61,7 +63,7 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
         return *found[kick], drive
     if kick == "normal-force":
         index = [one.name for one in model.contacts].index(at)
-        area = np.asarray(point.evaluate(_areas(model))[index], dtype=float)
+        area = np.asarray(point.evaluate(areas_of(model))[index], dtype=float)
         return "N", area * np.asarray(point.sigmas[index], dtype=float), none
     if not at:
         unit = model.roles["drive.velocity"].unit
@@ -88,7 +90,7 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
 def _force(point: OperatingPoint, model: Model, at: str) -> Array:
     """Largest steady normal force (N) as felt at a body, through the lever at which contacts rub."""
     numbers = [np.asarray(one, dtype=float) for one in point.evaluate(_levers(model, at))]
-    areas = point.evaluate(_areas(model))
+    areas = point.evaluate(areas_of(model))
     normal = [area * np.asarray(sigma, dtype=float) for area, sigma in zip(areas, point.sigmas, strict=True)]
     felt = [np.abs(lever) * force for lever, force in zip(numbers, normal, strict=True)]
     largest: Array = np.maximum.reduce(np.broadcast_arrays(*felt))
@@ -98,7 +100,7 @@ def _force(point: OperatingPoint, model: Model, at: str) -> Array:
 
 def steady_speeds(point: OperatingPoint, at: str) -> Any:
     """Velocity of a body in steady sliding, m/s (rad/s for a rotation)."""
-    return point.evaluate(_speeds(point.model))[_place(point.model, at)]
+    return point.evaluate(coordinate_speeds(point.model))[_place(point.model, at)]
 
 
 def _place(model: Model, at: str) -> int:
@@ -106,18 +108,8 @@ def _place(model: Model, at: str) -> int:
 
 
 @question
-def _speeds(model: Model) -> ArrayFunction:
-    return model.function(one.speed for one in model.coordinates)
-
-
-@question
 def _inertias(model: Model) -> ArrayFunction:
     return model.function(one.inertia for one in model.coordinates)
-
-
-@question
-def _areas(model: Model) -> ArrayFunction:
-    return model.function(contact.area for contact in model.contacts)
 
 
 @question

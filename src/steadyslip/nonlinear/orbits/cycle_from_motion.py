@@ -175,9 +175,8 @@ MOST_STEPS = 40_000  # integration steps per stretch of motion
 
 
 def cycle_near(
-    runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
-    unknowns: Array | None = None,
-) -> Cycle | None:  # fmt: skip
+    runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, unknowns: Array | None = None
+) -> Cycle | None:
     """Cycle that a motion is on or approaches, or None.
 
     Parameters
@@ -189,8 +188,6 @@ def cycle_near(
         Of the free parameter, where `runs` has one.
     patience : int
         How many stretches of some returns each to go on for, as long as no cycle is close enough.
-    attracts : bool
-        True to skip cycles that are not stable.
     unknowns : ndarray (u,), optional
         Of the balances at `state`, where they are known.
 
@@ -200,7 +197,7 @@ def cycle_near(
         The primitive cycle next to the motion, with multipliers; ``cycle.stable`` says whether it attracts.
         None if there is none: the motion grows, settles, wanders, or is still too far from any.
     """
-    return motion_from(runs, state, value, patience, attracts, unknowns).cycle
+    return motion_from(runs, state, value, patience, unknowns=unknowns).cycle
 
 
 def motion_from(
@@ -209,7 +206,7 @@ def motion_from(
 ) -> Simulated:  # fmt: skip
     """Simulate from a state: the cycle that the motion approaches, or a description of what it does instead.
 
-    Parameters are those of `cycle_near`.
+    Parameters are those of `cycle_near`; with `attracts` cycles that are not stable are skipped.
     """
     returns, low, high = 0, np.inf, -np.inf
     try:

@@ -252,8 +252,10 @@ def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
     for i, record in enumerate(plan.records):
         for step, part in _parts(record):
             weights = None if plan.weights is None else plan.weights[i][np.isin(record.time, part.time)]
+            later = part.time[0] > record.time[0]  # then friction may still change since the step before
+            begin = {"initial": "free"} if later else {}
             try:
-                alone = search_fit(plan.rig, part, plan.free, weights=weights, progress=progress, **options)
+                alone = search_fit(plan.rig, part, plan.free, weights=weights, progress=progress, **options | begin)
             except SteadyslipError as error:
                 left_out.append(f"{record.source}: {step} could not be fitted alone: {error}")
                 continue

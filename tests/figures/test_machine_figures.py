@@ -153,7 +153,7 @@ def test_a_machine_has_a_document_with_its_sketch_and_its_picture(name, tmp_path
     text, explorer, _ = (tmp_path / "a.html").read_text("utf-8").partition('<div class="steadyslip-root">')
     machine = ss.read_rig(path)
     assert explorer
-    assert text.count("<svg") == 4  # sketch, mode, motion over time and in its plane
+    assert text.count("<svg") == 5  # sketch, mode for wide and narrow windows, motion over time and in its plane
     for one in (*machine.bodies, *machine.links, *machine.contacts):
         assert one in text
     assert "NaN" not in text

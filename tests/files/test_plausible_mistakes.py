@@ -147,11 +147,6 @@ ROCK = (Path(__file__).parents[2] / "examples/inclined-spring.toml").read_text(e
             "friction.d_c = 12 is read as 12 m; the largest measured are some 100 mm: write the unit",
         ),
         (
-            r"\nb = .*",
-            "\nb = 1.6",
-            "friction.b = 1.6 is read as 1.6; the largest measured are some 0.05: a number in per",
-        ),
-        (
             r"alpha = [\d.]*",
             "alpha = 56",
             "friction.normal_memory.alpha = 56 is read as 56; the largest measured are some 0.6",

@@ -100,9 +100,9 @@ def style() -> str:
     themes = (
         f".steadyslip {{ color-scheme: light; {light}; }}\n"
         f'@media screen {{ .steadyslip[data-theme="dark"] {{ color-scheme: dark; {dark}; }} }}\n'
-        '@media screen and (prefers-color-scheme: dark) { .steadyslip:not([data-theme="light"]) '
+        '@media screen and (prefers-color-scheme:dark) { .steadyslip:not([data-theme="light"]) '
         f"{{ color-scheme: dark; {dark}; }} }}\n"
-        f"@media (forced-colors: active) {{ .steadyslip.steadyslip.steadyslip {{ {forced}; }} }}\n"
+        f"@media (forced-colors:active) {{ .steadyslip.steadyslip.steadyslip {{ {forced}; }} }}\n"
     )
     return minify_css(themes + _read_web("style.css"))
 

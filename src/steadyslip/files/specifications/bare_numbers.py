@@ -18,8 +18,8 @@ STIFFNESSES = ("N/m", "Pa/m")
 STRETCHED = 1.0  # m: what friction stretches the softest of real axes and presses by is some 10 mm
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
-LARGEST = {"direct effect": 0.05, "evolution effect": 0.05, "slip distance": 0.1, "stress share": 0.6}
-"""Largest measured values of friction parameters, by kind, SI units."""
+LARGEST = {"slip distance": 0.1, "stress share": 0.6}
+"""Largest measured values of friction parameters, by kind, SI units; a and b may be of forces, without a load."""
 ABOVE = (5.0, 1e4)  # factors above these between which another unit or per cent may be meant
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 

@@ -135,11 +135,6 @@ def lowest_stress(R: Array, layout: Layout) -> float:
     return float(found)
 
 
-def no_state(R: Array, layout: Layout) -> int:
-    """Status of a job that has no state after a jump of its inputs: lifted off by it, or without a velocity."""
-    return Status.CONTACT_LOST if lowest_stress(R, layout) <= R[Row.SIGMA_LOW] else Status.NO_VELOCITY
-
-
 def finish(R: Array, layout: Layout, row: int, status: int, results: Results) -> None:
     """Write the results of a job to its row and mark the lane as free."""
     statuses, final, tally = results[0], results[1], results[2]
@@ -222,8 +217,9 @@ def serve_lane(
         R[Row.FLAG] = 0.0
         if status == Status.RUNNING:
             return
-        if status == Status.NO_VELOCITY:  # there is no state after the jump
-            status = no_state(R, layout)
+        if status == Status.NO_VELOCITY:  # there is no state after the jump, by which the contact may have lifted off
+            if lowest_stress(R, layout) <= R[Row.SIGMA_LOW]:
+                status = Status.CONTACT_LOST
         else:
             take_samples(R, layout, routines, j - cursor[Cursor.FIRST_JOB], arrays[4], results[3], True, y)
         finish(R, layout, j - cursor[Cursor.FIRST_JOB], status, results)
@@ -235,7 +231,7 @@ def serve_lane(
             if R[Row.RECORD] > 0.0:
                 record_now(R, layout, cursor, results[5], y)
             return
-        finish(R, layout, j - cursor[Cursor.FIRST_JOB], no_state(R, layout), results)
+        finish(R, layout, j - cursor[Cursor.FIRST_JOB], Status.NO_VELOCITY, results)
     ids[lane] = -1
     cursor[Cursor.BUSY] -= 1
     for i in range(layout.rows):

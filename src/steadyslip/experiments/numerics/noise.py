@@ -31,6 +31,7 @@ LONGEST = 0.05  # correlation over a record that is sought at most: noise cannot
 CURVATURE_STEP = 0.05  # of differences of the likelihood, in inverse hyperbolic tangents of decay and average
 LEAST_CURVATURE = 0.25  # of their log-likelihood: where it is flatter they vary by 2, to where tanh hardly changes
 FITTED_RANK = 1e-6  # singular values of derivatives, scaled, below which they are combinations of each other
+VANISHED = 1e-30  # powers below it are taken as 0: they do not count, and denormal numbers are a hundred times slower
 TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
 
 
@@ -201,8 +202,9 @@ def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
         """Decay, average, variance and innovations at a place, and minus twice the log-likelihood."""
         decay, average = limit * math.tanh(x[0]), limit * math.tanh(x[1])
         through = lfilter([1.0, -decay], [1.0, -average], stack, axis=1)
-        through[-2, 0], through[-2, 1:] = 1.0, average
-        np.multiply.accumulate(through[-2], out=through[-2])
+        seen = n if abs(average) > VANISHED ** (1 / n) else max(math.ceil(math.log(VANISHED, abs(average) or 0.1)), 1)
+        through[-2, 0], through[-2, 1:seen], through[-2, seen:] = 1.0, average, 0.0
+        np.multiply.accumulate(through[-2, :seen], out=through[-2, :seen])
         root, singular = dpotrf(through @ through.T, lower=1)
         if singular:
             return decay, average, np.inf, through[-1], np.inf

@@ -71,6 +71,41 @@ def test_another_evolution_law_is_found():
     assert "with friction.evolution = 'aging' the sum of squares is 0.01" in said
 
 
+def one_step(wrong, seed):
+    """Friction of one step with correlated noise, which hides what is wrong from a test of the residuals."""
+    made, until = lab.rig(ss.laws.Aging() if wrong == "law" else None), 60.0
+    step = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=20.0, to=1e-5),), until=until)
+    found = noisy(lab.columns(made, step, count=3000), seed)
+    decay = (0.9, 0.95)[seed % 2]
+    slow = lfilter([np.sqrt(1 - decay**2)], [1, -decay], np.random.default_rng(seed + 50).standard_normal(3000))
+    friction, time, moved = found["friction"] + 1e-4 * slow, found["time"], found["displacement"]
+    if wrong == "late":
+        friction = np.interp(time - 0.08, time, friction)
+    if wrong == "trend":
+        friction = friction + 3.0 * moved
+    return found | {"friction": friction}
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("wrong", "choice"),
+    [("law", "friction.evolution = 'aging'"), ("late", "fit.lag = true"), ("trend", "fit.trend = 1"), ("", None)],
+)
+def test_what_correlated_noise_hides_is_told(wrong, choice, seed):
+    """By Schwarz's criterion: of one step, the residuals of a wrong law look like slow noise."""
+    fit, said = fitted(one_step(wrong, seed))
+    assert next((one.choice for one in fit.remedies), None) == choice
+    assert ("another model follows the records better" in said or "residuals have structure" in said) == bool(choice)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("wrong", ["law", ""])
+def test_hidden_misfits_at_random(wrong):
+    """A wrong law is told in each of 20, none where there is none."""
+    told = [fitted(one_step(wrong, seed))[0].remedies for seed in range(100, 120)]
+    assert sum(map(bool, told)) == (20 if wrong else 0)
+
+
 @pytest.mark.parametrize("late", [0.3, -0.3])
 def test_a_late_channel_is_found(late):
     """Without the lag the stiffness comes out 5 % off, z 5; with it, all times free, it was not determined."""

@@ -253,3 +253,14 @@ def test_a_fit_tells_both_cutoffs(faster):
     for name, value in cutoffs.items():
         assert abs(fit[name].value - value) < 4 * fit[name].error
         assert fit[name].error < 0.1 * value
+
+
+def test_alternatives_keep_what_the_law_has():
+    """Of one and of two states, with cut-off velocities, a fit may try each."""
+    one = law_with(a_cutoff_velocity=1e-4, b_cutoff_velocity=1e-3)
+    two = one.alternatives()["two states"](one)
+    assert [state.b_cutoff_velocity for state in two.states] == [1e-3, 1e-3]
+    for law in (one, two):
+        for change in law.alternatives().values():
+            assert change(law).a_cutoff_velocity == 1e-4
+    assert two.alternatives()["aging"](two).b_cutoff_velocity == 1e-3

@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedies
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, mended, remedies
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
@@ -92,11 +92,14 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """Short fits with other laws, a lag or a trend, the best first, where residuals have structure.
+        """Short fits with other laws, a lag or a trend, best first, where residuals have structure or one is better.
 
         Where they have none, those with memories of normal stress that fit as well as none, if the stress changes.
         """
-        if self.whiteness.p < STRUCTURE:
+        forgets = forgets_changes(self.plan)
+        if self.whiteness.p < STRUCTURE or (
+            not forgets and self.search.converged and mended(self.plan, self.ssq, self.values)
+        ):
             return remedies(self.plan, self.ssq, self.values)
         return tuple(one.remedy for one in self._equal_memories())
 

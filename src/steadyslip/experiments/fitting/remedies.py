@@ -1,4 +1,8 @@
-"""Changes of a plan that would mend the structure in the residuals of its fit: other laws, a lag, a trend."""
+"""Changes of a plan that would mend the structure in the residuals of its fit: other laws, a lag, a trend.
+
+A test of residuals for structure cannot tell what one step of velocity leaves from correlated noise, and says nothing
+where a law or a channel is wrong; a fit with another law, a lag or a trend tells it by Schwarz's criterion.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.plan import Plan, with_lag
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
-from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, minimise
 from steadyslip.experiments.numerics.noise import STRUCTURE, describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
 
@@ -24,6 +28,7 @@ ROUNDS = 2  # changes that are tried on top of each other
 TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3  # of each trial; on made records they end where the default ones do
 MAX_TREND = 2  # orders of a trend that are tried
 
+NOTHING = 0.1  # fall of −2 log likelihood of white noise below which the search for a change is over
 
 NESTED = {"lag", "trend"}
 """Unknowns without effect at 0, so that a fit with them begins at the minimum without."""
@@ -67,7 +72,8 @@ class Remedy:
 def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remedy, ...]:
     """Minima with changes of the plan, the best first; up to two changes on top of each other.
 
-    The search for them ends once one leaves no structure. Each trial is short: a longer one may find a better minimum.
+    Those that are soon tried come first; the search ends once some have left no structure. Each trial is short: a
+    longer one may find a better minimum.
 
     Parameters
     ----------
@@ -81,14 +87,15 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remed
     base, known, size = plan, {""}, len(plan.space())
     for _ in range(ROUNDS):
         tried: list[tuple[Remedy, Plan]] = []
-        for own in _changed(base):
-            if _choice(plan, own) in known:
-                continue
-            known.add(_choice(plan, own))
-            if (one := _fitted(own, plan, ssq, size, values)) is not None:
-                tried.append((one, own))
-            if one is not None and one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE:
-                return _ranked([*found, one, *(other for other, _ in tried if other is not one)])
+        changed = {_choice(plan, own): own for own in _changed(base)}
+        new = [own for choice, own in changed.items() if choice not in known]
+        known |= set(changed)
+        for first in (True, False):
+            some = [own for own in new if (_is_brief(own, values) or _recalls(own, base)) == first]
+            fitted = [(_fitted(own, plan, ssq, size, values), own) for own in some]
+            tried += [(one, own) for one, own in fitted if one is not None]
+            if any(one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE for one, _ in tried):
+                return _ranked([*found, *(one for one, _ in tried)])
         found += [one for one, _ in tried]
         best = max(tried, key=lambda pair: pair[0].gain, default=None)
         if best is None or best[0].gain <= max([STRONG_EVIDENCE, *(one.gain for one in found if one is not best[0])]):
@@ -97,21 +104,42 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remed
     return _ranked(found)
 
 
+def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
+    """True if a change that is soon tried, a lag, a trend or another evolution, fits better by strong evidence.
+
+    Parameters
+    ----------
+    plan, ssq, values
+        As of `remedies`.
+    """
+    size, samples = len(plan.space()), sum(map(len, plan.records))
+    for own in _changed(plan):
+        if not _choice(plan, own) or not _is_brief(own, values):
+            continue
+        try:
+            best = _from_minimum(own, _effort(own), values)
+        except NotAvailable:
+            continue
+        if samples * float(np.log(ssq / best.ssq)) < STRONG_EVIDENCE:
+            continue  # too little even in white noise; to describe the noise takes longer than this search
+        if remedy(plan, own, best.comparison, best.coordinates, ssq, size).gain > STRONG_EVIDENCE:
+            return True
+    return False
+
+
 def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
     return tuple(sorted(found, key=lambda one: -one.gain))
 
 
 def _changed(plan: Plan) -> Iterator[Plan]:
-    """Plans with one thing changed, those of brief searches first: lag, evolution and memory of the law, states."""
+    """Plans with one thing changed: lag, evolution and memory of the law, states, trend."""
     if plan.follows and not plan.lag:
         yield with_lag(plan)
     law, words = plan.rig.friction, plan.rig.friction.alternatives()
     pressed = plan.pressed and any(record.stress_changes for record in plan.records)
     memories = {word for own in law.decided_by_stress.values() for word in own}
     choices = [*product(*law.decided_by_stress.values())] if pressed else []
-    forms = sorted(
-        (word for word in words if word not in memories), key=lambda word: len(with_words(plan, [word]).free)
-    )
+    forms = [word for word in words if word not in memories]
     for form, memory in product(forms, choices or [()]):
         yield with_words(plan, [form, *memory])
     if plan.trend < MAX_TREND:
@@ -131,16 +159,28 @@ def with_words(plan: Plan, words: Sequence[str]) -> Plan:
 
 
 def _fitted(own: Plan, plan: Plan, ssq: float, size: int, values: Mapping[str, float]) -> Remedy | None:
-    space = own.space()
-    effort = Effort(budget=Budget.of_fit(sum(map(len, own.records)), len(space), TRIAL_EFFORT))
     try:
-        if {one.parameter.partition(".")[0] for one in space.unknowns if one.name not in values} <= NESTED:
-            best: FoundMinimum | SearchResult = _from_minimum(own, effort, values)
+        if _is_brief(own, values):
+            best: FoundMinimum | SearchResult = _from_minimum(own, _effort(own), values)
         else:
-            best = find_minimum(own, TRIAL_STARTS, effort, None)
+            best = find_minimum(own, TRIAL_STARTS, _effort(own), None)
     except NotAvailable:
         return None
     return remedy(plan, own, best.comparison, best.coordinates, ssq, size)
+
+
+def _is_brief(own: Plan, values: Mapping[str, float]) -> bool:
+    """True if a plan is searched from the values of a fit: what it has besides has no effect at 0."""
+    return {one.parameter.partition(".")[0] for one in own.space().unknowns if one.name not in values} <= NESTED
+
+
+def _recalls(own: Plan, base: Plan) -> bool:
+    """True if a plan has the memory of normal stress that another lacks: no other change may stand in for it."""
+    return base.rig.friction.forgets_stress() and not own.rig.friction.forgets_stress()
+
+
+def _effort(own: Plan) -> Effort:
+    return Effort(budget=Budget.of_fit(sum(map(len, own.records)), len(own.space()), TRIAL_EFFORT))
 
 
 def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, size: int) -> Remedy:
@@ -163,7 +203,10 @@ def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float]) -> Fou
     z = begin + np.outer(LAGS if np.any(added) else [0.0], added)
     low, high = np.transpose([one.bounds for one in space.unknowns])
     stop = effort.budget.part(np.inf)
-    ends = minimise(lambda x, _: comparison.residuals(x), z, low, high, most=MAX_ITERATIONS, stop=stop)
+    enough, near = NOTHING / comparison.size, DAMPING_NEAR
+    ends = minimise(
+        lambda x, _: comparison.residuals(x), z, low, high, MAX_ITERATIONS, tolerance=enough, stop=stop, damping=near
+    )
     ends = first_computable(comparison, ends.sorted())
     if not np.isfinite(ends.ssq[0]):
         raise NotAvailable("the model cannot follow these records")

@@ -101,8 +101,8 @@ def _left_out(fit: FitNumbers) -> list[str]:
 def warnings(fit: FitNumbers) -> list[str]:
     """Warnings on a fit, each a sentence, that a reader must know before using the numbers."""
     found = fitted_warnings(fit) + _open_memory(fit) + _left_out(fit) + _ends_off_model(fit)
-    found += _vague_jumps(fit) + _possible_ramps(fit) + _structure(fit) + _drained_at_once(fit)
-    return found + loading_warnings(fit) + version_warnings(fit)
+    found += _vague_jumps(fit) + _possible_ramps(fit) + loading_warnings(fit)
+    return found + _structure(fit) + _drained_at_once(fit) + version_warnings(fit)
 
 
 def _ends_off_model(fit: FitNumbers) -> list[str]:
@@ -183,33 +183,39 @@ def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
 
 
 def better(fit: FitNumbers) -> Remedy | None:
-    """What to fit again with, as the values are not to be used: residuals have structure that it mends, or less."""
-    best = next(iter(fit.remedies), None)
-    left = fit.whiteness.p < STRUCTURE or forgets_changes(fit.plan)
-    return best if left and best is not None and best.gain >= STRONG_EVIDENCE else None
+    """What to fit again with, since it follows the records better by strong evidence; None for nothing."""
+    return next((one for one in fit.remedies if one.gain >= STRONG_EVIDENCE), None)
 
 
 def _structure(fit: FitNumbers) -> list[str]:
     """Warning on structure in the residuals, or on a normal stress that this law does not remember; what mends it."""
-    plan = fit.plan
-    changing = [record.source for record in plan.records if record.stress_changes]
-    forgets = forgets_changes(plan)
-    said = f"the normal stress changes in {enumerated(changing)}, and this law has no memory of it"
-    best = next(iter(fit.remedies), None)
-    if fit.whiteness.p >= STRUCTURE and (best is None or best.gain < STRONG_EVIDENCE):
-        return [f"{said}; {_equal_memories(fit)}"] if forgets else []
-    if not forgets:
+    changing = [record.source for record in fit.plan.records if record.stress_changes]
+    forgets, structure, best = forgets_changes(fit.plan), fit.whiteness.p < STRUCTURE, better(fit)
+    if forgets:
+        said = f"the normal stress changes in {enumerated(changing)}, and this law has no memory of it"
+    elif structure:
         said = f"residuals have structure (whiteness {chance(fit.whiteness.p)})"
-    if best is None or best.gain < STRONG_EVIDENCE:
+    else:
+        said = "residuals alone look like noise, but another model follows the records better"
+    if best is None and structure:
         tried = "; ".join(one.choice for one in fit.remedies)
         return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
-    asked, moved = _asked(fit, best), _moved(fit, best)
+    if best is None:
+        return [f"{said}; {_equal_memories(fit)}"] if forgets else []
     rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {chance(best.p)})"
     return [
-        f"{said}: with {asked} the sum of squares is "
-        f"{best.ssq / fit.ssq:.2g} of this, BIC {best.gain:.0f} less, {', '.join([rest, *moved])}; "
-        "do not use the values above, but fit again with that, by --set or in the file (lab_rig and fit in Python)"
+        f"{said}: with {_asked(fit, best)} the sum of squares is {best.ssq / fit.ssq:.2g} of this, "
+        f"BIC {best.gain:.0f} less, {', '.join([rest, *_moved(fit, best)])}; {_consequence(fit, best)} "
+        "fit again with that, by --set or in the file (lab_rig and fit in Python)"
     ]
+
+
+def _consequence(fit: FitNumbers, best: Remedy) -> str:
+    """What a better model means for the values: whether it moves one by more than its error, or gives one none."""
+    steep = _steep_names(fit.rig(0))
+    shared = [n for n in steep if n in best.values and n in fit.values]
+    near = shared and all(abs(best.values[n] - fit.values[n]) <= fit.errors[n] < np.inf for n in shared)
+    return "the values above move by less than their errors;" if near else "do not use the values above, but"
 
 
 def _asked(fit: FitNumbers, one: Remedy) -> str:
@@ -220,7 +226,7 @@ def _asked(fit: FitNumbers, one: Remedy) -> str:
     for n, x in one.values.items():
         if n not in fit.values and not n.startswith(("step.", "jump.")):
             unit = units.get(n.partition("@")[0].rpartition(".")[2], "1")
-            added.append(f"{n.partition('.')[2] or n} {format_quantity(x, unit, 3)}")
+            added.append(f"{n.removeprefix('friction.')} {format_quantity(x, unit, 3)}")
     return f"{one.choice} ({', '.join(added)})" if added else one.choice
 
 

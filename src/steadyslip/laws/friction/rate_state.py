@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import sympy as sp
@@ -121,21 +121,22 @@ class RateState(FrictionLaw, name="rate-state"):
                 found[name] = partial(RateState._remembering, memory=usual)
         return found
 
-    def _one_state(self) -> tuple[float, float]:
-        """Values of b and d_c of the only or the first state."""
-        b, d_c = (self.states[0].b, self.states[0].d_c) if self.states else (self.b, self.d_c)
-        if b is None or d_c is None:
+    def _one_state(self) -> dict[str, Any]:
+        """Values of the only or the first state, by name."""
+        one = self.states[0] if self.states else self
+        if one.b is None or one.d_c is None:
             raise InternalError("b and d_c, or states, to be given")
-        return b, d_c
+        return {"b": one.b, "d_c": one.d_c, "b_cutoff_velocity": one.b_cutoff_velocity}
 
     def _with_one_state(self, evolution: Evolution) -> RateState:
-        b, d_c = self._one_state()
-        return replace(self, evolution=evolution, states=(), b=b, d_c=d_c)
+        return replace(self, evolution=evolution, states=(), **self._one_state())
 
     def _with_two_states(self) -> RateState:
-        b, d_c = self._one_state()
-        pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))  # starting values of a fit; by trial
-        return replace(self, states=pair, b=None, d_c=None)
+        own = self._one_state()
+        pair = tuple(
+            State(**own | {"b": share * own["b"], "d_c": times * own["d_c"]}) for share, times in ((0.6, 1), (0.4, 10))
+        )  # starting values of a fit; by trial
+        return replace(self, states=pair, b=None, d_c=None, b_cutoff_velocity=None)
 
     def _remembering(self, memory: NormalMemory) -> RateState:
         if type(memory) is type(self.normal_memory):

@@ -79,6 +79,20 @@ def test_a_search_ends_when_its_work_is_done(record, monkeypatch):
     assert longer.ssq <= fit.ssq * (1 + 1e-9)
 
 
+def test_a_search_without_an_end_has_no_errors():
+    """Nor does it say that data do not determine, or advise what more of the search would do."""
+    made = lab.record(lab.rig(), lab.STEP, 3, count=1500)
+    fit = ss.fit(ss.lab_rig(), made, effort=5e-5)
+    assert not fit.search.converged
+    assert "no error: the search had not come to its end" in str(fit)
+    assert "not determined" not in str(fit)
+    assert not [one for one in fit.remedies if one.gain > 6]
+    answers = ss.experiments
+    for ask in (answers.bootstrap, answers.posterior, answers.normal_draws, lambda one: answers.profile(one, "a")):
+        with pytest.raises(ss.NotAvailable, match="had not come to its end"):
+            ask(fit)
+
+
 def test_a_model_that_follows_from_no_start_is_refused(record, monkeypatch):
     monkeypatch.setattr(Forward, "run", lambda self, table, parameters, units, begin=None: np.full(
         (len(parameters), 1 + self.directions, len(table.times)), np.nan))  # fmt: skip

@@ -157,6 +157,21 @@ def test_fits_of_records_with_a_servo_hold_the_truth(law, lag, beyond):
     assert np.max(np.abs(np.mean(z, axis=0))) < 1.3
 
 
+def test_bootstrap_and_profile_draw_the_servo_too():
+    """Held where it was found, it left errors of .3 to .6 of the fit's."""
+    fit, _ = fitted("slip", 0.3, 0.0, 7)
+    draws = ss.experiments.bootstrap(fit, 64)
+    assert "95 %:" in str(draws)
+    for name in ("friction.a", "friction.b", "friction.d_c", "slider.stiffness"):
+        assert 0.7 < draws.error(name) / fit.errors[name] < 1.4
+        own, usual = (np.diff(np.log(one)) for one in (ss.experiments.profile(fit, name, count=17).interval(),
+                                                       fit.interval(name)))  # fmt: skip
+        assert own == pytest.approx(usual, rel=0.15)
+    few = str(ss.experiments.bootstrap(fit, 5))
+    assert "95 %:" not in few
+    assert "intervals of 95 % need 40 draws" in few
+
+
 @cache
 def fitted_in_pieces(way, seed, law="slip"):
     found, source = record(seed, evolution=getattr(ss.laws, law.title())(), way=way)

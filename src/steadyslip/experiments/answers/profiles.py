@@ -13,6 +13,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import NAME, THREADS, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.fitting.at_minimum import spread_of_gradient
 from steadyslip.experiments.fitting.condensed import condensed
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
@@ -120,6 +121,11 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     threads : int, optional
         Number of threads; all cores unless given.
 
+    Raises
+    ------
+    NotAvailable
+        If the search of the fit had not come to its end.
+
     Examples
     --------
     >>> record = ss.read_record("examples/data/made_velocity_step.csv")
@@ -127,6 +133,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     >>> ss.experiments.profile(fit, "friction.a", count=3).values.round(4)
     array([0.0116, 0.0119, 0.0123])
     """
+    fit.check_ended()
     i = fit.index(name)
     variance = float(fit.covariance[i, i])
     width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
@@ -154,10 +161,10 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
 
 
 def _unit_of_rise(fit: Fit, i: int) -> float:
-    """Rise of the sum of squares at one standard deviation from the minimum, with correlation of the residuals."""
+    """Rise of the sum of squares at one standard deviation from the minimum, by noise and by the uncertain loading."""
     _, jacobian = fit.comparison.residuals(fit.coordinates[None])
     rows = jacobian[0]
     inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-13, hermitian=True)
-    spread = sum(noise.spread(rows[:, own]) for noise, own in zip(fit.noise, fit.comparison.slices, strict=True))
+    spread = spread_of_gradient(fit.plan, fit.comparison, fit.coordinates, rows, fit.noise)
     naive, variance = float(inverse[i, i]), float((inverse @ spread @ inverse)[i, i])
     return variance / naive if np.isfinite(fit.covariance[i, i]) and naive > 0 else fit.ssq / max(fit.degrees, 1)

@@ -19,9 +19,11 @@ from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.answers.inference import SampleDraws, inference_data
 from steadyslip.experiments.fitting import store
+from steadyslip.experiments.fitting.at_minimum import loading_shifts
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
+from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.experiments.numerics.pooling import run_walkers, spread_of_chains
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
@@ -31,10 +33,12 @@ BOOTSTRAPS = ("auto", "block", "residual")
 REFIT_TOLERANCE = (
     1e-6  # a refit stops when the predicted relative decrease of the sum of squares is below; its scatter is larger
 )
+BLOCK = 10.0  # length of blocks, in samples that are worth one: of a sum of AR(1) noise they lose 5 % of the variance
 MAX_BLOCK_SHARE = 0.1  # longest block, as a share of the record: longer ones would leave too few to resample
 MIXED, FEWEST_TIMES = 1.1, 20
 """R-hat below which chains have mixed, and steps they need, in autocorrelation times; chosen by trial: walkers are
 many, so that each has few draws."""
+FEWEST = 40  # draws of which an interval of 95 % leaves one beyond each end
 MOST_POINTS = 5e7  # numbers of a quantity that has one for each draw and sample: half a gigabyte
 DRAWS = FileKind("draws", 1, 2**30, "draw them again and save them anew")
 _ATTRIBUTES = {"kind": str, "about": str, "chains": int}
@@ -101,13 +105,15 @@ class Draws(ReadOnly):
     def __str__(self) -> str:
         details = ", ".join(f"{name} {value:.4g}" for name, value in self.details.items())
         stopped = ", stopped before all were done" if self.interrupted else ""
-        lines = [f"{len(self)} draws, {self.kind} ({details}){stopped}"]
+        lines, few = [f"{len(self)} draws, {self.kind} ({details}){stopped}"], len(self) < FEWEST
         for one in (*self.fit.estimates, *self.fit.derived):
             low, high = self.interval(one.name)
             drawn = replace(
                 one, value=float(np.nanmean(self[one.name])), error=self.error(one.name), low=low, high=high
             )
-            lines.append(f"  {one.name}  {drawn.shown()}   95 %: {drawn.range()}")
+            lines.append(f"  {one.name}  {drawn.shown()}" + ("" if few else f"   95 %: {drawn.range()}"))
+        if few:
+            lines.append(f"! intervals of 95 % need {FEWEST} draws, one beyond each end")
         if (worst := max(self.chain_spread, key=self.chain_spread.__getitem__, default=None)) is not None:
             spread, lasting = self.chain_spread[worst], self.details.get("autocorrelation", 0.0)
             if not (spread < MIXED and self.details.get("steps", np.inf) >= FEWEST_TIMES * lasting):
@@ -247,7 +253,7 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[s
     Raises
     ------
     NotAvailable
-        If another parameter is not determined.
+        If another parameter is not determined, or the search of the fit had not come to its end.
 
     Examples
     --------
@@ -257,6 +263,7 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[s
     >>> draws.values["friction.a"].shape
     (1000,)
     """
+    fit.check_ended()
     lost = [e.name for e in fit.estimates if not e.determined and e.name not in {fit.names[fit.index(n)] for n in held}]
     if lost:
         raise NotAvailable(f"the fit does not determine {', '.join(lost)}; fix one of each combination that it names")
@@ -278,6 +285,8 @@ def bootstrap(
 ) -> Draws:  # fmt: skip
     """Refit the model plus resampled residuals, many times, each from the fit's own minimum.
 
+    What is uncertain in the loading found in the records (levels of rate, a servo) is drawn from its errors.
+
     Parameters
     ----------
     fit : Fit
@@ -287,7 +296,7 @@ def bootstrap(
         ``block``: residuals in blocks, which keeps their correlation; ``residual``: one by one; ``auto``: blocks where
         the fit takes residuals as correlated.
     block : int, optional
-        SampleDraws in a block; three times as many as are worth one independent sample unless given.
+        Samples in a block; ten times as many as are worth one independent sample unless given.
     seed : int
     threads : int, optional
     progress : bool, optional
@@ -297,6 +306,11 @@ def bootstrap(
     Returns
     -------
     Draws
+
+    Raises
+    ------
+    NotAvailable
+        If the search of the fit had not come to its end.
 
     Examples
     --------
@@ -310,17 +324,21 @@ def bootstrap(
         raise ParameterError([Problem("kind", unknown_name("choice", kind, BOOTSTRAPS))])
     if not (isinstance(count, int) and count >= 2):
         raise ParameterError([Problem("count", f"got {count!r}; allowed: a whole number >= 2")])
+    fit.check_ended()
     generator = np.random.default_rng(seed)
     comparison = fit.plan.comparison(Effort(threads))
-    lengths = [block_length(fit, i, kind, block) for i in range(len(comparison.parts))]
+    shifts = [shift / comparison.weights for shift in loading_shifts(fit.plan, comparison, fit.coordinates)]
+    lengths = [block_length(fit, i, BLOCK, kind, block) for i in range(len(comparison.parts))]
+    scales = [_scale_of_blocks(fit.part(fit.scaled_residuals, i), fit.noise[i], own) for i, own in enumerate(lengths)]
     ends, converged, done = [], [], 0
 
     def refitted(many: int) -> Minima:
         data = np.empty((many, comparison.size))
         for i, where in enumerate(comparison.slices):
             r = fit.residuals[where]
-            centred = (r - r.mean()) * np.sqrt(fit.samples / max(fit.degrees, 1))
-            data[:, where] = fit.model[where] + _resampled(centred, lengths[i], many, generator)
+            data[:, where] = fit.model[where] + scales[i] * _resampled(r - r.mean(), lengths[i], many, generator)
+        for shift in shifts:
+            data += generator.standard_normal((many, 1)) * shift
         start = np.tile(fit.coordinates, (many, 1))
         return minimise(lambda z, lanes: comparison.residuals(z, data[lanes]), start, *fit.bounds, most=30,
                         tolerance=REFIT_TOLERANCE)  # fmt: skip
@@ -341,14 +359,21 @@ def bootstrap(
     return _draws(fit, "bootstrap", np.concatenate(ends), details, interrupted=done < count)
 
 
-def block_length(fit: Fit, record: int, kind: str = "block", block: int | None = None) -> int:
-    """Number of samples in a block: residuals further apart are nearly independent."""
+def block_length(fit: Fit, record: int, worth: float, kind: str = "block", block: int | None = None) -> int:
+    """Number of samples in a block that is worth so many independent ones: those further apart are nearly so."""
     noise = fit.noise[record]
     size = len(fit.part(fit.residuals, record))
     if kind == "residual" or (kind == "auto" and not noise.correlated):
         return 1
-    usual = max(int(np.ceil(3 * noise.inflation)), int(np.ceil(size ** (1 / 3))))
+    usual = max(int(np.ceil(worth * noise.inflation)), int(np.ceil(size ** (1 / 3))))
     return max(1, min(block or usual, int(MAX_BLOCK_SHARE * size)))
+
+
+def _scale_of_blocks(residuals: Array, noise: Noise, block: int) -> float:
+    """Factor by which means of blocks scatter as the noise of a fit; its parameters took some of that out."""
+    sums = np.cumsum(np.concatenate([[0.0], residuals - residuals.mean(), residuals[:block] - residuals.mean()]))
+    scatter = float(np.var(sums[block:-1] - sums[: -block - 1])) / block**2
+    return float(np.sqrt(noise.variance_of_mean(block) / scatter)) if scatter > 0 else 1.0
 
 
 def _resampled(residuals: Array, block: int, many: int, generator: np.random.Generator) -> Array:
@@ -380,7 +405,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     Raises
     ------
     NotAvailable
-        If emcee is not installed.
+        If emcee is not installed, or the search of the fit had not come to its end.
 
     Examples
     --------
@@ -390,6 +415,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     >>> sorted(draws.values)
     ['friction.a', 'friction.b', 'friction.d_c', 'friction.mu_ref', 'slider.stiffness', 'step.1.at']
     """
+    fit.check_ended()
     comparison = fit.plan.comparison(Effort(threads))
     low, high = fit.bounds
     stretch = _stretch(fit)

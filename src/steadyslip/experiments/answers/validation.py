@@ -15,6 +15,8 @@ from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
+APART = 3.0  # length of blocks left out, in samples that are worth one independent one
+
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation(ReadOnly):
@@ -93,7 +95,7 @@ def cross_validate(
     if block is not None and not (isinstance(block, int) and not isinstance(block, bool) and 1 <= block <= most):
         raise ParameterError([Problem("block", f"got {block!r}; allowed: a whole number from 1 to {most}")])
     comparison = fit.plan.comparison(Effort(threads))
-    length = block or min(max(block_length(fit, i) for i in range(len(comparison.parts))), most)
+    length = block or min(max(block_length(fit, i, APART) for i in range(len(comparison.parts))), most)
     fold = np.arange(fit.samples) // length % folds
     seen = (fold != np.arange(folds)[:, None]).astype(float)
 

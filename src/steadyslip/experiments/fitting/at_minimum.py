@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -16,33 +17,48 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
 from steadyslip.experiments.fitting.valleys import along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
-from steadyslip.experiments.numerics.noise import describe, white
+from steadyslip.experiments.numerics.noise import Noise, describe, white
 
 ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
 F = TypeVar("F", bound=Fitted)
 
 
-def _level_uncertainty(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
-    """Covariance (p, p) of Jᵀr that comes from the uncertain levels of velocity and normal stress in the records."""
-    found = np.zeros((len(z), len(z)))
+def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Array]:
+    """Changes (n,) of the weighted model by one standard deviation of each thing uncertain in the commanded loading.
+
+    These are levels of velocity and normal stress, the course of a load point, its servo; none where the loading is
+    not found in the records, or the model cannot follow it.
+    """
+    if not plan.follows:
+        return
     predicted: Array | None = None
     values = comparison.space.values(z[None])[0]
     for loading, part, where in zip(plan.loading, comparison.parts, comparison.slices, strict=True):
         loads = () if loading.load is None else tuple(raised(loading.load))
         if loads and loading.load is not None:
             models = part.driven_by(values, [loading.load, *loads])
-            pushes = ((models[1:] - models[0]) * part.weights) @ rows[:, where].T
-            pushes = pushes[np.all(np.isfinite(pushes), axis=1)]
-            found += pushes.T @ pushes
+            for model in models[1:]:
+                own = np.zeros(comparison.size)
+                own[where] = (model - models[0]) * part.weights
+                if np.all(np.isfinite(own)):
+                    yield own
     for i, loading in enumerate(plan.loading):
         for moved in shifted(loading, plan.pressed):
             if predicted is None:
                 predicted = comparison.model(z[None])[0][0]
             others = tuple(moved if k == i else own for k, own in enumerate(plan.loading))
             model = replace(plan, loading=others).comparison().model(z[None])[0][0]
-            push = rows @ ((model - predicted) * comparison.weights)
-            if np.all(np.isfinite(push)):
-                found += np.outer(push, push)
+            if np.all(np.isfinite(model)):
+                yield (model - predicted) * comparison.weights
+
+
+def spread_of_gradient(plan: Plan, comparison: Comparison, z: Array, rows: Array, noises: Sequence[Noise]) -> Array:
+    """Covariance (p, p) of Jᵀr, with the derivatives Jᵀ in `rows` (p, n): by noise and by the uncertain loading."""
+    found = np.zeros((len(z), len(z)))
+    for noise, where in zip(noises, comparison.slices, strict=True):
+        found += noise.spread(rows[:, where])
+    for shift in loading_shifts(plan, comparison, z):
+        found += np.outer(push := rows @ shift, push)
     return found
 
 
@@ -85,7 +101,7 @@ def fit_with_errors(
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
     free = len(z)
-    information, spread = rows @ rows.T, np.zeros((free, free))
+    information = rows @ rows.T
     noises = []
     for where in comparison.slices:
         own = residuals[where]
@@ -95,9 +111,7 @@ def fit_with_errors(
         else:
             noise = describe(own, share, errors == "correlated", rows[:, where])
         noises.append(noise)
-        spread += noise.spread(rows[:, where])
-    if plan.follows:
-        spread += _level_uncertainty(plan, comparison, z, rows)
+    spread = spread_of_gradient(plan, comparison, z, rows, noises)
     known = prior_information(comparison.space)
     scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)

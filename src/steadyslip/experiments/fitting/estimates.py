@@ -29,6 +29,8 @@ class Estimate(Displayed):
         Contact area of the rig, m²; if given, text shows totals for the whole contact.
     along : tuple of str
         Parameters that change together with one that is not determined.
+    ended : bool
+        False if the search had not come to its end, so that nothing is known of the error.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Estimate(Displayed):
     high: float
     area: float | None = None
     along: tuple[str, ...] = ()
+    ended: bool = True
 
     @property
     def determined(self) -> bool:
@@ -60,6 +63,8 @@ class Estimate(Displayed):
     @property
     def undetermined(self) -> str:
         """Words in place of an error that is infinite."""
+        if not self.ended:
+            return "no error: the search had not come to its end"
         together = f" (with {', '.join(self.along)})" if self.along else ""
         return f"not determined by these data{together}"
 

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
@@ -105,6 +105,19 @@ class Fitted(ReadOnly):
         low, high = (float(one.value(self.coordinates[i] + sign * reach)) for sign in (-1, 1))
         return max(low, one.low), min(high, one.high)
 
+    def check_ended(self) -> None:
+        """Check that the search has come to a minimum, without which nothing is known of errors.
+
+        Raises
+        ------
+        NotAvailable
+        """
+        if not self.search.converged:
+            raise NotAvailable(
+                "the search of this fit had not come to its end, so that nothing is known of its errors; let it search "
+                "longer (effort), or fit another model"
+            )
+
     def _reach(self, level: float) -> float:
         """Standard deviations to the end of an interval."""
         from scipy.stats import t
@@ -128,7 +141,7 @@ class Fitted(ReadOnly):
         unit, area, error = self.space.unknowns[i].unit, self.plan.rig.area, self.errors[full]
         together = [one.weights for one in self.unidentified if full in one.weights and not np.isfinite(error)]
         along = tuple(dict.fromkeys(other for one in together for other in one if other != full))
-        return Estimate(full, self.values[full], error, unit, low, high, area, along)
+        return Estimate(full, self.values[full], error, unit, low, high, area, along, self.search.converged)
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:

@@ -53,7 +53,7 @@ def fitted_warnings(fit: Fitted) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    return found + list(fit.at_bounds)
+    return found + (list(fit.at_bounds) if fit.search.converged else [])
 
 
 def _cut_off(fit: Fitted) -> str:

@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, mended, remedies
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, continued, mended, remedies
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
@@ -81,9 +81,10 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     def as_measured(self) -> dict[str, float] | None:
         """Values that a fit driven by the measured columns, instead of the commanded loading, would have.
 
-        None where the model does not follow commanded loading, or the measured columns have hardly any noise.
+        None where the model does not follow commanded loading, the measured columns have hardly any noise, or the
+        search had not come to its end.
         """
-        return driven_as_measured(self.plan, self.values, self._ends)
+        return None if not self.search.converged else driven_as_measured(self.plan, self.values, self._ends)
 
     @cached_property
     def as_ramps(self) -> tuple[RampFit, ...]:
@@ -100,7 +101,9 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if self.whiteness.p < STRUCTURE or (
             not forgets and self.search.converged and mended(self.plan, self.ssq, self.values)
         ):
-            return remedies(self.plan, self.ssq, self.values)
+            ended = self.search.converged
+            reached = self.ssq if ended else continued(self.plan, self.ssq, self.values)
+            return remedies(self.plan, reached, self.values)
         return tuple(one.remedy for one in self._equal_memories())
 
     def with_memories(self) -> Self:

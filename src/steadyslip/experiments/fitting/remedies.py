@@ -127,6 +127,14 @@ def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
     return False
 
 
+def continued(plan: Plan, ssq: float, values: Mapping[str, float]) -> float:
+    """Sum of squares that a search reaches if it goes on with the effort of a trial; parameters as of `remedies`."""
+    try:
+        return min(ssq, _from_minimum(plan, _effort(plan), values).ssq)
+    except NotAvailable:
+        return ssq
+
+
 def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
     return tuple(sorted(found, key=lambda one: -one.gain))
 

@@ -37,9 +37,6 @@ def _excess_scatter(r: Array, noise: Noise) -> Iterator[float]:
     if length < MIN_SAMPLES:
         return
     means = r[: length * PIECES].reshape(PIECES, length).mean(axis=1)
-    own = noise.covariance[:length]
-    worth = 2.0 * (1.0 - np.arange(len(own)) / length)
-    worth[0] = 1.0
-    expected = float(own @ worth) / length
+    expected = noise.variance_of_mean(length)
     scatter = float(np.var(means))
     yield max(float(np.sqrt(scatter / expected)) - 1.0, 0.0) if expected > 0 else (np.inf if scatter else 0.0)

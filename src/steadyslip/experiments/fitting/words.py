@@ -197,6 +197,8 @@ def _structure(fit: FitNumbers) -> list[str]:
         said = f"residuals have structure (whiteness {chance(fit.whiteness.p)})"
     else:
         said = "residuals alone look like noise, but another model follows the records better"
+    if best is None and structure and not fit.search.converged:
+        return [f"{said}, which says nothing before the search has come to its end"]
     if best is None and structure:
         tried = "; ".join(one.choice for one in fit.remedies)
         return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]

@@ -65,6 +65,13 @@ class Noise(ReadOnly):
         slow = self.innovation / (1.0 - float(np.sum(self.coefficients))) ** 2  # spectral density at frequency 0
         return max(slow / float(self.covariance[0]), 1e-3)
 
+    def variance_of_mean(self, count: int) -> float:
+        """Variance of the mean over `count` samples in a row."""
+        own = self.covariance[:count]
+        worth = 2.0 * (1.0 - np.arange(len(own)) / count)
+        worth[0] = 1.0
+        return float(own @ worth) / count
+
     def spread(self, rows: Array) -> Array:
         """Product rows · C · rowsᵀ, (p, p), for rows (p, n); C is the covariance matrix (n, n) of the samples."""
         if not len(self.coefficients):

@@ -50,6 +50,34 @@ def test_every_step_is_fitted_alone_and_all_together(joint, table, tmp_path):
     assert table.to_dict()["lines"][-1]["estimates"]["d_c"]["value"] == joint.values["friction.d_c"]
 
 
+def test_a_memory_of_normal_stress_is_held_where_it_has_no_effect(tmp_path):
+    """Free, a velocity step left alpha open, and with it a critical stiffness; the line of a step says where it was."""
+    protocol = ss.Protocol(
+        pieces=(
+            ss.protocol.NormalStressStep(at=60.2, by=0.1 * lab.STRESS),
+            ss.protocol.VelocityStep(at=120.13, to=5e-6),
+        ),
+        until=180.0,
+    )
+    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(lab.rig(alpha=0.3), protocol, seed=3))
+    table = ss.experiments.step_table(fit)
+    pressed, driven = table.lines[:2]
+    assert pressed.normal_stress == pytest.approx(lab.STRESS, rel=1e-5)
+    assert "normal_memory.alpha" not in driven.estimates()
+    assert driven.fit.plan.rig.value("friction.normal_memory.alpha") == fit["alpha"].value
+    assert driven.estimates()["k_c"].determined
+    assert "changes of normal stress alone" not in " ".join(table.to_dict()["lines"][1]["warnings"])
+    told = table.to_dict()["lines"][0]["warnings"]
+    assert told
+    text = table.latex_text()
+    assert f"11 MPa: {told[0]}" in text.replace(r"$^{*}$", "")
+    assert r"11 MPa$^{*}$ & " in text
+    assert " & rms & " in text
+    assert "Values in parentheses are not determined" in table.methods
+    table.to_csv(tmp_path / "t.csv")
+    assert told[0] in next(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))["warnings"]
+
+
 def test_latex_and_methods(joint, table, tmp_path):
     table.to_latex(tmp_path / "t.tex")
     text = (tmp_path / "t.tex").read_text()

@@ -21,6 +21,7 @@ from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.words import warnings
 from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.files.output import write_columns, write_text
 from steadyslip.machine.slider import Slider
 
@@ -120,7 +121,9 @@ class StepTable(Displayed):
         return {"lines": lines, "left_out": list(self.left_out), "methods": self.methods}
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the table as CSV, SI units in the header; an error is empty where a value is not determined.
+        """Write the table as CSV, SI units in the header, the warnings of each line last.
+
+        An error is empty where a value is not determined.
 
         Raises
         ------
@@ -135,24 +138,31 @@ class StepTable(Displayed):
             found = [one.get(name) for one in own]
             columns[f"{name} ({si})"] = [one and one.value for one in found]
             columns[f"{name} error ({si})"] = [one.error if one and one.determined else None for one in found]
+        columns["warnings"] = ["; ".join(warnings(line.fit)) for line in self.lines]
         write_columns(path, columns, "%.8g")
 
     def latex_text(self) -> str:
-        r"""Table as LaTeX: a ``tabular``, with the sentence for the methods section as a comment above it."""
+        r"""Table as LaTeX: a ``tabular``, with the sentences for the methods section as a comment above it.
+
+        Values in parentheses are not determined. Lines with warnings are marked by stars, and these are comments too.
+        """
         names = self._estimated()
-        about = {name: si for name, si in ABOUT.items() if name not in ("samples", "rms")}
-        heads = [name + (f" ({_unit(si, name)})" if si else "") for name, si in about.items()]
+        about = {name: si for name, si in ABOUT.items() if name != "samples"}
+        heads = [name + (f" ({_unit(si, name)})" if si not in ("", "1") else "") for name, si in about.items()]
         heads += [
             f"${_letter(name, self.joint.plan.rig)}$" + (f" ({_unit(si)})" if si != "1" else "")
             for name, si in names.items()
         ]
-        rows = []
+        rows, comments = [], [f"% {self.methods}"]
         for line in self.lines:
             own, here = line.estimates(), line.about()
             cells = [_cell(here[name], _shown(si, name)) for name, si in about.items()]
+            told = warnings(line.fit)
+            cells[1] += "$^{*}$" if told else ""
+            comments += [f"% * {here['record']}, {here['step']}: {text}" for text in told]
             cells += [_with_error(own.get(name)) for name in names]
             rows.append(" & ".join(cells) + r" \\")
-        body = [f"% {self.methods}", rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
+        body = [*comments, rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
                 " & ".join(heads) + r" \\", r"\hline", *rows[:-1], r"\hline", rows[-1], r"\hline",
                 r"\end{tabular}"]  # fmt: skip
         return "\n".join(body) + "\n"
@@ -197,13 +207,22 @@ class StepTable(Displayed):
             f"Outliers weighed less ({plan.loss} loss)." if plan.loss != "linear" else "",
             "Samples were weighted." if plan.weights is not None else "",
         ]
+        left = sum(one.whiteness.p < STRUCTURE for one in (*self.steps, self.joint))
+        open_ones = any(not one.determined for line in self.lines for one in line.estimates().values())
+        said = [
+            f"Residuals of {left} of these {len(self.lines)} fits have structure (probability of their whiteness below "
+            f"{STRUCTURE:g})."
+            if left
+            else "",
+            "Values in parentheses are not determined by the data." if open_ones else "",
+        ]
         noise = "allowing for correlated residuals" if self.joint.correlated else "for independent residuals"
         alone = f"{len(self.steps)} step{'s were' if len(self.steps) != 1 else ' was'} fitted alone"
         added = "".join(f" {text}" for text in further if text)
         return (
             f"Friction was fitted by least squares with steadyslip {self.joint.version}: {kind}, coupled to a spring "
             f"and driven by {driven}, with {', '.join(free)} free.{added} {alone}, and all together; errors are one "
-            f"standard deviation, {noise}."
+            f"standard deviation, {noise}." + "".join(f" {text}" for text in said if text)
         )
 
     def __str__(self) -> str:
@@ -211,7 +230,7 @@ class StepTable(Displayed):
         for line in self.lines:
             where = f"{line.record}: {line.step}" if line.step else f"all together ({line.record})"
             lines.append(where)
-            lines.append("  " + ", ".join(f"{name} {one.shown()}" for name, one in line.estimates().items()))
+            lines.append("  " + ", ".join(f"{name} {_value(one)}" for name, one in line.estimates().items()))
             lines += [f"  ! {text}" for text in (warnings(line.fit) if line.step else ())]
         return "\n".join([*lines, *(f"! {text}" for text in self.left_out), "", self.methods])
 
@@ -254,8 +273,9 @@ def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
             weights = None if plan.weights is None else plan.weights[i][np.isin(record.time, part.time)]
             later = part.time[0] > record.time[0]  # then friction may still change since the step before
             begin = {"initial": "free"} if later else {}
+            rig, free = (plan.rig, plan.free) if part.stress_changes else _without_memory(fit, i)
             try:
-                alone = search_fit(plan.rig, part, plan.free, weights=weights, progress=progress, **options | begin)
+                alone = search_fit(rig, part, free, weights=weights, progress=progress, **options | begin)
             except SteadyslipError as error:
                 left_out.append(f"{record.source}: {step} could not be fitted alone: {error}")
                 continue
@@ -265,6 +285,16 @@ def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
     sources = ", ".join(dict.fromkeys(record.source for record in plan.records))
     lines.append(FittedStep(sources, None, fit))
     return StepTable(tuple(lines), tuple(left_out))
+
+
+def _without_memory(fit: Fit, record: int) -> tuple[Slider, tuple[str, ...]]:
+    """Rig with a memory of normal stress as fitted to all records, and what else is free: for a step without effect."""
+    plan = fit.plan
+    fields_of = tuple(f"friction.{name}." for name in plan.rig.friction.decided_by_stress)
+    held = [n for n in plan.free if n.startswith(fields_of) or n in plan.rig.of_kind("stress share")]
+    known = fit.rig(record)
+    rig = plan.rig.with_values({name: known.value(name) for name in held})
+    return rig, tuple(name for name in plan.free if name not in held)
 
 
 def _parts(record: Record) -> Iterator[tuple[LoadStep, Record]]:
@@ -278,11 +308,18 @@ def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
                      for own in (record.displacement, record.normal))  # fmt: skip
     if moved is not None and record.displacement is not None:
         moved -= float(record.displacement[0])
+    if step.kind.startswith("normal"):  # its samples lie on both sides of the step
+        normal = step.before
     load = record.loading.load
     rates = (step.before, step.after) if step.unit == "m/s" else (None, None)
     if step.unit == "Pa" and load is not None:
         rates = (float(load.at(np.array([step.time]))[0]),) * 2
     return FittedStep(record.source, step, alone, moved, normal, rates)
+
+
+def _value(one: Estimate) -> str:
+    """Value and error with units; a value that is not determined in parentheses."""
+    return one.shown() if one.determined else f"({format_quantity(one.value, one.unit, area=one.area)})"
 
 
 def _shown(si: str, column: str = "") -> str:

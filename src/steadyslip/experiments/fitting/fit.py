@@ -27,7 +27,6 @@ from steadyslip.experiments.fitting.search import (
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
-from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.loading import as_followed
 from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
@@ -204,7 +203,7 @@ def search_fit(
 def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | None, **options: Any) -> Fit:
     """Fit along pieces that follow the load point; where that leaves structure or fails, along the better loading."""
     fits, problems = [], []
-    for own in (list(map(_as_it_follows, records)), [_as_commanded(one) for one in records]):
+    for own in ([_followed(record, pieces) for record in records] for pieces in (True, False)):
         try:
             fits.append(search_fit(rig, own, free, **options))
         except NotAvailable as problem:
@@ -221,18 +220,9 @@ def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | No
     return min(fits, key=operator.attrgetter("rms"))
 
 
-def _as_commanded(record: Record) -> Record:
-    """Record whose load point moves as it was commanded, whether or not its displacement is beside that."""
-    return replace(record, commanded=as_followed(record.loading, False))
-
-
-def _as_it_follows(record: Record) -> Record:
-    """Record whose load point moves in pieces where its displacement, not across the fault, is beside the command."""
-    load, displacement = record.loading.load, record.displacement
-    if load is None or load.otherwise is None or displacement is None:
-        return record
-    across = yielding(record.time, displacement, record.friction, load) is not None
-    return replace(record, commanded=as_followed(record.loading, not across))
+def _followed(record: Record, pieces: bool) -> Record:
+    """Record whose load point moves in pieces where its displacement is beside the command, or as it was commanded."""
+    return replace(record, commanded=as_followed(record.loading, pieces))
 
 
 def _without_outliers(plan: Plan, found: SearchResult) -> tuple[Record, ...]:

@@ -81,17 +81,17 @@ def _across_fault(fit: FitNumbers) -> list[str]:
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         if record.displacement is None or record.integrated or loading.load is None:
             continue
-        lost = yielding(record.time, record.displacement, record.friction, loading.load)
-        if lost is None:
+        behind = yielding(record.time, record.displacement, record.friction, loading.load)
+        if behind is None:
             continue
         stress = steady_state(fit.rig(0)).normal_stress if record.normal is None else float(np.mean(record.normal))
-        if stress / lost > _RIGID * _stiffness(fit.rig(0)):
+        if stress / behind.lost > _RIGID * _stiffness(fit.rig(0)):
             continue
-        spring = format_quantity(stress / lost, "Pa/m")
+        spring = format_quantity(stress / behind.lost, "Pa/m")
         found.append(
             f"{record.source}: the displacement falls where friction rises, as across the fault, or behind a spring of "
-            f"{spring}: it cannot show how a servo follows, and changes of rate found in it may be the fault's own; "
-            "add shear stress over that stiffness to it, or give the rates that were commanded as a protocol"
+            f"{spring}: rates were found without what that takes, but it cannot show how a servo follows; give the "
+            "rates that were commanded as a protocol, or add shear stress over that stiffness where it is known"
         )
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -9,30 +10,101 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Course
+from steadyslip.experiments.numerics.splitting import level_noise
 
 WITH_FRICTION = -0.5
 """Correlation of displacement and friction from which the one moves with the other. Of 50 records of the load point
 none was beyond -.05; of 18 measured across the fault 12 were, the others lost in noise or in changes found instead."""
 REPEATS = 3  # times that the course is found again
+AS_WELL = 1.2  # ratio of scatters up to which one course follows a displacement as well as another
+CERTAIN = 10.0  # errors that a displacement lost per friction must be above 0: noise may be correlated
+STEPS_OF_TIMES = 6  # of Newton's method for the times of steps; two or three suffice near them
 FEWEST = 5  # samples between two changes that show how both move
 
 
-def yielding(time: Array, displacement: Array, friction: Array, course: Course) -> float | None:
-    """Displacement lost per friction (m): what a spring between sensor and load point takes; None if there is none.
+@dataclass(frozen=True)
+class Yielding:
+    """Spring between a displacement sensor and the load point.
 
-    The changes of rate are found again in the displacement without that, until both agree.
+    Attributes
+    ----------
+    lost : float
+        Displacement that it takes per friction, m.
+    course : Course
+        Of the load point itself, without that displacement.
+    """
+
+    lost: float
+    course: Course
+
+
+def yielding(time: Array, displacement: Array, friction: Array, course: Course) -> Yielding | None:
+    """What a spring between sensor and load point takes; None if there is none.
+
+    Displacement moves with friction on the lines of its course, or with fewer changes and friction it is followed as
+    well as by a course of more, or late ones. The course is found again without that, until both agree.
     """
     if course.curve is not None or not course.strays > 0:
         return None
     lost, together = _slope(time, displacement - course.integral(time), friction, course)
-    if together > WITH_FRICTION:
+    apart = together > WITH_FRICTION
+    if apart:
+        lost = _with_fewer_changes(time, displacement, friction, course)
+    if not lost > 0:
         return None
+    found = course
     for _ in range(REPEATS):
-        course = load_course(time, displacement + lost * friction)
-        if course.curve is not None:
+        found = load_course(time, displacement + lost * friction)
+        if found.curve is not None:
             break
-        lost, _ = _slope(time, displacement - course.integral(time), friction, course)
-    return lost if lost > 0 else None
+        lost, _ = _slope(time, displacement - found.integral(time), friction, found)
+    simple = found.curve is None and not _is_late(found) and len(found.changes) <= len(course.changes)
+    return Yielding(lost, found) if lost > 0 and (simple or not apart) else None
+
+
+def _is_late(course: Course) -> bool:
+    """True if the load point follows changes late, or may."""
+    return course.otherwise is not None or any(change.lag or change.pieces for change in course.changes)
+
+
+def _with_fewer_changes(time: Array, displacement: Array, friction: Array, course: Course) -> float:
+    """Displacement lost per friction (m) by which steps, as many as a course has or fewer, follow as well; 0 if none.
+
+    Two changes beside each other may be one at which friction has its peak.
+    """
+    times = np.array([change.time + change.lag for change in course.changes])
+    if not len(times) or (len(times) == 1 and not _is_late(course)):
+        return 0.0
+    best = course.otherwise or course
+    own, noise = float(np.std(displacement - best.integral(time))), level_noise(friction)
+    while len(times):
+        lost, error, strays = _steps_and_friction(time, displacement, friction, times)
+        if strays <= AS_WELL * np.hypot(own, lost * noise) and lost > CERTAIN * error:
+            return lost
+        if len(times) == 1:
+            break
+        first = int(np.argmin(np.diff(times)))
+        times = np.concatenate([times[:first], [np.mean(times[first : first + 2])], times[first + 2 :]])
+    return 0.0
+
+
+def _steps_and_friction(time: Array, displacement: Array, friction: Array, times: Array) -> tuple[float, float, float]:
+    """Displacement lost per friction (m), its error, and scatter about steps of rate near given times and friction."""
+    t, times = time - time[0], times - time[0]
+    rates = np.array([])
+    for last in [False] * STEPS_OF_TIMES + [True]:
+        since = np.maximum(t - times[:, None], 0.0)
+        jumps = [] if last else list(since > 0)  # a jump stands for a change that was earlier or later
+        rows = np.column_stack([np.ones_like(t), t, *since, -friction, *jumps])
+        found, *_ = np.linalg.lstsq(rows, displacement)
+        if not last:
+            rates, levels = found[2 : 2 + len(times)], found[-len(times) :]
+            with np.errstate(all="ignore"):
+                times = np.clip(np.nan_to_num(times - levels / rates), t[1], t[-2])
+    off = displacement - rows @ found
+    scatter = float(np.std(off))
+    inverse = np.linalg.pinv(rows.T @ rows)
+    return float(found[2 + len(times)]), scatter * float(np.sqrt(inverse[2 + len(times), 2 + len(times)])), scatter
 
 
 def _slope(time: Array, strays: Array, friction: Array, course: Course) -> tuple[float, float]:

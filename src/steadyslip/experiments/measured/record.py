@@ -19,6 +19,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.results import read_only
 from steadyslip.core.roles import Parameter
+from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import LoadStep, oscillation, steps_of, stress_course
@@ -84,10 +85,16 @@ class Record(Displayed, Keeper):
 
     @cached_property
     def loading(self) -> Loading:
-        """Commanded loading, as found in the measured displacement and normal stress."""
+        """Commanded loading, as found in the measured displacement and normal stress.
+
+        A displacement that moves with friction, as across the fault, is followed without what the spring between takes.
+        """
         if self.commanded is not None:
             return self.commanded
         load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
+        if load is not None and self.displacement is not None and not self.integrated:
+            behind = yielding(self.time, self.displacement, self.friction, load)
+            load = load if behind is None else behind.course
         total = self.total_normal
         pore = None
         if self.pore_pressure is not None and total is not None:  # counted so that no level of it is zero

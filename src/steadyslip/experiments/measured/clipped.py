@@ -8,11 +8,14 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.measured.record import Record
-from steadyslip.experiments.numerics.splitting import level_noise
+from steadyslip.experiments.numerics.splitting import level_noise, spread
 
 SHORTEST = 3  # samples of a run
 CHANCE = 1e-6  # of so long a run in a record whose samples are as often equal to their neighbour as the others of it
 GAP = 5  # samples between runs of one peak: noise brings the channel back below its limit for a moment
+PLATEAU, QUIET = 10, 0.3
+"""Samples of a plateau, and its noise as a share of that of the record: of a random walk, or white noise about a peak,
+one in 1e7 stays so close to its largest value so long."""
 STILL = 1e-3  # share of the median change from sample to sample below which a channel stands still
 CLIPPED = "at a limit of the channel"
 BESIDE = 2  # samples on each side with which a sample is compared
@@ -32,7 +35,8 @@ def without_clipped(record: Record) -> Record:
     full = np.zeros(len(record), dtype=bool)
     for values in (record.friction, record.shear):
         if values is not None:
-            full |= clipped(values) | clipped(-values)
+            for own in (values, -values):
+                full |= clipped(own) | flattened(own)
     return _without(record, full, CLIPPED)
 
 
@@ -104,6 +108,23 @@ def clipped(values: Array) -> Array:
         runs = np.split(peak, np.flatnonzero(np.diff(peak) > 1) + 1)
         if max(map(len, runs)) >= max(longest, SHORTEST) and _is_cut_off(values, peak):
             found[peak[0] : peak[-1] + 1] = True
+    return found
+
+
+def flattened(values: Array) -> Array:
+    """Mask (n,) of the samples of values (n,) around its largest that lie on a plateau quieter than the noise.
+
+    A channel cuts peaks and the noise on them off before a later stage adds noise of its own.
+    """
+    found = np.zeros(len(values), dtype=bool)
+    noise = spread(np.diff(values, 2)) / np.sqrt(6.0)
+    near = np.flatnonzero(values >= np.max(values) - noise)
+    for peak in np.split(near, np.flatnonzero(np.diff(near) > GAP) + 1):
+        first, last = int(peak[0]), int(peak[-1]) + 1
+        beside = np.concatenate([values[max(first - PLATEAU, 0) : first], values[last : last + PLATEAU]])
+        inside = first > 0 and last < len(values) and len(peak) >= PLATEAU
+        if inside and np.std(values[first:last]) < QUIET * noise and np.mean(beside) < np.min(values[peak]) - noise:
+            found[first:last] = True
     return found
 
 

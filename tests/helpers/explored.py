@@ -27,7 +27,8 @@ BAR = 1e-12
 @cache
 def library():
     web = files("steadyslip.explorer.web")
-    modules = [web.joinpath(name).read_text(encoding="utf-8") for name in ("polynomials.js", "modes.js", "linear.js")]
+    names = ("polynomials.js", "modes.js", "nearness.js", "linear.js")
+    modules = [web.joinpath(name).read_text(encoding="utf-8") for name in names]
     return javascript.as_script(javascript.runtime(), *modules)
 
 

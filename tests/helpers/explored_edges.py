@@ -157,8 +157,6 @@ def _other_edges(page, values, own):
 def other_lists(page, found, edges):
     """Differences of the list of nearest edges from that of an analysis: places, words, values and order."""
     listed, wrong = {page.names[one["i"]]: one for one in edges}, []
-    rows, _ = edge_rows(found)
-    rows = {row[0]: row for row in rows}
     order = []
     for margin in found.margins:
         if margin.parameter not in page.names:
@@ -172,7 +170,11 @@ def other_lists(page, found, edges):
             wrong.append(f"{margin.parameter} = {margin.value!r}: {mine and mine['at']} for {theirs}")
             continue
         order.append(margin.parameter)
-        _, value, edge, _, words = map(written, rows[margin.parameter])
+        _, value, edge, _, words = map(written, edge_rows(found, margin)[0])
+        second, other = next((edge.value for edge in margin.about[1:]), math.nan), mine.get("other", math.nan)
+        near = any(abs(one - margin.value) <= NEAR * size for one in (second, other))
+        if near and not abs(second - other) <= SHARE * size:
+            wrong.append(f"{margin.parameter}: the other edge {other} for {second}")
         texts = [*mine["told"], mine["words"]]
         if not all(map(same_text, texts, (value, edge, words))):
             wrong.append(f"{margin.parameter}: {texts} for {[value, edge, words]}")

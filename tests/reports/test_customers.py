@@ -94,7 +94,7 @@ def test_a_stable_rig_is_told_what_to_hold():
     found = ss.analyze(ss.read_rig("examples/double-direct-shear.toml"))
     text = words("".join(recommendation(found)))
     assert "evolution effect b₁, now 0.006: keep it below 0.009113" in text
-    assert "Of what can be set, the nearest is that of stiffness k, now 20 GPa/m: keep it above 2.503 GPa/m" in text
+    assert "Of what can be set, the nearest is that of preload σ₀, now 25 MPa: keep it below 171.4 MPa" in text
     assert "preload σ₀, now 25 MPa: keep it below" in words(
         "".join(recommendation(found, Order((), {"contact.preload": ss.verdict.Adjustment()})))
     )

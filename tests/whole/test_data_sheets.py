@@ -216,7 +216,7 @@ def test_the_edge_of_the_first_line_is_that_of_the_first_row(name):
     remote = [margin.remote for margin in with_edge if margin.value]
     assert remote == sorted(remote)
     text = str(found)
-    rows = text.partition("Nearest edge in each parameter")[2].splitlines()[1:]
+    rows = text.partition("Nearest edges in each parameter")[2].splitlines()[1:]
     first = next(row.split()[0] for row in rows if " -> " in row)
     assert with_edge[0].parameter.endswith(first)
     if "nearest edge is that of" in " ".join(text.split()):

@@ -37,6 +37,7 @@ from steadyslip.explorer.sketch import sketch
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.linear_sets import linear_set
+from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.search import Search
 from steadyslip.linear.status import STABLE, UNSTABLE, status
 from steadyslip.machine.letters import letter_of, said
@@ -53,9 +54,9 @@ from steadyslip.verdict.reasons import page_reasons
 from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES, PACE
 
 MODULES = (
-    "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
-    "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view", "leaving", "stories",
-    "page",
+    "dom", "quantities", "polynomials", "modes", "nearness", "linear", "rig", "search", "words", "plot", "chart",
+    "edges", "banner", "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view",
+    "leaving", "stories", "page",
 )  # fmt: skip
 """Modules of the page in `web/`, each after those that it imports."""
 ENTRIES = ("mount", "render")
@@ -341,7 +342,7 @@ def _nearest_edge(rig: Machine, point: OperatingPoint, name: str | None) -> floa
     if found is None or name is None or not np.any(found.changes):
         return None
     edges = found.edges[found.changes]
-    return float(edges[np.argmin(np.abs(edges - float(rig.value(name) or 0.0)))])
+    return float(edges[nearest_end(edges, float(rig.value(name) or 0.0))])
 
 
 def _judged_slider(rig: Slider, point: OperatingPoint, name: str | None) -> tuple[float | None, Sequence[complex]]:

@@ -14,6 +14,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.roles import Parameter
 from steadyslip.figures.style import axis_label, display_unit, parameter_label
 from steadyslip.linear.boundary import boundary
+from steadyslip.linear.nearness import ends_about
 from steadyslip.machine.slider import Slider
 
 _RANGE_FACTOR = 20.0  # default range of a positive parameter: value / 20 to value x 20 (by trial)
@@ -99,7 +100,7 @@ def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tup
         )
     known = rig if rig.parameters()[name].value is not None else rig.with_values({name: value})
     edges = [edge.value for edge in boundary(known, name)]
-    nearest = min(edges, key=lambda edge: abs(edge - value), default=value)
+    nearest = next(iter(ends_about(value, edges)), value)
     if value and not 1 / _MAX_EDGE_RATIO < abs(nearest / value) < _MAX_EDGE_RATIO:
         nearest = value
     if nearest == value == 0:

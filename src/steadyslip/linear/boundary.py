@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from steadyslip.linear.coupling import search_for
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
 from steadyslip.linear.measured_search import MeasuredSearch
+from steadyslip.linear.nearness import doublings, ends_about
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
@@ -46,7 +48,7 @@ class Margin(Displayed):
     value : float
         The rig's own.
     edge : Boundary or None
-        The nearest; None if stability does not change in the range searched.
+        The nearest by `steadyslip.linear.nearness`; None if stability does not change in the range searched.
     edges : tuple of Boundary
         All in the range searched.
     absolute : float
@@ -69,9 +71,17 @@ class Margin(Displayed):
     @property
     def remote(self) -> bool:
         """True if the nearest edge is more than a factor `REMOTE` from the value; never for angles and zero values."""
-        if self.edge is None or self.unit == "rad" or not self.value or not self.edge.value:
-            return False
-        return not 1 / REMOTE < abs(self.edge.value / self.value) < REMOTE
+        return self.edge is not None and self.is_remote(self.edge)
+
+    @property
+    def about(self) -> tuple[Boundary, ...]:
+        """The edges next to the value, below and above it, nearest first; a remote one only if it is the nearest."""
+        found = edges_about(self.value, self.edges)
+        return found[:1] + tuple(edge for edge in found[1:] if not self.is_remote(edge))
+
+    def is_remote(self, edge: Boundary) -> bool:
+        """True if an edge is more than a factor `REMOTE` from the value; never for angles and zero values."""
+        return self.unit != "rad" and bool(doublings(self.value, edge.value) >= math.log2(REMOTE))
 
 
 @checked(between=LOW_AND_HIGH)
@@ -216,8 +226,9 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
                 continue
             (low, high), (first, last) = search.searched, search.decided
             own = _margin(name, address.role.unit, search.value, edges, (max(low, first), min(high, last)))
-            cuts = [abs(end - search.value) for end in (first, last) if low < end < high]
-            if min(cuts, default=np.inf) < (np.inf if own.edge is None else abs(own.absolute)):
+            cut_off = [end for end in (first, last) if low < end < high]
+            next_to = [*cut_off, *(() if own.edge is None else (own.edge.value,))]
+            if ends_about(search.value, next_to, own.unit)[:1] in [(end,) for end in cut_off]:
                 cut.append(_unknown(rig, search, low, high))
                 if not isinstance(search, MeasuredSearch):  # whose edges are told beside what errors leave open
                     continue
@@ -246,13 +257,13 @@ def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Ma
 
 def _margin(name: str, unit: str, value: float, edges: tuple[Boundary, ...], searched: tuple[float, float]) -> Margin:
     """Margin of a parameter, from its value and its edges."""
-    edge = min(edges, key=lambda one: abs(one.value - value), default=None)
+    edge = next(iter(edges_about(value, edges)), None)
     gap = edge.value - value if edge else float("nan")
     return Margin(name, unit, value, edge, edges, gap, gap / abs(value) if value else float("nan"), searched)
 
 
 def _urgency(margin: Margin) -> tuple[bool, float]:
-    """Sorting key: relative distance, remote ones last; angles count by radians, zeros after others that have an edge.
+    """Sorting key: `doublings` to the edge, remote ones last; values of zero after others that have an edge.
 
     Distances that differ by rounding only are equal: parameters then stay in the order of the rig.
     """
@@ -260,8 +271,14 @@ def _urgency(margin: Margin) -> tuple[bool, float]:
         return True, np.inf
     if not margin.value and margin.unit != "rad":
         return True, 1e300
-    distance = abs(margin.absolute if margin.unit == "rad" else margin.relative)
-    return margin.remote, float(f"{distance:.{_TIED}g}") if distance > 10.0**-_TIED else 0.0
+    far = float(doublings(margin.value, margin.edge.value, margin.unit))
+    return margin.remote, float(f"{far:.{_TIED}g}") if far > 10.0**-_TIED else 0.0
+
+
+def edges_about(own: float, edges: Sequence[Boundary]) -> tuple[Boundary, ...]:
+    """Edges next to a value of their parameter, below and above it, nearest first."""
+    at = {edge.value: edge for edge in edges}
+    return tuple(at[end] for end in ends_about(own, list(at), edges[0].unit if edges else ""))
 
 
 def _role(rig: Rig, full: str) -> Parameter:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.linear.linear_sets import linear_set, not_linear_error, sets_of
+from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.roots import Array
 from steadyslip.linear.stiffness import STIFFNESS, critical_stiffness, in_chunks, own_safety_factor, stable_stiffness
 from steadyslip.machine.machine import Machine
@@ -181,5 +182,4 @@ def nearest_value(intervals: Array, own: ArrayLike) -> Array:
     """Positive finite end of a stable interval nearest to a rig's own value, (...); NaN without one."""
     ends = intervals.reshape(*intervals.shape[:-2], -1)
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)
-    distance = np.where(np.isnan(ends), np.inf, np.abs(ends - np.asarray(own, dtype=float)[..., None]))
-    return np.take_along_axis(ends, np.argmin(distance, axis=-1)[..., None], axis=-1)[..., 0]
+    return np.take_along_axis(ends, nearest_end(ends, own)[..., None], axis=-1)[..., 0]

@@ -23,6 +23,7 @@ from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic, matrix_route
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_many_windows_error
+from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.linear.roots import Array, ComplexArray, quietly
@@ -400,13 +401,11 @@ def _nearest(low: Array, high: Array, own: Array) -> Array:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # shortcut for the common case, for speed
             return np.asarray(cubic.unless(cubic.positive(low), low))
-        is_low = (low > 0) & ~((high < np.inf) & (np.abs(high - own) < np.abs(low - own)))
+        is_low = (low > 0) & ~((high < np.inf) & (own > np.sqrt(low) * np.sqrt(high)))  # as of `doublings`
         return np.where(is_low, low, np.where(high < np.inf, high, np.nan))
     ends = np.concatenate([low, high], axis=-1)
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)
-    distance = np.where(np.isnan(ends), np.inf, np.abs(ends - np.asarray(own)[..., None]))
-    nearest = np.argmin(distance, axis=-1)[..., None]
-    return np.take_along_axis(ends, nearest, axis=-1)[..., 0]
+    return np.take_along_axis(ends, nearest_end(ends, own)[..., None], axis=-1)[..., 0]
 
 
 @quietly

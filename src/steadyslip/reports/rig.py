@@ -119,11 +119,11 @@ def _meaning(one: Address, letter: str) -> str:
 
 def edge_table(analysis: Analysis) -> Iterator[str]:
     """HTML table of the nearest edge of every parameter, and a line of the parameters without one."""
-    rig, (rows, without) = analysis.rig, edge_rows(analysis)
-    far = [one.parameter for one in analysis.margins if one.remote]
-    if rows := [row for row in rows if row[0] not in far]:
+    rig, far = analysis.rig, [one.parameter for one in analysis.margins if one.remote]
+    without = [one.parameter for one in analysis.margins if one.edge is None]
+    if rows := [row for one in analysis.margins if not one.remote for row in edge_rows(analysis, one)]:
         head = ("parameter", "now", "edge", "change", "beyond it")
-        yield paragraph("The nearest edge in each parameter, the others unchanged.")
+        yield paragraph("The nearest edges in each parameter, below and above it, the others unchanged.")
         yield table(((said(rig, name), *rest) for name, *rest in rows), head, caption="Nearest edges.")
     if far:
         words = EDGE_WORDS["far"].format(remote=REMOTE).capitalize()

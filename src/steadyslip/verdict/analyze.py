@@ -15,7 +15,7 @@ from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.version import version
-from steadyslip.linear.boundary import Margin, margins, margins_and_missing, oscillatory_edge
+from steadyslip.linear.boundary import Margin, edges_about, margins, margins_and_missing, oscillatory_edge
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.mode_table import growth_origin
 from steadyslip.linear.modes import Mode, matrix_mode, mode_of
@@ -226,7 +226,7 @@ def _onset(rig: Slider | Machine, distances: Sequence[Margin], branch: int) -> O
     if margin is None or not edges:
         return None
     with suppress(NotAvailable):  # with a delay
-        return onset_at(rig, min(edges, key=lambda one: abs(one.value - margin.value)), branch)
+        return onset_at(rig, edges_about(margin.value, edges)[0], branch)
     return None
 
 

@@ -344,7 +344,7 @@ def _period(one: Findings) -> str:
 
 
 def _edge(one: Findings) -> str:
-    rows, _ = edge_rows(one)
+    rows = edge_rows(one, one.margins[0]) if one.margins else []
     return " ".join(rows[0][i] for i in (0, 3)) if rows else ""
 
 

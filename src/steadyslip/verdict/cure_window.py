@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pages import Displayed
 from steadyslip.core.written import of_load
+from steadyslip.linear.nearness import doublings, ends_about
 
 LEAST = 1e-12  # smallest value searched over the largest, of a parameter that is zero
 
@@ -47,16 +47,22 @@ class Window(Displayed):
         """End of a window nearest to the rig's own value; None inside a window or without one."""
         if not self.windows or any(low <= self.value <= high for low, high in self.windows):
             return None
-        return min((end for one in self.windows for end in one), key=lambda end: distance(self.value, end))
+        return ends_about(self.value, [end for one in self.windows for end in one], self.unit)[0]
 
     @property
     def leaves(self) -> float | None:
         """Nearest edge of the window around the rig's own value; None if it is in none, or if that has no edge."""
-        for ends in self.windows:
-            if ends[0] <= self.value <= ends[1]:
-                edges = [end for end in ends if end not in self.limits]
-                return min(edges, key=lambda end: distance(self.value, end), default=None)
-        return None
+        return next(iter(self.edges_around), None)
+
+    @property
+    def edges_around(self) -> tuple[float, ...]:
+        """Edges of the window around the rig's own value, nearest first: two, one or none."""
+        around = [ends for ends in self.windows if ends[0] <= self.value <= ends[1]]
+        return ends_about(self.value, [end for ends in around for end in ends if end not in self.limits], self.unit)
+
+    def doublings(self, to: float) -> float:
+        """How far a value is from the rig's own, by `steadyslip.linear.nearness`."""
+        return float(doublings(self.value, to, self.unit))
 
     def __str__(self) -> str:
         if not self.windows:
@@ -89,8 +95,3 @@ class Window(Displayed):
         factor, unit = self.told or (1.0, self.unit)
         with of_load(self.load):
             return format_quantity(value * factor, unit, area=self.area)
-
-
-def distance(value: float, other: float) -> float:
-    """Doublings from one value to another; 1 from or to zero, or through it."""
-    return abs(math.log2(other / value)) if value * other > 0 else float(value != other)

@@ -17,12 +17,13 @@ from steadyslip.core.options import Tested, checked
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
 from steadyslip.linear.boundary import REMOTE, boundary, searched
+from steadyslip.linear.nearness import doublings, ends_about
 from steadyslip.linear.status import stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.chances import Chances, chances_of
 from steadyslip.verdict.change_costs import SPEED, unit_cost
-from steadyslip.verdict.cure_window import LEAST, Window, distance
+from steadyslip.verdict.cure_window import LEAST, Window
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.tolerances import GIVEN, format_chance
 from steadyslip.verdict.unknown import ValuesWithin, stable_within
@@ -103,10 +104,10 @@ class Cures(ReadOnly):
         alone += [OWN_VALUES] if self.without_tolerances else []
         if self.chance >= self.sure:
             already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
-            near = [one for one in self.fails if one.leaves is not None and distance(one.value, one.leaves) <= FAR]
-            lines = [f"{one.parameter:<{wide}}{_change(one, one.leaves)}" for one in near]
+            near = {one: [end for end in one.edges_around if one.doublings(end) <= FAR] for one in self.fails}
+            lines = [f"{one.parameter:<{wide}}{_change(one, *ends)}" for one, ends in near.items() if ends]
             whatever = f"whatever single value changes by less than a factor of {REMOTE}"
-            found = [f"{already}. What would lose it first:", *lines] if near else [f"{already}, {whatever}"]
+            found = [f"{already}. What would lose it first:", *lines] if lines else [f"{already}, {whatever}"]
             return "\n".join([*found, *alone])
         lines = [f"To be {wanted} (now {now})", *alone]
         if (best := self.best) is not None:
@@ -147,10 +148,9 @@ class Cures(ReadOnly):
         return found
 
 
-def _change(one: Window, to: float | None) -> str:
-    if to is None:
-        return "unchanged"
-    return f"from {one.written(one.value)} to {one.written(to)}"
+def _change(one: Window, *to: float | None) -> str:
+    ends = [one.written(end) for end in to if end is not None]
+    return f"from {one.written(one.value)} to {' or '.join(ends)}" if ends else "unchanged"
 
 
 @checked(tolerances=GIVEN, sure=SURE)
@@ -307,7 +307,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
         return replace(found, cost=math.inf, beyond=_beyond(chances, name, (low, high)))
     if found.nearest is None:
         return found
-    return replace(found, cost=_unit_cost(name, one) * distance(found.value, found.nearest))
+    return replace(found, cost=_unit_cost(name, one) * found.doublings(found.nearest))
 
 
 def _unit_cost(name: str, one: Adjustment) -> float:
@@ -322,7 +322,8 @@ def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[s
         return None
     outside = {"above": lambda value: value > limits[1], "below": lambda value: value < limits[0]}
     found = [(one.stable, one.value) for one in edges if one.stable in outside and outside[one.stable](one.value)]
-    return min(found, key=lambda one: distance(chances.own(name), one[1]), default=None)
+    ends = ends_about(chances.own(name), [value for _, value in found], chances.rig.parameters()[name].role.unit)
+    return next((one for one in found if one[1] == ends[0]), None)
 
 
 def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first: Array, halvings: int) -> Array:
@@ -362,12 +363,8 @@ def _fails(chances: Chances, windows: Sequence[Window], sure: float) -> tuple[Wi
         if one.value and not one.role.gauge and name not in chances.rig.not_in_model
     ]
     every = [known.get(name) or _windows(chances, name, Adjustment(), sure) for name in names]
-    lost = [(one, one.leaves) for one in every]
-    return tuple(
-        one for one, _ in sorted(
-            ((one, end) for one, end in lost if end is not None), key=lambda both: distance(both[0].value, both[1])
-        )
-    )  # fmt: skip
+    far = [(one.doublings(one.leaves), one) for one in every if one.leaves is not None]
+    return tuple(one for _, one in sorted(far, key=lambda both: both[0]))
 
 
 def _cheapest_pair(
@@ -387,8 +384,8 @@ def _cheapest_pair(
 
 
 def _cost(chances: Chances, adjust: Mapping[str, Adjustment], name: str, to: Array) -> Array:
-    far = [distance(chances.own(name), float(one)) for one in np.atleast_1d(to)]
-    return np.asarray(_unit_cost(name, adjust[name]) * np.array(far))
+    far = doublings(chances.own(name), to, chances.rig.parameters()[name].role.unit)
+    return np.asarray(_unit_cost(name, adjust[name]) * np.atleast_1d(far))
 
 
 def _coarse(

@@ -12,6 +12,7 @@ from steadyslip.core.areas import stress_name
 from steadyslip.core.checks import Check
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
+from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint
@@ -48,7 +49,7 @@ def stiffness_numbers(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
     numbers: dict[str, Any] = {"stable_stiffness": tuple((float(a), float(b)) for a, b in intervals)}
     at = np.flatnonzero(found.changes)
     if at.size:
-        i = at[np.argmin(np.abs(found.edges[at] - own))]
+        i = at[nearest_end(found.edges[at], own)]
         critical, beta = float(found.edges[i]), float(found.frequencies[i])
         numbers["critical_stiffness"] = critical
         numbers["critical_angular_frequency"] = beta if math.isfinite(beta) else None

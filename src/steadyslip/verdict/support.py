@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from steadyslip.linear.linear_sets import linear_set
+from steadyslip.linear.nearness import doublings
 from steadyslip.machine.letters import words_of
 from steadyslip.machine.rig import Rig
 from steadyslip.model.point import operating_point
@@ -65,7 +66,7 @@ def support_stiffness(analysis: Findings) -> SupportStiffness:
     stable = tuple((float(low), float(high)) for low, high in found.intervals if not math.isnan(low))
     ends = [(end, side) for pair in stable for end, side in zip(pair, ("above", "below"), strict=True)]
     edges = [(end, side) for end, side in ends if 0 < end < np.inf]
-    critical, side = min(edges, key=lambda edge: abs(edge[0] - gain), default=(None, None))
+    critical, side = min(edges, key=lambda edge: doublings(gain, edge[0]), default=(None, None))
     return SupportStiffness(label, gain, 0.0, critical, side, stable, label)
 
 

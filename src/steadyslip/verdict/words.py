@@ -222,27 +222,30 @@ def disturbance(analysis: Findings) -> str:
     return text if analysis.on_edge else f"{text} without oscillating"
 
 
-def edge_rows(analysis: Findings) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
-    """Rows (name, value, edge, change, what happens beyond) of parameters with an edge; names of those without."""
-    rows = [_margin_row(analysis, margin, margin.edge) for margin in analysis.margins if margin.edge is not None]
-    return rows, [margin.parameter for margin in analysis.margins if margin.edge is None]
+def edge_rows(analysis: Findings, margin: Margin) -> list[tuple[str, str, str, str, str]]:
+    """Rows (name, value, edge, change, what happens beyond) of the edges about a value, nearest first."""
+    return [_margin_row(analysis, margin, edge) for edge in margin.about]
 
 
 def margin_table(analysis: Findings) -> list[str]:
     """Lines of the table of nearest edges, one parameter varied at a time; those beyond a factor `REMOTE` last."""
     if not analysis.margins:
         return []
-    rows, without = edge_rows(analysis)
-    lines = ["", "Nearest edge in each parameter, the others unchanged, and what happens beyond it"]
-    rows = [(name, value, f"-> {edge}", change, words) for name, value, edge, change, words in rows]
-    widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
-    table = ["  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows]
-    remote = [one.remote for one in analysis.margins if one.edge is not None]
-    lines += [line for line, far in zip(table, remote, strict=True) if not far]
-    if any(remote):
-        lines += [f"  {EDGE_WORDS['far'].format(remote=REMOTE)}:"]
-        lines += [line for line, far in zip(table, remote, strict=True) if far]
-    if without:
+    lines = ["", "Nearest edges in each parameter, the others unchanged, and what happens beyond them"]
+    rows = [
+        (one.remote, (name, value, f"-> {edge}", change, words))
+        for one in analysis.margins
+        for name, value, edge, change, words in edge_rows(analysis, one)
+    ]
+    widths = [max(len(cells[i]) for _, cells in rows) for i in range(4)] if rows else []
+    for far in (False, True):
+        table = [cells for is_far, cells in rows if is_far == far]
+        lines += [f"  {EDGE_WORDS['far'].format(remote=REMOTE)}:"] if far and table else []
+        lines += [
+            "  " + "  ".join([*(cell.ljust(w) for cell, w in zip(cells, widths, strict=False)), cells[4]])
+            for cells in table
+        ]
+    if without := [one.parameter for one in analysis.margins if one.edge is None]:
         lines += textwrap.wrap(
             f"no edge within range: {', '.join(without)}", 98, initial_indent="  ", subsequent_indent="    "
         )
@@ -251,16 +254,17 @@ def margin_table(analysis: Findings) -> list[str]:
 
 def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:
     """Row of the table of nearest edges: name, value, edge, change and what happens beyond."""
+    gap = edge.value - margin.value
     if margin.unit == "rad":
-        change = f"{math.degrees(margin.absolute):+.4g} deg"
+        change = f"{math.degrees(gap):+.4g} deg"
     elif not margin.value:
         change = "from zero"
     elif 0 < (ratio := edge.value / margin.value) < 0.1 or abs(ratio) > 10:
         change = f"x {ratio:.4g}"
     else:
-        change = f"{100 * margin.relative:+.4g} %"
-    towards = "above" if margin.absolute > 0 or (margin.absolute == 0 and edge.stable == "below") else "below"
-    if analysis.on_edge and abs(margin.absolute) <= NEXT_TO_IT * abs(margin.value):
+        change = f"{100 * gap / abs(margin.value):+.4g} %"
+    towards = "above" if gap > 0 or (gap == 0 and edge.stable == "below") else "below"
+    if analysis.on_edge and abs(gap) <= NEXT_TO_IT * abs(margin.value):
         change, words = "0", EDGE_WORDS["here" if edge.stable == "neither" else "beside"].format(side=edge.stable)
     elif edge.stable == towards:
         words = EDGE_WORDS["stable"]

@@ -1,5 +1,6 @@
 // Nearest edge of every parameter, and values just beside it.
 import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { about, doublings } from "./nearness.js";
 import { inside } from "./rig.js";
 import { NEXT_TO_IT } from "./words.js";
 
@@ -8,27 +9,21 @@ const TIED = 6; // digits to which distances are compared, as in steadyslip/line
 
 /**
  * Nearest edge of every parameter, nearest first and far ones last: value, status behind it, far or not, and two values close to it:
- * `landing` on its stable side (or the side with steady sliding, if none is stable), and `behind` on its other side.
+ * `landing` on its stable side (or the side with steady sliding, if none is stable), and `behind` on its other side; `other` is the edge on the other side of the value.
  * @param {import("./page.js").Page} page
  */
 export function edgesOf(page) {
-  const { remote } = page.rig.data; // ratio to the own value above which an edge counts as far
-  const found = /** @type {{i: number, at: number, gap: number, stable: string, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
+  const most = Math.log2(page.rig.data.remote); // doublings from the own value from which an edge counts as far
+  const found = /** @type {{i: number, at: number, gap: number, stable: string, distance: number, beyond: number, far: boolean, landing: number, behind: number, other?: number}[]} */ ([]);
   page.rig.data.parameters.forEach((one, i) => {
-    const value = page.rig.values[i], { edges, low, high } = page.found[i], size = one.unit === "rad" ? 1 : Math.abs(value);
-    let best = null;
-    edges.forEach(({ at, below, above }, n) => {
-      const away = at > value;
-      if (below === UNKNOWN || above === UNKNOWN) return; // no valid rig on one side
-      const [here, beyond] = away ? [below, above] : [above, below];
-      const gap = Math.abs(at - value);
-      if (best !== null && gap >= best.gap) return;
-      const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < remote && times > 1 / remote);
-      const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // true if the side to land on is behind the edge
-      const room = (up) => (up ? (edges[n + 1]?.at ?? high) : (edges[n - 1]?.at ?? low)) - at;
-      best = { i, at, gap, stable: above === STABLE ? "above" : below === STABLE ? "below" : "", distance: !size ? Infinity : gap > NEXT_TO_IT * size ? Number((gap / size).toPrecision(TIED)) : 0, beyond, far, landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)) };
-    });
-    if (best) found.push(best);
+    const value = page.rig.values[i], { edges, low, high } = page.found[i];
+    const [edge, other] = about(edges.filter(({ below, above }) => below !== UNKNOWN && above !== UNKNOWN), (one) => one.at, value, one.unit); // with a valid rig on both sides
+    if (!edge) return;
+    const { at, below, above } = edge, n = edges.indexOf(edge), away = at > value, [here, beyond] = away ? [below, above] : [above, below], doubled = doublings(value, at, one.unit);
+    const isFar = (end) => one.unit !== "rad" && doublings(value, end) >= most;
+    const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // true if the side to land on is behind the edge
+    const room = (up) => (up ? (edges[n + 1]?.at ?? high) : (edges[n - 1]?.at ?? low)) - at;
+    found.push({ i, at, gap: Math.abs(at - value), stable: above === STABLE ? "above" : below === STABLE ? "below" : "", distance: !value && one.unit !== "rad" ? Infinity : doubled > NEXT_TO_IT ? Number(doubled.toPrecision(TIED)) : 0, beyond, far: isFar(at), landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)), other: other && !isFar(other.at) ? other.at : undefined });
   });
   return found.sort((a, b) => Number(a.far) - Number(b.far) || a.distance - b.distance || 0);
 }

@@ -81,7 +81,8 @@ export class Facts {
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.put(page.with(edge.i, edge.landing));
       });
-      return make("li", {}, go, ` ${change(one, page.rig.values[edge.i], edge.at)}: ${beyondWords(edge, page)}`);
+      const moved = (at) => change(one, page.rig.values[edge.i], at), other = edge.other === undefined ? "" : `; the other edge: ${told(one, edge.other)}, ${moved(edge.other)}`;
+      return make("li", {}, go, ` ${moved(edge.at)}: ${beyondWords(edge, page)}${other}`);
     });
     const found = page.edges(), far = found.filter((edge) => edge.far);
     const near = found.filter((edge) => !edge.far), [next] = near, one = next && page.rig.data.parameters[next.i];

@@ -1,6 +1,7 @@
 // Linear stability of a rig at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
 // The equations themselves are generated (steadyslip/explorer/equations.py).
 import { modeOf } from "./modes.js";
+import { about } from "./nearness.js";
 import { roots } from "./polynomials.js";
 
 /** @typedef {import("./polynomials.js").Complex} Complex */
@@ -328,7 +329,7 @@ function resolved({ intervals, ends }, size) {
 /** End of a stable set nearest to a value, and its stable side. @param {Interval[] | null} intervals @param {number[]} ends */
 function nearestEnd(intervals, ends, own) {
   if (!ends.length) return { critical: null, side: null };
-  const critical = ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a));
+  const [critical] = about(ends, (k) => k, own);
   return { critical, side: intervals?.some((one) => one.low === critical) ? "above" : "below" };
 }
 

@@ -1,5 +1,6 @@
 // Rig of a page: values and their domains, status, checks against Python, links and rig files.
 import { ABSENT, Linear, UNKNOWN } from "./linear.js";
+import { about } from "./nearness.js";
 import { exactly, tellIn } from "./quantities.js";
 
 /**
@@ -193,7 +194,4 @@ export function rangeOf(one, value, edges) {
 }
 
 /** Positive value nearest to a size, by ratio. @param {number[]} values @param {number} size */
-export function nearestOf(values, size) {
-  const far = (x) => Math.abs(Math.log(x / size));
-  return values.length ? values.reduce((a, b) => (far(b) < far(a) ? b : a)) : undefined;
-}
+export const nearestOf = (values, size) => about(values, (x) => x, size)[0];

@@ -24,8 +24,9 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.pages import Displayed
-from steadyslip.linear.boundary import boundary
+from steadyslip.linear.boundary import boundary, edges_about
 from steadyslip.linear.linear_sets import linear_sets
+from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
@@ -217,7 +218,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
         found = "; ".join(str(edge) for edge in edges) or "stability does not change at all"
         raise NotAvailable(f"no oscillatory edge of stability along {name}: {found}")
     own = float(rig.parameters()[name].value)  # type: ignore[arg-type]  # boundary() refuses None
-    return onset_at(rig, min(oscillatory, key=lambda edge: abs(edge.value - own)), branch)
+    return onset_at(rig, edges_about(own, oscillatory)[0], branch)
 
 
 def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
@@ -347,8 +348,7 @@ def _onsets(point: OperatingPoint, name: str) -> Array:
     count = point.size
     edges, frequencies, changes = (a.reshape(count, -1) for a in (found.edges, found.frequencies, found.changes))
     usable = changes.astype(bool) & (frequencies > 0) & np.isfinite(frequencies)
-    distance = np.where(usable, np.abs(edges - own[:, None]), np.inf)
-    nearest = np.argmin(distance, axis=1)
+    nearest = nearest_end(np.where(usable, edges, np.nan), own, point.model.roles[name].unit)
     rows = np.flatnonzero(usable.any(axis=1))
     result = np.full((count, 3), np.nan)
     result[:, 0] = KINDS.index("none")

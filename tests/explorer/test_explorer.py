@@ -19,9 +19,10 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.quantities import parse
 from steadyslip.explorer.assembly import page_parts
 from steadyslip.explorer.equations import _stable_set_programs, _verdict_values, linear_part
-from steadyslip.explorer.minify import minify, minify_generated, share_numbers, shorten_declared, shorten_names
+from steadyslip.explorer.minify import minify, minify_generated, share_numbers, shorten_names
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
 from steadyslip.explorer.programs import program
+from steadyslip.explorer.variables import shorten_variables
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing
@@ -172,14 +173,16 @@ def test_what_cannot_be_printed_is_refused_in_words():
         linear_part(rig(contact=Turning(preload=SIGMA)))
 
 
-def test_names_of_modules_are_shortened_where_they_name_nothing_else():
-    """Not those of properties, methods and fields, in text, or in use elsewhere; also in templates, after spreads."""
-    own = "const LIMIT=3,SHARED=4;const sizes=(many)=>[...many,LIMIT];class Box{kept=1;measured(){return SHARED}}\n"
-    own += "const kept=2,measured=`text ${sizes([LIMIT])[0]} {}`,text='a';const known=(a)=>a?LIMIT:SHARED;"
-    declared = ("LIMIT", "SHARED", "sizes", "Box", "kept", "measured", "text", "known")
-    assert shorten_declared(own, declared, {"known"}) == (
-        "const b=3,c=4;const d=(many)=>[...many,b];class e{kept=1;measured(){return c}}\n"
-        "const kept=2,measured=`text ${d([b])[0]} {}`,text='a';const known=(a)=>a?b:c;"
+def test_variables_of_modules_are_shortened_and_nothing_else():
+    """Properties, keys, methods, fields and text keep their names, of variables those in use elsewhere."""
+    own = "const LIMIT=3;const sizes=(many,{length,kept=2})=>[...many,LIMIT,{kept,class:many.length,sizes(){}}];"
+    own += "class Box{kept=LIMIT;get sizes(){return this.kept}async measured(text){return{sizes,text}}}\n"
+    own += "for(const{kept}of known){const text=`kept ${sizes([LIMIT,{kept}])[0]} {text} ${kept}`;"
+    own += "({kept:text,Box}=kept?.text)}"
+    assert shorten_variables(own, {"known"}) == (
+        "const b=3;const e=(d,{length:g,kept:a=2})=>[...d,b,{kept:a,class:d.length,sizes(){}}];"
+        "class f{kept=b;get sizes(){return this.kept}async measured(c){return{sizes:e,text:c}}}\n"
+        "for(const{kept:a}of known){const c=`kept ${e([b,{kept:a}])[0]} {text} ${a}`;({kept:c,Box:f}=a?.text)}"
     )
 
 
@@ -193,7 +196,7 @@ def test_shortened_code_says_the_same():
     )
     assert minify(text) == 'const a=1;const b="// @ /** x */";let c=((b)).d;'
     nested = "const t = `a ${b ? `- ${c} ` : \" ; \"} , d`, r = e.replace(/ , \\//g, ' - ') + + 1 - -f;\n"
-    assert minify(nested) == "const t=`a ${b ? `- ${c} ` : \" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ +1- -f;"
+    assert minify(nested) == "const t=`a ${b?`- ${c} `:\" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ +1- -f;"
     sums = "    var t2 = ((R[0] * x) + R[1]);\n    var t3 = ((t2 - (x * x)) < (t2 * (x + 1)));\n"
     assert minify_generated(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));"
     negative = "    var t1 = R[0] + (-R[1]) * x + (-1.0);\n    var t2 = (-x) - 20.0;\n"

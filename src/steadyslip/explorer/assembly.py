@@ -7,6 +7,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -27,13 +28,14 @@ from steadyslip.explorer.minify import (
     minify,
     minify_css,
     minify_generated,
+    names_in,
     share_numbers,
-    shorten_declared,
     shorten_names,
 )
 from steadyslip.explorer.motion import DRIVER, driver, motion_part
 from steadyslip.explorer.own_file import display_unit, own_file
 from steadyslip.explorer.sketch import sketch
+from steadyslip.explorer.variables import shorten_variables
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.linear_sets import linear_set
@@ -68,6 +70,8 @@ DEFAULTS = {
 """Entries that the data of a parameter leave out where they are these, which a page has once."""
 WORKER_MODULES = ("motion",)
 """Modules of the worker, which also gets the runtime and the driver, as text from the page."""
+WORKER_ENTRIES = ("Motion", "serve")
+"""Names of these modules that the worker's own code uses."""
 MOTION_KEYS = ("layout", "routines", "segments")
 """Entries of a kernel that `web/motion.js` uses beside its programs."""
 POLICY = (
@@ -149,16 +153,9 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
             del moving["parameters"]  # equal to those of `facts`
     except NotAvailable as refused:  # a page without motion still has the verdict
         still = str(refused)
-    modules = [_read_web(f"{name}.js") for name in MODULES]
-    library = [_read_web(f"{name}.js") for name in WORKER_MODULES]
-    modules.insert(0, javascript.runtime(text, *modules))
-    script = shorten_declared(
-        minify(javascript.as_script(*modules)),
-        javascript.declared_names(*modules),
-        {*ENTRIES, *javascript.runtime_names()},
-    )
-    needed = javascript.runtime(machine, driven, *library)
-    worker = minify(javascript.as_script(needed, *library)) + _minified(driven, DRIVER)
+    script = _joined(MODULES, ENTRIES, text)
+    engine = _minified(driven, DRIVER)
+    worker = _joined(WORKER_MODULES, {*WORKER_ENTRIES, *names_in(engine)}, machine, driven) + engine
     known = _data(rig, title, branch, facts, file) | {
         "motion": moving,
         "still": still,
@@ -171,6 +168,18 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
         "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
     )
     return code, known
+
+
+def _joined(names: Iterable[str], known: Iterable[str], *generated: str) -> str:
+    """Minified modules of `web/` in one scope, with what they and generated code need of the runtime."""
+    modules = [_read_web(f"{name}.js") for name in names]
+    needed = javascript.runtime(*generated, *modules)
+    return _shortened(javascript.as_script(needed, *modules), frozenset({*known, *javascript.runtime_names()}))
+
+
+@cache
+def _shortened(script: str, known: frozenset[str]) -> str:
+    return shorten_variables(minify(script), known)
 
 
 def _minified(generated: str, known: Iterable[str]) -> str:

@@ -22,11 +22,11 @@ _SPACED_SIGNS = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
 def minify(text: str) -> str:
     """Minified text of a JavaScript module without multi-line strings."""
-    bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
+    bare = re.sub(r"^ *(//.*|/\*\*(?:(?!\*/)[\s\S])*\*/) *\n", "", text, flags=re.M)
     bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # JSDoc types within a line
     bare = re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
     return _LINE_END.sub(
-        r"\1", "".join(_SPACED_SIGNS.sub(_strip_spaces, part) if code else part for part, code in _split_literals(bare))
+        r"\1", "".join(_SPACED_SIGNS.sub(_strip_spaces, part) if code else part for part, code in split_code(bare))
     )
 
 
@@ -62,7 +62,7 @@ def _hole_end(text: str, at: int) -> int:
     return at
 
 
-def _split_code(text: str) -> Iterator[tuple[str, bool]]:
+def split_code(text: str) -> Iterator[tuple[str, bool]]:
     """Parts as those of `_split_literals`, with the code within template literals as parts of their own."""
     for part, code in _split_literals(text):
         if part[:1] != "`":
@@ -73,7 +73,7 @@ def _split_code(text: str) -> Iterator[tuple[str, bool]]:
             if part.startswith("${", at):
                 end = _hole_end(part, at + 2)
                 yield part[start - (start == 1) : at + 2], False
-                yield from _split_code(part[at + 2 : end])
+                yield from split_code(part[at + 2 : end])
                 start = at = end
             at += 2 if part[at] == "\\" else 1
         yield part[start - (start == 1) :], False
@@ -103,13 +103,7 @@ def minify_generated(text: str) -> str:
 
 
 _NAME = re.compile(r"(?<![\w.$])[A-Za-z_]\w*")
-_WORD = re.compile(r"(?<![\w$])[A-Za-z_]\w*")
-_MEMBER = re.compile(r"(?<!\.)\.([A-Za-z_]\w*)")
-# perhaps a key, a shorthand property, a method or a field; constants, in capitals, are none of the last three
-_KEY = re.compile(
-    r"(?:(?<=[{,;}\n])|(?<=[gs]et )|(?<=async ))(?:([A-Z_]+)(?=:)|(?![A-Z_]+\b)([A-Za-z_]\w*)(?=[,:}(=]))"
-)
-_LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 # names of JavaScript that occur in generated code
 _RESERVED = frozenset(
     re.findall(
@@ -127,6 +121,11 @@ def function_names(text: str) -> set[str]:
     return set(re.findall(r"^ *function (\w+)", text, flags=re.M))
 
 
+def names_in(text: str) -> set[str]:
+    """Names in code without strings."""
+    return set(_NAME.findall(text))
+
+
 def shorten_names(text: str, known: Iterable[str]) -> str:
     """Generated code with its own names replaced by short ones, the shortest for the most frequent.
 
@@ -139,34 +138,9 @@ def shorten_names(text: str, known: Iterable[str]) -> str:
     """
     taken = _RESERVED.union(known)
     counts = Counter(name for name in _NAME.findall(text) if name not in taken)
-    free = (name for size in (1, 2, 3) for name in map("".join, product(_LETTERS, repeat=size)) if name not in taken)
+    free = (name for size in (1, 2, 3) for name in map("".join, product(LETTERS, repeat=size)) if name not in taken)
     short = {name: next(free) for name, _ in sorted(counts.items(), key=lambda item: (-item[1], item[0]))}
     return _NAME.sub(lambda found: short.get(found[0], found[0]), text)
-
-
-def shorten_declared(text: str, declared: Iterable[str], known: Iterable[str]) -> str:
-    """Minified modules with short names for what they declare, wherever that cannot be the name of a property.
-
-    Parameters
-    ----------
-    text : str
-        Modules joined into one scope.
-    declared : iterable of str
-        Names that they declare at their outermost level.
-    known : iterable of str
-        Names used by other code, which are kept.
-    """
-    parts = list(_split_code(text))
-    codes, others = ([part for part, is_code in parts if is_code == kind] for kind in (True, False))
-    taken = _RESERVED.union(known, *map(_WORD.findall, codes))
-    kept = {*known, *(name for part in others for name in _WORD.findall(part))}
-    kept |= {name for part in codes for name in _MEMBER.findall(part)}
-    kept |= {name for part in codes for names in _KEY.findall(part) for name in names}
-    counts = Counter(name for part in codes for name in _WORD.findall(part))
-    found = sorted({*declared} - kept, key=lambda name: (-counts[name] * (len(name) - 2), name))
-    free = (name for size in (1, 2) for name in map("".join, product(_LETTERS, repeat=size)) if name not in taken)
-    short = {name: next(free) for name in found if len(name) > 2}
-    return "".join(_WORD.sub(lambda one: short.get(one[0], one[0]), part) if code else part for part, code in parts)
 
 
 def share_numbers(text: str) -> str:

@@ -257,6 +257,27 @@ def test_conditions_by_label_and_the_same_record_twice(fits):
         ss.population(fits | {"again": fits["run 1"]})
 
 
+def test_other_conditions_move_means_and_what_follows(fits):
+    """Along the straight line of the means, a prediction for a machine as well; beyond the experiments it is told."""
+    rock = ss.population(fits, ["a", "b", "d_c"], conditions="normal stress", count=400)
+    ends = {stress: rock.at({"normal stress": stress}) for stress in (5e6, 20e6)}
+    low, high = (ends[stress].mean("a").value for stress in (5e6, 20e6))
+    assert high / low == pytest.approx(4**0.2, rel=0.05)
+    slope = rock.slope("a", "normal stress")[0]
+    assert np.log(high / low) == pytest.approx(15e6 * slope, rel=0.02)
+    middle = rock.at({"normal stress": np.mean([5e6, 10e6, 20e6])})
+    assert middle.mean("a").value == pytest.approx(rock.mean("a").value, rel=1e-12)
+    others = {stress: np.median(one.others()["friction.a"]) for stress, one in ends.items()}
+    assert others[20e6] / others[5e6] == pytest.approx(high / low, rel=0.02)
+    told = str(ss.predict(lab.rig(), ends[20e6], count=100))
+    assert "another experiment of a population at normal stress 20 MPa" in told
+    assert "means           at normal stress 5 MPa" in str(ends[5e6])
+    assert "! normal stress 40 MPa is beyond 5 MPa to 20 MPa" in str(rock.at({"normal stress": 40e6}))
+    for wrong, words in (({"stress": 1e6}, "allowed: 'normal stress'"), ({"normal stress": "hot"}, "finite number")):
+        with pytest.raises(ss.ParameterError, match=words):
+            rock.at(wrong)
+
+
 def test_the_same_record_cut_thinned_or_averaged_is_not_another():
     measured = [lab.record(lab.rig(), lab.STEP, seed, count=600) for seed in (1, 2)]
     first = measured[0]
@@ -391,6 +412,7 @@ def test_a_population_goes_with_one_law_and_no_bootstrap(files):
     done = fit_all(files, SPEC.format("") + "[fit]\ncompare = ['slip', 'aging']\n")
     assert "fit.compare: cannot be combined with [population]" in done.stderr
     assert "--bootstrap: cannot be combined" in fit_all(files, SPEC.format(""), "--bootstrap", 5).stderr
+    assert "rock.csv: a population has no table of steps" in fit_all(files, SPEC.format(""), "-o", "rock.csv").stderr
 
 
 def test_what_cannot_be_a_population_is_refused(fits):

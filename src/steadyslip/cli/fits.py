@@ -84,9 +84,9 @@ def fit(
             message = "cannot be combined with [population], whose draws carry the uncertainty"
             raise ParameterError([Problem("--bootstrap", message)])
         if steps or listed:
-            raise ParameterError(
-                [Problem("--steps", "cannot be combined with [population]; leave it and its table out")]
-            )
+            name = "--steps" if steps else f"-o {listed[0]}"
+            message = "a population has no table of steps; allowed: files .nc, .html, .json or of a figure"
+            raise ParameterError([Problem(name, message)])
         members = population_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
         output_result(members, output or (), as_json, write_population)
         return

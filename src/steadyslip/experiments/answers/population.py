@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -66,6 +66,8 @@ class Population(ReadOnly):
         Scale s₀ of the prior of the spreads, exp(−s²/2s₀²)/√s, e-folds or natural sizes.
     draws : Pooled
         Draws from the posterior, in the coordinates of `axes`.
+    where : dict of str to float
+        Conditions that means and new experiments are at, as `at` sets them; others are at their mean.
     """
 
     fits: Mapping[str, Fit]
@@ -73,17 +75,60 @@ class Population(ReadOnly):
     conditions: Mapping[str, Array]
     scale: float
     draws: Pooled = field(repr=False)
-    kind = "another experiment of a population"
+    where: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """What predictions from it are of."""
+        at = " and ".join(f"{name} {_condition(name, value)}" for name, value in self.where.items())
+        return "another experiment of a population" + (f" at {at}" if at else "")
 
     @cached_property
     def axes(self) -> Axes:
         """Coordinates: logarithms of positive parameters, natural sizes of others, a − b in place of the first b."""
         return Axes(self.fits, self.names)
 
+    def at(self, where: Mapping[str, float]) -> Population:
+        """The same population with its means, new experiments and predictions at other conditions.
+
+        Parameters
+        ----------
+        where : mapping of str to float
+            Conditions by name, such as ``{"temperature": 80}``, SI units; conditions left out are at their mean.
+
+        Raises
+        ------
+        ParameterError
+            If a condition is unknown or no finite number.
+        """
+        allowed = ", ".join(map(repr, self.conditions)) or "none were given"
+        problems = [
+            Problem("where", f"got {name!r}; allowed: {allowed}") for name in where if name not in self.conditions
+        ]
+        problems += [
+            Problem(f"where.{name}", f"got {value!r}; allowed: a finite number")
+            for name, value in where.items()
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value)
+        ]
+        if problems:
+            raise ParameterError(problems)
+        return replace(self, where={name: float(value) for name, value in where.items()})
+
+    @cached_property
+    def _shift(self) -> Array:
+        """Coordinates (m, p) of the means less those at mean conditions."""
+        away = [self.where.get(name, np.mean(x)) - np.mean(x) for name, x in self.conditions.items()]
+        return np.asarray(self.draws.mean[:, :, 1:] @ np.array(away).reshape(-1))
+
+    @cached_property
+    def _mean(self) -> Array:
+        """Coordinates (m, p) of the means."""
+        return np.asarray(self.draws.mean[:, :, 0] + self._shift)
+
     def mean(self, name: str) -> Estimate:
-        """Mean of the population (for a positive parameter its median), at mean conditions."""
+        """Mean of the population (for a positive parameter its median), at mean conditions or those of `at`."""
         one = self.axes[name]
-        return self._estimate(one, one.value(self.draws.mean[:, :, 0]))
+        return self._estimate(one, one.value(self._mean))
 
     def experiment(self, label: str, name: str) -> Estimate:
         """Parameter of one experiment, estimated together with the others."""
@@ -93,21 +138,21 @@ class Population(ReadOnly):
         return self._estimate(one, one.value(self.draws.members[:, list(self.fits).index(label)]))
 
     def others(self, seed: int = 0) -> dict[str, Array]:
-        """Draws (m,) of all parameters of a new experiment on this rock at mean conditions, as they belong together."""
-        found = self.draws.another(seed)
+        """Draws (m,) of all parameters of a new experiment on this rock, as they belong together; see `mean`."""
+        found = self.draws.another(seed) + self._shift
         return {name: one.value(found) for name, one in self.axes.quantities.items()}
 
     def another(self, name: str, seed: int = 0) -> Estimate:
-        """Parameter predicted for a new experiment on this rock at mean conditions, with all uncertainties."""
+        """Parameter predicted for a new experiment on this rock, with all uncertainties; conditions as of `mean`."""
         one = self.axes[name]
-        return self._estimate(one, one.value(self.draws.another(seed)))
+        return self._estimate(one, one.value(self.draws.another(seed) + self._shift))
 
     def spread(self, name: str, level: float = 0.95) -> tuple[float, float, float]:
         """Standard deviation between experiments: median and ends of its central interval of probability `level`.
 
         Of the logarithm of a positive parameter, else in SI units.
         """
-        slopes = self.axes[name].gradient(self.draws.mean[:, :, 0])
+        slopes = self.axes[name].gradient(self._mean)
         return _middle_and_ends(np.linalg.norm(slopes[:, None, :] @ self.draws.root, axis=(1, 2)), level)
 
     def slope(self, name: str, condition: str) -> tuple[float, float, float]:
@@ -119,14 +164,12 @@ class Population(ReadOnly):
 
     def correlation(self, name: str, other: str) -> tuple[float, float, float]:
         """Correlation of two parameters between experiments: median and 95 % interval."""
-        first, second = (
-            (self.axes[n].gradient(self.draws.mean[:, :, 0])[:, None, :] @ self.draws.root)[:, 0] for n in (name, other)
-        )
+        first, second = ((self.axes[n].gradient(self._mean)[:, None, :] @ self.draws.root)[:, 0] for n in (name, other))
         sizes = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
         return _middle_and_ends(np.clip(np.sum(first * second, axis=1) / np.maximum(sizes, 1e-300), -1, 1))
 
     def _slopes(self, one: MemberQuantity, k: int) -> Array:
-        return np.asarray(np.sum(one.gradient(self.draws.mean[:, :, 0]) * self.draws.mean[:, :, k], axis=1))
+        return np.asarray(np.sum(one.gradient(self._mean) * self.draws.mean[:, :, k], axis=1))
 
     def _estimate(self, one: MemberQuantity, values: Array) -> Estimate:
         """Median, half of the 68 % interval and the 95 % interval of draws."""
@@ -169,8 +212,13 @@ class Population(ReadOnly):
             "sizes; of correlations towards none"
         )
         if self.conditions:
-            means = ", ".join(f"{name} {_condition(name, float(np.mean(x)))}" for name, x in self.conditions.items())
-            lines.append(f"means           at {means}")
+            where = {name: self.where.get(name, float(np.mean(x))) for name, x in self.conditions.items()}
+            lines.append(f"means           at {', '.join(f'{n} {_condition(n, x)}' for n, x in where.items())}")
+            for name, x in self.conditions.items():
+                if not np.min(x) <= where[name] <= np.max(x):
+                    ends = " to ".join(_condition(name, float(end)) for end in (np.min(x), np.max(x)))
+                    lines.append(f"! {name} {_condition(name, where[name])} is beyond {ends} of the experiments: the "
+                                 "straight lines through these are prolonged")  # fmt: skip
         if not self.draws.mixed:
             lines.append(
                 f"! the chains have not mixed ({self.draws.steps} steps, autocorrelation over {self.draws.time:.3g}): "
@@ -196,6 +244,8 @@ class Population(ReadOnly):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the population, its fits and their records to a netCDF file; `load_population` reads it back.
+
+        Conditions of `at` are not kept.
 
         Raises
         ------
@@ -241,7 +291,7 @@ class Population(ReadOnly):
         """
         found: dict[str, Array] = {}
         units: dict[str, str] = {}
-        mean = self.draws.mean[:, :, 0]
+        mean = self._mean
         for name, one in self.axes.quantities.items():
             unit = "1" if one.logarithmic else one.unit
             spread = np.linalg.norm(one.gradient(mean)[:, None, :] @ self.draws.root, axis=(1, 2))
@@ -297,7 +347,7 @@ def _spread_words(found: tuple[float, float, float], one: MemberQuantity, mean: 
     middle, low, high = found
     if one.name == DIFFERENCE:  # whose mean may be 0
         return f"{format_quantity(middle, one.unit)} ({format_range(low, high, one.unit)})"
-    middle, low, high = (100 * x / (1.0 if one.logarithmic else abs(mean)) for x in found)
+    middle, low, high = (100 * (np.expm1(x) if one.logarithmic else x / abs(mean)) for x in found)
     return f"{middle:.2g} % ({low:.2g} to {high:.2g} %)"
 
 

@@ -57,6 +57,7 @@ def _best(value: float, names: tuple[str, ...]) -> str | None:
 _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 HIDDEN = 1e-3  # share of its error below which a value is told as 0: no digit of it is known
+MOST_DIGITS = 12  # of the ends of a narrow range; beyond, digits are rounding errors
 _SHORTEST, _LONGEST = 1e-3, 1e5  # numbers between are written without exponent; others in the SI unit without prefix
 
 
@@ -124,13 +125,15 @@ def format_with_error(value: float, error: float, si_unit: str, area: float | No
 
 
 def format_range(low: float, high: float, si_unit: str, area: float | None = None, digits: int = 4) -> str:
-    """Format a range, both values in the unit chosen for the second.
+    """Format a range, both values in the unit chosen for the second, with two digits of its width at least.
 
-    >>> format_range(8.52e-6, 1.195e-5, "m")
-    '8.52 to 11.95 um'
+    >>> format_range(8.52e-6, 1.195e-5, "m"), format_range(0.599974, 0.600023, "1")
+    ('8.52 to 11.95 um', '0.599974 to 0.600023')
     """
     factor, si_unit = outside(si_unit, area)
     low, high = low * factor, high * factor
+    if math.isfinite(low) and math.isfinite(high) and low != high:
+        digits = max(digits, min(2 + math.floor(math.log10(max(abs(low), abs(high)) / abs(high - low))), MOST_DIGITS))
     number, _, name = format_quantity(high, si_unit, digits).partition(" ")
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
         return f"{format_quantity(low, si_unit, digits)} to {format_quantity(high, si_unit, digits)}"

@@ -74,7 +74,7 @@ DIMENSIONLESS = frozenset(
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _HIDDEN = frozenset(
     """rig version plan data protocol area unit units html start fit fits draws search noise plot map resonances told
-    columns""".split()  # noqa: SIM905
+    where columns""".split()  # noqa: SIM905
 )
 _SKETCH_CAPTION = (
     "Motion is to the right. Solid blue: what the drive does; dashed: what it measures; red: constant forces."

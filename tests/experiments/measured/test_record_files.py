@@ -27,7 +27,7 @@ def xlook(kind, order=">", channels=32, header=">"):
 
 @pytest.mark.parametrize(
     "layout",
-    [("f4", ">"), ("f8", ">"), ("f8", "<"), ("f4", ">", 16), ("f4", "<", 16, "<")],  # 16 channels before 2007
+    [("f4", ">"), ("f8", ">"), ("f8", "<"), ("f4", ">", 16), ("f4", "<", 16, "<"), ("f8", "<", 16)],
 )
 def test_xlook_files_are_read(tmp_path, layout):
     path = tmp_path / "p9999"

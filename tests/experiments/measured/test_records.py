@@ -40,6 +40,7 @@ def same(record, clean):
         ("t x_lp_um friction normal_MPa", " "),
         ("# time (s)  load displacement (um)  friction  normal stress (MPa)", " "),
         ("t[s] x[um] mu[-] sigma[MPa]", " "),
+        ("t/s x/um mu/1 sigma/MPa", " "),
     ],
 )
 def test_columns_are_found_by_their_names(tmp_path, clean, header, mark):

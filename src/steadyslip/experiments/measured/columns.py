@@ -83,20 +83,23 @@ def listed(names: Iterable[str]) -> str:
 def split_name(name: str) -> tuple[str, str | None]:
     """Name of a column without its unit, and the unit in it or None.
 
-    >>> split_name("Normal_stress(MPa)"), split_name("lp_disp_um"), split_name("Friction")
-    (('Normal_stress', 'MPa'), ('lp_disp', 'um'), ('Friction', None))
+    >>> split_name("Normal_stress(MPa)"), split_name("lp_disp_um"), split_name("t/s"), split_name("Friction")
+    (('Normal_stress', 'MPa'), ('lp_disp', 'um'), ('t', 's'), ('Friction', None))
     """
     name = name.strip().strip("\"'").strip()
     if match := _BRACKETS.match(name):
         found = known_unit(match[2])
         if found is not None and match[1]:
-            return match[1].strip(), found
+            return match[1].strip("/ "), found
     for separator in (",", "_", " "):
         head, _, tail = name.rpartition(separator)
         tail = tail.strip()
         plain = tail in _SUFFIXES or tail.lower() in _SPELLINGS or ("/" in tail and known_unit(tail) is not None)
         if head and plain:
             return head.strip(), known_unit(tail)
+    head, _, tail = (part.strip() for part in name.partition("/"))  # quantity/unit, as ISO 80000-1 has it
+    if head and head not in _SUFFIXES and head.lower() not in _SPELLINGS and (found := known_unit(tail.strip("()"))):
+        return head, found
     return name, None
 
 

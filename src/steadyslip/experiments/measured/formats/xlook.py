@@ -2,7 +2,7 @@
 
 A header of 36 bytes (name, numbers of records and columns, two settings), 32 channel descriptions of 84 bytes (name,
 unit, gain, comment, number of elements), then the columns one after another, as floats of four or eight bytes. Until
-2007 there were 16 channels, and floats of four bytes. Headers are big-endian, as were the machines on which XLOOK ran,
+2007 there were 16 channels. Headers are big-endian, as were the machines on which XLOOK ran,
 but for files of versions compiled elsewhere; the byte order of columns is the one that gives plausible numbers.
 """
 
@@ -16,7 +16,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
 HEAD, CHANNEL = 36, 84  # bytes of the header and of each channel's description
-LAYOUTS = ((32, 4), (32, 8), (16, 4))  # numbers of channels, and bytes per number
+LAYOUTS = ((32, 4), (32, 8), (16, 4), (16, 8))  # numbers of channels, and bytes per number
 UNUSED = "no_val"
 NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 

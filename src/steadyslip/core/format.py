@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 from steadyslip.core.areas import outside
@@ -138,6 +138,15 @@ def format_range(low: float, high: float, si_unit: str, area: float | None = Non
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
         return f"{format_quantity(low, si_unit, digits)} to {format_quantity(high, si_unit, digits)}"
     return f"{_few(low * float(number) / high, digits)} to {number} {name}".rstrip()
+
+
+def enumerated(words: Sequence[str]) -> str:
+    """Words joined by commas and an and.
+
+    >>> enumerated(["a", "b", "k"])
+    'a, b and k'
+    """
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def format_growth(low: float, high: float | None = None) -> str:

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.format import enumerated
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
 from steadyslip.experiments.fitting.fit import refit_from, search_fit
-from steadyslip.experiments.fitting.loading_words import enumerated
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.result import Fit

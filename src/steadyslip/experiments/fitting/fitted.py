@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import enumerated, format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
 from steadyslip.core.results import ReadOnly, read_only
@@ -223,23 +223,24 @@ class Fitted(ReadOnly):
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
-        """Sentences on parameters that ended at a bound of the search."""
+        """Sentences on parameters that ended at a bound of the search, one on all with the same explanation."""
         low, high = self.bounds
-        found = []
+        found: dict[tuple[str, str], list[tuple[str, str]]] = {}
         for i, one in enumerate(self.space.unknowns):
             if self._between_samples(one):  # bounded on both sides
                 continue
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
-                    value = float(one.value(bound))
-                    end = (
-                        f"{value:.7g} s"
-                        if one.unit == "s"
-                        else format_quantity(value, one.unit, area=self.plan.rig.area)
-                    )
-                    text = f"{one.name} ended at the {word} value that was searched, {end}"
-                    found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
-        return tuple(found)
+                    value, area = float(one.value(bound)), self.plan.rig.area
+                    end = f"{value:.7g} s" if one.unit == "s" else format_quantity(value, one.unit, area=area)
+                    why = self._beyond_window(one, "earlier" if bound == low[i] else "later")
+                    found.setdefault((word, why or one.name), []).append((one.name, end))
+        said = []
+        for (word, why), own in found.items():
+            names, ends = (enumerated(list(column)) for column in zip(*own, strict=True))
+            values = "value that was" if len(own) == 1 else "values that were"
+            said.append(f"{names} ended at the {word} {values} searched, {ends}{'' if why == own[0][0] else why}")
+        return tuple(said)
 
     def _between_samples(self, one: Unknown) -> bool:
         """True for times that samples bound on both sides, so that an end there says nothing."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.core.format import enumerated, format_percent, format_quantity
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.protocol_words import protocol_against_record
 from steadyslip.experiments.loading.across import yielding
@@ -162,8 +162,3 @@ def _unusual_distances(fit: FitNumbers) -> list[str]:
 def own_rate(fit: FitNumbers) -> str:
     """Rate at which the rig itself is driven, as printed."""
     return format_quantity(float(operating_point(fit.plan.rig).drive), "m/s")
-
-
-def enumerated(words: list[str]) -> str:
-    """Words joined by commas and an and."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.checks import in_words
-from steadyslip.core.format import format_percent, format_quantity
+from steadyslip.core.format import enumerated, format_percent, format_quantity
 from steadyslip.experiments.fitting.fitted_words import (
     WIDTH,
     chance,
@@ -18,7 +18,7 @@ from steadyslip.experiments.fitting.fitted_words import (
     quality,
     version_warnings,
 )
-from steadyslip.experiments.fitting.loading_words import enumerated, loading_warnings, own_rate
+from steadyslip.experiments.fitting.loading_words import loading_warnings, own_rate
 from steadyslip.experiments.fitting.memories import forgets_changes
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp

@@ -348,3 +348,29 @@ def test_bristles_per_load():
         parse("400 N/um", "1/m")
     with pytest.raises(ss.QuantityError):
         parse("400 N/um at 0 N", "1/m")
+
+
+def test_a_table_without_a_header_is_told_what_to_write(tmp_path):
+    (file := tmp_path / "t.csv").write_text("0.1,610\n0.5,600\n2,548\n5,487\n")
+    with pytest.raises(ss.ParameterError, match=r"the file has no header, .* such as: speed \[mm/min\], force \[N\]"):
+        read_speed_table(file)
+
+
+def test_exchanged_columns_are_noticed_and_others_are_not(tmp_path):
+    """Random Stribeck curves with viscous drag over three decades of speed and of load, as they are and exchanged."""
+    chance, file = np.random.default_rng(33), tmp_path / "t.csv"
+    for _ in range(200):
+        speed = np.geomspace(*sorted(10 ** chance.uniform(-6, 1, 2)), 8) * [1, 1, 1, 1, 1, 1, 1, 1.5]
+        mu = 10 ** chance.uniform(-3, 0) * (1 + chance.uniform(0, 8) * np.exp(-speed / 10 ** chance.uniform(-6, 0)))
+        load = 10 ** chance.uniform(0, 4, 8) if chance.integers(2) else np.full(8, 100.0)
+        force = load * (mu + speed * 10 ** chance.uniform(-3, 2)) * (1 + 0.02 * chance.normal(size=8))
+        rows = "\n".join(
+            f"{a!r},{b!r},{c!r}" for a, b, c in zip(*map(np.ndarray.tolist, (speed, force, load)), strict=True)
+        )
+        file.write_text(f"speed [m/s],force [N],load [N]\n{rows}\n")
+        assert not [note for note in read_speed_table(file).notes if "exchange" in note]
+    force, speed = 100 * np.linspace(1.0, 0.6, 8), np.geomspace(1e-4, 1e-1, 8)
+    rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(force.tolist(), speed.tolist(), strict=True))
+    file.write_text(f"speed [mm/min],force [N]\n{rows}\n")
+    notes = "; ".join(read_speed_table(file).notes)
+    assert "force varies by a factor of 1000 over speeds that vary by 1.7: if the names of the two columns are" in notes

@@ -1,11 +1,14 @@
 """Mistakes that one makes when a data sheet becomes a rig file: each is answered once, with what to write instead."""
 
 import re
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import steadyslip as ss
+from data_sheets import SHEETS
 from steadyslip.core.errors import UnitWarning
 from toleranced import AXIS
 
@@ -176,3 +179,115 @@ def test_a_tolerance_wider_than_its_value_is_told_in_its_unit():
     )
     with pytest.raises(ss.RigFileError, match=re.escape(answer)):
         ss.rig_from_text(AXIS.replace('"12 ± 20 % N/um"', '"12 ± 20 N/um"'))
+
+
+HUNTING = (Path(__file__).parents[2] / "examples/hunting-axis.toml").read_text(encoding="utf-8")
+GEARED = (Path(__file__).parents[2] / "examples/machines/telescope.toml").read_text(encoding="utf-8")
+SHEET = SHEETS["feed axis"]
+UNITLESS = {
+    "a load in kN": (SHEET, '"8 kN"\n', "8\n", "contact.preload = 8 has no unit and is read as 8 N; what slides there"),
+    "a stress in MPa": (ROCK, '"5 MPa"', "5", "contact.preload = 5 has no unit and is read as 5 Pa, less than 10 cm"),
+    "per cent": (SHEET, "= 0.05", "= 9.7", "largest measured are some 1.5: a number in per cent .* as a share, 0.097$"),
+    "bristles": (SHEET, '"300 N/um at 8 kN"', "300", 'friction would bend .* 400 um; .* "300 N/um at 8 kN"$'),
+    "an encoder": (
+        HUNTING,
+        "kp =",
+        "sample_time = 1e-3\nresolution = 0.05\nkp =",
+        "= 0.05 is read as 50 mm; .* 100 um",
+    ),
+    "samples": (
+        HUNTING,
+        "kp =",
+        "sample_time = 1\nkp =",
+        "sample_time = 1 is read as 1 s; the largest in use .* 20 ms",
+    ),
+    "a dead time": (HUNTING, "kp =", "delay = 2\nkp =", "delay = 2 is read as 2 s; the largest in use are some 100 ms"),
+    "a gear the other way": (
+        GEARED,
+        "gear = 0.002",
+        "gear = 500",
+        'a reduction is written "1/500", this one "500/1"$',
+    ),
+    "a lead": (MACHINE, '"10 mm/rev"', "10", "lead = 10 is read as .*; the largest in use are some 100 mm/rev: write"),
+    "an integral time": (MACHINE, '"20 ms"', "20", "tn = 20 is read as 20 s; the largest in use are some 1 s: write"),
+}
+
+
+@pytest.mark.parametrize(("text", "right", "wrong", "answer"), UNITLESS.values(), ids=UNITLESS)
+def test_a_number_without_its_unit_is_asked_about_once(text, right, wrong, answer):
+    mistaken = text.replace(right, wrong, 1)
+    assert mistaken != text
+    with pytest.warns(UnitWarning, match=answer) as caught:
+        ss.rig_from_text(mistaken)
+    assert len(caught) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.rig_from_text(text)
+
+
+def test_the_step_of_an_encoder_elsewhere_than_the_motor_is_asked_about():
+    text = MACHINE.replace('velocity = "0.05 rpm"', 'velocity = 0\nsample_time = "1 ms"\nresolution = "5 arcsec"')
+    with pytest.warns(
+        UnitWarning, match="drive.resolution = 5 arcsec is a step of motor, .* an encoder at table, write"
+    ):
+        ss.rig_from_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.rig_from_text(text.replace('measured = "table"', "#"))
+
+
+@pytest.mark.parametrize("key", ["mu_static = 0.16", 'bristle_stiffness = "20 N/um at 125 N"', "viscous = 0"])
+def test_friction_of_what_turns_is_told_how_to_be_given(key):
+    """A torque, a torque by angle or by angular speed in place of friction per load."""
+    name, unit = key.split(" = ")[0], {"mu_static": "N m", "bristle_stiffness": "N m/rad", "viscous": "N m s/rad"}
+    text = SHEETS["telescope worm"].replace("[contacts.bearing.contact]", "viscous = 0\n[contacts.bearing.contact]")
+    wrong = text.replace(key, f'{name} = "38 {unit[name]}"')
+    assert wrong != text
+    with pytest.raises(
+        ss.RigFileError, match=r"at a radius, divide by .* and name the load that presses there, as in '20"
+    ):
+        ss.rig_from_text(wrong)
+
+
+ORDINARY = """
+[friction]
+law = "lugre"
+mu_coulomb = {mu_c:.4g}
+mu_static = {mu_s:.4g}
+v_stribeck = "{v_s:.4g} mm/s"
+bristle_stiffness = {bristles:.4g}
+[contact]
+law = "constant"
+preload = {preload:.4g}
+[slider]
+area = "1 m^2"
+mass = {mass:.4g}
+[drive]
+velocity = 0
+control = "pid"
+kp = {kp:.4g}
+ki = {kp:.4g}
+delay = {delay:.4g}
+sample_time = {sample:.4g}
+resolution = {step:.4g}
+"""
+
+
+def test_ordinary_numbers_are_not_asked_about():
+    """500 axes whose numbers without a unit are of the sizes of catalogues and laboratories."""
+    chance = np.random.default_rng(33)
+
+    def between(low, high):
+        return float(np.exp(chance.uniform(np.log(low), np.log(high))))
+
+    for _ in range(500):
+        mu, mass = between(1e-3, 1.2), between(1e-2, 1e5)
+        numbers = {
+            "mu_c": mu, "mu_s": mu * chance.uniform(1, 1.6), "v_s": between(1e-2, 100),
+            "bristles": mu / between(1e-8, 1e-4),
+            "mass": mass, "preload": 9.81 * mass * between(0.1, 100), "kp": 9.81 * mass * between(1e2, 1e6),
+            "delay": between(1e-5, 0.5), "sample": between(1e-5, 0.1), "step": between(1e-9, 1e-4),
+        }  # fmt: skip
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            ss.rig_from_text(ORDINARY.format(**numbers))

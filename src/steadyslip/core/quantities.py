@@ -27,6 +27,7 @@ _BY_RADIUS = {
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)(?![a-z])", re.I | re.A)
 PER_LOAD = ("1", "1/m", "s/m")
 """Units of friction per load, which machine people know as forces: a coefficient, bristles, viscous friction."""
+_OF_FORCES = {"1": "N", "1/m": "N/um", "s/m": "N s/mm"}
 _COMMA = re.compile(r",(\d+)", re.A)
 _QUOTIENT = re.compile(r"/\s*(\d+\.?\d*)", re.A)
 _RATIO = re.compile(r":\s*(\d+\.?\d*)", re.A)
@@ -107,8 +108,10 @@ def parse(text: str, expected: str, instance: str = "") -> float:
                 "; it is per unit area: laws of a contact take that where it has an area, [contacts.NAME] "
                 "area = '0.01 m^2', all else is of the whole"
             )
-        elif found == wanted.times(_WEIGHT) and expected in PER_LOAD:
+        elif found == (loaded := wanted.times(_WEIGHT)) and expected in PER_LOAD:
             message += f"; name the load that it is of: '{text} at 3.2 kN'"
+        elif expected in PER_LOAD and (turned := _of_what_turns(found, loaded)):
+            message += f"{turned} and name the load that presses there, as in '20 {_OF_FORCES[expected]} at 125 N'"
         elif turned := _of_what_turns(found, wanted):
             message += turned
         elif (found, wanted) == (_MASS, _WEIGHT):
@@ -222,7 +225,11 @@ _EXAMPLES = {
     "kg/m^2": "200 kg/m^2",
     "Pa s/m": "1e6 Pa s/m",
     "N": "50 N",
-    "N/m": "1e6 N/m",
+    "N/m": "12 N/um",
+    "N s/m": "5 N s/mm",
+    "N m/rad": "12 kN m/rad",
+    "1/m": "400 N/um at 3.2 kN",
+    "s/m": "50 N s/mm at 3.2 kN",
     "kg": "2 kg",
     "m^2": "0.01 m^2",
 }

@@ -41,7 +41,7 @@ def band(unit: str) -> Any:
 def encoder(unit: str) -> Any:
     """Declare the step of the encoder."""
     doc = "at velocity 0: step of the encoder, to which places are rounded; needs a sample_time"
-    return parameter(unit, positive, doc, default=None)
+    return parameter(unit, positive, doc, default=None, instance="0.1 arcsec" if unit == "rad" else "0.1 um")
 
 
 class Holding(FrozenRecord):

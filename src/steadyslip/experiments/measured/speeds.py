@@ -23,6 +23,7 @@ from steadyslip.experiments.measured.formats.text import read_text
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
 FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
+STEEPEST = 20.0  # more than friction falls from rest to its least: by some 10 with an oil film (Stribeck 1902)
 _UNITS = {
     "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
     "displacement": ("m", "rad"), "direction": ("1",),
@@ -145,9 +146,12 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
         lacking = "speed" if "speed" not in found else "force"
         _refuse_misfits(Path(path))
         both = f"has columns of {' and of '.join(kinds)}; leave one out" if len(kinds) > 1 else "has no column for it"
-        names = listed(repr(name) for name in _table(Path(path)).names)
+        names = _table(Path(path)).names
+        if names == [str(place) for place in range(1, len(names) + 1)]:
+            raise _fault(source, lacking, "the file has no header, which tells what its columns are; write one as its "
+                         "first line, such as: speed [mm/min], force [N]")  # fmt: skip
         raise _fault(source, lacking, f"{both}; a table of speeds has speed, force or torque or friction, and if known "
-                     f"load and direction; its columns are {names}")  # fmt: skip
+                     f"load and direction; its columns are {listed(map(repr, names))}")  # fmt: skip
     kind, speed = kinds[0], found["speed"][0]
     turns = unit(speed.unit)[1].angle == 1
     if kind != "friction" and turns != (kind == "torque"):
@@ -176,9 +180,27 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
             pressed, twisted = None, False
     elif pressed is not None and not np.all(pressed > 0):
         raise _fault(source, "load", f"got {pressed.min():g} N; allowed: loads above 0")
+    notes += _exchanged(v, f if pressed is None or np.any(pressed == 0) else f / pressed, kind)
     return SpeedTable(
         source, v, _unsigned(source, v, f, kind), pressed, turns, kind == "friction", speed.unit, tuple(notes), twisted
     )
+
+
+def _exchanged(speed: Array, friction: Array, kind: str) -> list[str]:
+    """Note on friction that varies more with speed than anything that drags does; empty if it does not.
+
+    Drag grows with the square of speed at most, and what falls with speed falls by less than `STEEPEST`.
+    """
+    fast, rubs = np.abs(speed), np.abs(friction)
+    if not np.all(rubs > 0):
+        return []
+    spread, varies = fast.max() / fast.min(), rubs.max() / rubs.min()
+    if varies <= max(STEEPEST, spread**2):
+        return []
+    return [
+        f"{kind} varies by a factor of {varies:.0f} over speeds that vary by {spread:.2g}: if the names of the two "
+        "columns are exchanged, exchange them in the header"
+    ]
 
 
 def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:

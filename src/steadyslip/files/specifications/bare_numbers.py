@@ -4,31 +4,70 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import UnitWarning
 from steadyslip.core.format import format_quantity
 from steadyslip.core.quantities import parse, units_in
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
+from steadyslip.machine.servo import MachineDrive
 
 SPEEDS = ("m/s", "rad/s")
 STIFFNESSES = ("N/m", "Pa/m")
 STRETCHED = 1.0  # m: what friction stretches the softest of real axes and presses by is some 10 mm
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
-LARGEST = {"slip distance": 0.1, "stress share": 0.6}
-"""Largest measured values of friction parameters, by kind, SI units; a and b may be of forces, without a load."""
-ABOVE = (5.0, 1e4)  # factors above these between which another unit or per cent may be meant
+G = 9.81  # m/s^2
+
+
+class Largest(NamedTuple):
+    """Largest of known values, from where a number without a unit is questioned, SI units, and what it is largest of.
+
+    Between `ABSURD` times the latter and it another unit, per cent or the reciprocal may be meant.
+    """
+
+    value: float
+    questioned: float
+    of: str = "in use"
+
+
+ABSURD = 1e4
+LARGEST = {
+    ("slip distance", "m"): Largest(0.1, 0.5, "measured"),
+    ("stress share", "1"): Largest(0.6, 3.0, "measured"),  # a and b may be of forces, without a load
+    ("mu_coulomb", "1"): Largest(1.5, 7.5, "measured"),  # of rubber; of joints, per load of a bearing, up to 5
+    ("mu_static", "1"): Largest(1.5, 7.5, "measured"),
+    ("mu_ref", "1"): Largest(1.5, 7.5, "measured"),
+    ("resolution", "m"): Largest(1e-4, 5e-4),  # magnetic scales
+    ("resolution", "rad"): Largest(2 * math.pi / 400, 0.02),  # 100 lines, four steps each
+    ("sample_time", "s"): Largest(0.02, 0.2),
+    ("delay", "s"): Largest(0.1, 1.0),
+    ("tn", "s"): Largest(1.0, 10.0),
+    ("radius", "m"): Largest(2.0, 10.0),  # turntables, turbine rings
+    ("lead", "m/rad"): Largest(0.1 / (2 * math.pi), 0.1),  # screws of 100 mm/rev
+    ("gear", "1"): Largest(10.0, 10.0),
+}
+"""By kind of parameter or last part of its name, and SI unit."""
+REMEDIES = {
+    "gear": 'its second body turns faster than the first; a reduction is written "1/{raw:g}", this one "{raw:g}/1"',
+    "1": "a number in per cent is written as a share, {share:g}",
+    "": "write the unit that is meant",
+}
+"""What to write instead, by last part of the name, else by SI unit, else for all."""
+BENT = 2e-4  # m: by how much friction bends bristles at most before it slides; measured are some um to 0.1 mm
+LIGHTEST = 1000.0  # Pa: 10 cm of water; faults and laboratories have ten times as much and more
+LIGHT = 0.05  # share of its weight by which a body is hardly ever pressed
 BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
 
 
 def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iterable[str]) -> None:
     """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
 
-    Also of stiffnesses without a unit that friction would stretch far, of friction parameters far above all measured,
-    and of values that a friction law doubts.
+    Also of stiffnesses without a unit that friction would stretch far, of numbers far above all in use or far below,
+    of an encoder that is not where its step counts, and of values that a friction law doubts.
 
     Parameters
     ----------
@@ -39,8 +78,9 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
         Units that stand in the file. Where all are SI's own, as programs write them, only speeds are asked about.
     """
     by_programs = all(unit(name)[0] == 1.0 for name in written)
-    typed = () if by_programs else (*_soft(rig, read), *_large(rig, read))
-    for text in (*_questions(rig, read), *typed, *_doubts(rig)):
+    large = {} if by_programs else dict(_large(rig, read))
+    typed = () if by_programs else (*_soft(rig, read), *large.values(), *_light(rig, read), *_pliable(rig, read))
+    for text in (*_questions(rig, read), *typed, *_elsewhere(rig, read), *_doubts(rig, large)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -58,10 +98,12 @@ def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
                 yield f"{was}, {law}: write the unit that is meant"
 
 
-def _doubts(rig: Rig) -> Iterator[str]:
-    """What friction laws doubt, once for all contacts of which it is the same."""
+def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
+    """What friction laws doubt, once for all contacts of which it is the same; without those questioned already."""
     found: dict[str, list[str]] = {}
     for one in rig.laws_by_contact().values():
+        if any(name.startswith(f"{one.prefix}friction.mu_") for name in questioned):
+            continue  # what a law doubts is how these compare
         for text in one.friction.doubts():
             found.setdefault(text, []).append(one.prefix)
     for text, (first, *others) in found.items():
@@ -85,15 +127,82 @@ def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
         )
 
 
-def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Questions about friction parameters without a unit that are far above `LARGEST`."""
-    for name, one in rig.parameters().items():
+def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str, str]]:
+    """Names and questions of numbers without a unit that are far above `LARGEST`."""
+    parameters = rig.parameters()
+    for name, (raw, si) in read.items():
+        last, one = name.rpartition(".")[2], parameters.get(name)
+        known = LARGEST.get((one.role.kind if one else "", si)) or LARGEST.get((last, si))
+        if known is None or not _is_between(raw, known.questioned, ABSURD * known.questioned):
+            continue
+        if last.startswith("mu_") and _is_of_forces(rig, name):
+            continue
+        was, largest = (format_quantity(value, si) for value in (float(raw), known.value))
+        remedy = (REMEDIES.get(last) or REMEDIES.get(si) or REMEDIES[""]).format(raw=raw, share=raw / 100)
+        yield name, f"{name} = {raw:g} is read as {was}; the largest {known.of} are some {largest}: {remedy}"
+
+
+def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    """Questions about bristles without a unit that are far softer than all measured."""
+    for name in rig.of_kind("bristle stiffness"):
         raw, si = read.get(name, (None, ""))
-        most = LARGEST.get(one.role.kind, math.inf)
-        if isinstance(raw, (int, float)) and ABOVE[0] * most < raw < ABOVE[1] * most:
-            was, largest = (format_quantity(value, si) for value in (float(raw), most))
-            remedy = "a number in per cent is written as a share" if si == "1" else "write the unit that is meant"
-            yield f"{name} = {raw:g} is read as {was}; the largest measured are some {largest}: {remedy}"
+        at_rest = rig.parameters().get(f"{name.rpartition('.')[0]}.mu_static")
+        friction = at_rest.value if at_rest and at_rest.value else 0.0
+        if si == "1/m" and _is_between(raw, 0.0, friction / BENT) and not _is_of_forces(rig, name):
+            bend, load = format_quantity(friction / raw, "m"), format_quantity(rig.load_of(name) or 0.0, "N")
+            yield (
+                f"{name} = {raw:g} is read as {raw:g} 1/m, so that friction would bend the bristles by {bend}; "
+                f'a stiffness is written with its load, "{raw:g} N/um at {load}"'
+            )
+
+
+def _light(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    """Questions about loads without a unit that hardly press: far less than a body weighs, or than `LIGHTEST`."""
+    for name in rig.of_kind("normal stress"):
+        raw, si = read.get(name, (None, ""))
+        load, weight = rig.load_of(name), G * _mass_on(rig, name)
+        if not _is_between(raw, 0.0, math.inf):
+            continue
+        if load is not None and load < LIGHT * weight:
+            yield (
+                f"{name} = {raw:g} has no unit and is read as {format_quantity(load, 'N')}; what slides there weighs "
+                f"{format_quantity(weight, 'N')}: write the unit that is meant"
+            )
+        elif load is None and raw < LIGHTEST:
+            yield (
+                f"{name} = {raw:g} has no unit and is read as {raw:g} {si}, less than 10 cm of water press with: write "
+                "the unit that is meant"
+            )
+
+
+def _mass_on(rig: Rig, name: str) -> float:
+    """Mass (kg) of the body that slides at the contact whose parameter this is; 0 if it is not known."""
+    mass, area = "slider.mass", rig.area or 0.0
+    if isinstance(rig, Machine):
+        mass, area = f"bodies.{rig.contacts[name.split('.')[1]].body}.mass", 1.0
+    address = rig.parameters().get(mass)
+    return (address.value or 0.0) * area if address else 0.0
+
+
+def _elsewhere(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    """Question about the step of an encoder that measures another body than the one at which it is read."""
+    drive, (raw, _) = rig.drive, read.get("drive.resolution", (None, ""))
+    if raw is None or not isinstance(drive, MachineDrive) or drive.watched()[0] == drive.driven():
+        return
+    body, at = drive.watched()[0], drive.driven()
+    yield (
+        f"drive.resolution = {raw} is a step of {at}, on which the drive acts; if it is that of an encoder at {body}, "
+        f"write by how much {at} moves meanwhile"
+    )
+
+
+def _is_of_forces(rig: Rig, name: str) -> bool:
+    """True if the friction of a contact is given as forces, pressed with 1 N, so that no size is unusual."""
+    return rig.load_of(name) == 1.0
+
+
+def _is_between(raw: Any, low: float, high: float) -> bool:
+    return isinstance(raw, (int, float)) and not isinstance(raw, bool) and low < raw < high
 
 
 def _fits_better(number: float, texts: Sequence[str], si: str) -> bool:

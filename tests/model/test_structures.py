@@ -278,13 +278,3 @@ def test_contacts_at_points_that_do_not_exist_are_refused(tmp_path):
     path.write_text(path.read_text().replace('against = "reed.tip"', 'against = "reed.top"'))
     with pytest.raises(ss.RigFileError, match="tip"):
         ss.read_rig(path)
-
-
-def test_what_needs_formulas_says_that_it_is_not_offered():
-    for call in (
-        lambda: ss.simulate(reed(), until=1.0),
-        lambda: ss.state_space(reed()),
-        lambda: ss.hopf(reed(), along="friction.a"),
-    ):
-        with pytest.raises(ss.NotAvailable, match="structure"):
-            call()

@@ -408,6 +408,13 @@ class Machine(Rig):
             for name, surface in self.contacts.items()
         )  # fmt: skip
         structures = tuple(_structure_part(n, b, speeds) for n, b in self.bodies.items() if b.is_structure)
+        points = {
+            end + suffix: row
+            for end in self.ends()
+            if self._structure_at(end) is not None
+            for axis, suffix in (("x", ""), ("y", NORMAL))
+            if (row := self.row(end, axis))
+        }
         velocity, limits = self.drive.velocity, self.drive.limits()
         return Mechanism(
             tuple(coordinates),
@@ -416,6 +423,7 @@ class Machine(Rig):
             contacts,
             velocity,
             structures=structures,
+            points=points,
             limits=limits,
         )
 
@@ -480,7 +488,7 @@ def _structure_part(name: str, body: StructureBody, speeds: Mapping[str, Any]) -
     moving = np.zeros(data.size)
     if data.rigid_motions.shape[1] == 1:
         motion = data.rigid_motions[:, 0]
-        points = [(float(body.rows(one)[0] @ motion), float(speeds[f"{name}.{one}"])) for one in body.point_names()]
+        points = [(float(body.rows(one)[0] @ motion), speeds[f"{name}.{one}"]) for one in body.point_names()]
         share, speed = max(points, key=lambda pair: abs(pair[0]))
         moving = motion * (speed / share)
     places = tuple(coordinate(name, i) for i in range(data.size))

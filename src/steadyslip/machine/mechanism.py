@@ -8,7 +8,7 @@ the velocity of the drive. Displacements are relative to steady sliding.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from steadyslip.laws.contact import ContactLaw
@@ -22,13 +22,17 @@ NORMAL = ".normal"
 
 @dataclass(frozen=True)
 class DegreeOfFreedom:
-    """Coordinate of a body: name, inertia (kg or kg m²), steady speed, constant force along it, unit (m or rad)."""
+    """Coordinate of a body: name, inertia (kg or kg m²), steady speed, constant force along it, unit (m or rad).
+
+    An `inner` one is of a structure, and no result.
+    """
 
     name: str
     inertia: Any
     speed: Any
     force: Any = 0
     unit: str = "m"
+    inner: bool = False
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,8 @@ class Mechanism:
     ----------
     structures : tuple of StructurePart
         Bodies given by matrices; only machines have them.
+    points : mapping of str to Shares
+        Rows of the points of structures along the slide and, with `NORMAL` after the name, away from the surface.
     velocity
         Velocity of the drive (m/s or rad/s).
     gain
@@ -175,6 +181,7 @@ class Mechanism:
     gain: Any = 0
     axial_share: Any = None
     structures: tuple[StructurePart, ...] = ()
+    points: Mapping[str, Shares] = field(default_factory=dict)
     limits: Limits | None = None
 
     def pulling(self, port: ContactPort) -> list[Element]:

@@ -87,6 +87,10 @@ class Rig(FrozenRecord, Keeper):
             several = value.values() if isinstance(value, Mapping) else value if isinstance(value, tuple) else (value,)
             yield from (one for one in several if isinstance(one, FrozenRecord))
 
+    def ends(self) -> tuple[str, ...]:
+        """What can be pushed, by name: bodies, and of structures the points; none of a slider's one block."""
+        return tuple(self.bodies)
+
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts, which prefix their results; empty for the one contact of a slider."""

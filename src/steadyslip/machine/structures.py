@@ -276,11 +276,11 @@ class StructureBody(Body, name="structure"):
         return np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
 
     def forces(self) -> Array:
-        """Constant forces on the degrees of freedom, (n,)."""
+        """Constant forces on the degrees of freedom, (n,); of symbols where forces and presses are."""
         found = np.zeros(self.data.size)
-        for name in self.points:
+        for name, point in self.points.items():
             along, away = self.rows(name)
-            found += float(self._point(name).force) * along - float(self._point(name).press) * away
+            found = found + point.force * along - point.press * away
         return found
 
     def damping_matrix(self) -> Array:

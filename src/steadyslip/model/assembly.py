@@ -57,7 +57,7 @@ class _Assembly(Forces):
             Coordinate(
                 one.name, self.x[one.name], self.v[one.name], self.a[one.name], sp.sympify(one.inertia),
                 sp.sympify(one.speed), self.inertial[one.name], self._balance(one.name, one.inertia), one.unit,
-                self.push[one.name],
+                self.push[one.name], one.inner,
             )
             for one in self.mechanism.coordinates
         )  # fmt: skip
@@ -92,6 +92,7 @@ class _Assembly(Forces):
             late_signals=tuple(self.past),
             letting_go=self.letting_go,
             carried=None if self.single else self.statics.carried,
+            points=self.mechanism.points,
         )
 
     def _contact(self, i: int) -> Contact:
@@ -209,9 +210,14 @@ class _Assembly(Forces):
         """Named results with units; stresses of a slider, forces of a machine's contacts."""
         tables: list[tuple[str, Observables]] = []
         for one in self.mechanism.coordinates:
+            if one.inner:
+                continue
             own = "" if self.bare else f"{one.name}."
             moving = {f"{own}x": (self.x[one.name], one.unit), f"{own}v": (self.v[one.name], f"{one.unit}/s")}
             tables.append(("the block" if self.bare else one.name, moving))
+        for name, row in self.mechanism.points.items():
+            moved, pace = row_of(row, self.x), row_of(row, self.v)
+            tables.append((name, {f"{name}.x": (moved, "m"), f"{name}.v": (pace, "m/s")}))
         tables += [("the equations", self._contact_observables(site)) for site in self.sites]
         laws = [one for site in self.sites for one in self._law_observables(site)]
         tables += [(owner, seen) for owner, _, seen in laws]

@@ -16,12 +16,19 @@ from steadyslip.core.records import Address, parameters, shape_of, with_values
 from steadyslip.core.symbols import Letters
 from steadyslip.machine.letters import MEMBERS
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import LOAD_POINT, Mechanism
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
+from steadyslip.machine.structure_elements import with_elements
 from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
-from steadyslip.model.numeric import has_structure
+from steadyslip.model.numeric import has_response
+from steadyslip.model.numeric.machine_matrices import NO_PULL
 
+MEASURED = (
+    "a structure given by its measured response has no equations; analyze, boundary and margins are offered. Describe "
+    "it by matrices or modes for more"
+)
 HELD = (
     "the drive holds a place (velocity = 0), so there is no steady sliding to be stable or not: linear stability does "
     "not speak of hunting, and a loaded bristle at rest has no linearisation; ask `steadyslip hunt`, "
@@ -78,13 +85,10 @@ def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model
     """Build the Model without checks; `drive` is `MOVED`, `PULLED` or `EITHER`."""
     if rig.holds:
         raise NotAvailable(HELD)
-    if has_structure(rig):
-        raise NotAvailable(
-            "this is not offered for a machine with a structure, whose equations are matrices; offered are analyze, "
-            "eigenvalues, growth_rate, stability, boundary, margins, modes and steady_state"
-        )
+    if has_response(rig):
+        raise NotAvailable(MEASURED)
     kept = frozenset(present)
-    key = (shape_of(rig), kept, drive)
+    key = (shape_of(rig), kept, drive, *((name, rig.value(name)) for name in in_matrices(rig)))
     return _build_cached(_Structure(key, rig, kept, drive), 0)
 
 
@@ -110,18 +114,29 @@ def _build_cached(structure: _Structure, order: int) -> Model:
     for name in rig.replaces:
         given.pop(name, None)
     roles = {name: address.role for name, address in rig.parameters().items()}
-    mechanism = with_values(rig, symbols).mechanism()
+    own = with_values(rig, symbols).mechanism()
+    mechanism = with_elements(own)
     laws = [law for one in rig.laws_by_contact().values() for law in (one.friction, one.contact)]
     several = {name for name, many in Counter(name for law in laws for name in law.memory()).items() if many > 1}
     taken = {*RESERVED, *known.values(), *several, *(("a",) if rig.contact_names else ())}  # a: an acceleration
     model = assemble(mechanism, given, roles, Letters(taken, known), structure.drive, order)
+    _check_pulls(model, own)
     return replace(model, for_motion=partial(_build_cached, structure)) if model.late else model
+
+
+def _check_pulls(model: Model, mechanism: Mechanism) -> None:
+    """Raise NotAvailable if the normal stress at a structure follows the pull of a spring."""
+    inner = {name for part in mechanism.structures for name in part.coordinates}
+    for contact, port in zip(model.contacts, mechanism.contacts, strict=True):
+        body = next(name for name in port.slip if name != LOAD_POINT)
+        if body in inner and model.definitions[contact.normal].has(contact.spring):
+            raise NotAvailable(NO_PULL.format(name=port.name))
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:
     """Symbols of the given parameters by dotted name, and their letters; structural zeros stay the number zero."""
     symbols: dict[str, Any] = {}
-    every = parameters(rig)
+    every, numbers = parameters(rig), in_matrices(rig)
     declared = Counter(address.role.letter for address in every.values())
     shared = Counter(_plain_letter(name, one) for name, one in every.items() if one.value is not None)
     letters = Letters({*RESERVED, *declared, *(letter for letter, many in shared.items() if many > 1)})
@@ -129,7 +144,7 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
         called = f"parameter_{place:03d}"
         if name in rig.always_symbols:
             symbols[name] = letters.symbol(called, name, rig.always_symbols[name], nonnegative=True)
-        elif name in rig.not_in_model or address.value is None:
+        elif name in (*rig.not_in_model, *numbers) or address.value is None:
             continue
         elif address.role.structural and address.value == 0 and name not in present:
             symbols[name] = sp.Integer(0)
@@ -140,6 +155,16 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
             signs = {"positive": True if low and not reached else None, "nonnegative": True if low else None}
             symbols[name] = letters.symbol(called, _owned(name, address), letter, real=True, **signs)
     return symbols, letters.known
+
+
+def in_matrices(rig: Rig) -> tuple[str, ...]:
+    """Parameters of structures that stay numbers of the Model: directions of points, and speeds of rotation."""
+    found = []
+    for body, one in rig.bodies.items():
+        if one.is_structure:
+            inside = (f"bodies.{body}.points.{point}.angle" for point in one.points)
+            found += [f"bodies.{body}.spin"] * (one.spin is not None) + [*inside]
+    return tuple(found)
 
 
 def _plain_letter(name: str, address: Address) -> str:

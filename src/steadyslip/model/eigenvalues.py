@@ -288,7 +288,7 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.comple
     good = np.all([np.all(np.isfinite(one), axis=(-2, -1)) for one in (rate_x, rate_z, balance_x, balance_z)], axis=0)
     if all(one.inertial for one in point.model.coordinates):
         whole = np.where(good[..., None, None], balance_z, np.eye(balance_z.shape[-1]))
-        good = good & (np.linalg.det(whole) != 0)
+        good = good & (np.linalg.slogdet(whole)[0] != 0)  # the determinant itself may underflow
         whole = np.where(good[..., None, None], whole, np.eye(balance_z.shape[-1]))
         state = rate_x - rate_z @ np.linalg.solve(whole, np.where(good[..., None, None], balance_x, 0.0))
         good = good & np.all(np.isfinite(state), axis=(-2, -1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,6 +14,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import inner_symbols
+from steadyslip.machine.mechanism import Shares
 from steadyslip.model.dead_time import LateSignal
 from steadyslip.model.variables import Variable
 
@@ -38,6 +39,8 @@ class Coordinate:
         Unit of the displacement, m or rad.
     push : sympy.Symbol
         Disturbance acting on the coordinate: a force or torque, on a slider a stress.
+    inner : bool
+        True for a coordinate of a structure, which is no result: its points are.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Coordinate:
     balance: sp.Expr | None
     unit: str
     push: sp.Symbol
+    inner: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +244,8 @@ class Model(Keeper, Displayed):
         For a drive that is alternately moved and released.
     carried : Carried or None
         Equations of link forces in steady sliding, if their solution would be too long as formulas.
+    points : mapping of str to Shares
+        Rows of the points of structures by the names of coordinates; see `Mechanism.points`.
     """
 
     variables: tuple[Variable, ...]
@@ -260,6 +266,7 @@ class Model(Keeper, Displayed):
     for_motion: Callable[[int], Model] | None = field(default=None, repr=False)
     letting_go: LettingGo | None = None
     carried: Carried | None = None
+    points: Mapping[str, Shares] = field(default_factory=dict)
 
     # -- properties and expressions
 

@@ -15,11 +15,11 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import BroadcastArrays, broadcast, check_together, checked_array, valid_together
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.rig import Rig
-from steadyslip.model.build import model_of
+from steadyslip.model.build import in_matrices, model_of
 from steadyslip.model.equations import MOVED, Model
 from steadyslip.model.steady import carried_forces, steady_roots, steady_stresses
 
@@ -201,6 +201,12 @@ def operating_point(
         return _cached_point(rig, branch)
     arrays = checked_arrays(rig, vary or {})
     varied = arrays.values
+    for name in in_matrices(rig):
+        if name in varied:
+            raise NotAvailable(
+                f"{name} is in the matrices of the structure, so that equations for several values at once are not "
+                f"offered; make a rig for each value: rig.with_values({{{name!r}: ...}})"
+            )
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
     return _make_point(model_of(rig, [*structural, *present], drive), rig, arrays, branch, scan)
 

@@ -22,7 +22,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
 from steadyslip.core.expressions import ArrayFunction, Choose, occurrences
 from steadyslip.core.questions import question
-from steadyslip.model.eigenvalues import coefficients_from_eigenvalues, digits_lost
+from steadyslip.model.eigenvalues import coefficients_from_eigenvalues, digits_lost, eigenvalues_of
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import (
     characteristic_coefficients,
@@ -109,10 +109,7 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
     for rigs of an array whose eigenvalues rounding hides; those of a single rig are computed with many digits.
     """
     with np.errstate(all="ignore"):
-        c, _ = quasipolynomial(point)
-        main = c[..., 0, :]
-        top = np.where(main[..., -1] == 0, main[..., -2], main[..., -1])[..., None, None]
-        slopes = np.all(np.isfinite(c) & np.isfinite(c / np.where(top == 0, 1.0, top)), axis=(-2, -1))
+        slopes = _finite_slopes(point)
         values = np.ones(point.shape, dtype=bool)
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
@@ -121,6 +118,16 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
             values &= ~digits_lost(point)
         known = ~out_of_range(point.model, point.arguments, point.shape)
         return np.asarray(known & (~point.exists | (slopes & values)))
+
+
+def _finite_slopes(point: OperatingPoint) -> NDArray[np.bool_]:
+    """True where the slopes of the equations are finite: by the polynomial, or where it is too long by eigenvalues."""
+    if not (point.model.delays or is_written_out(point.model)):
+        return np.asarray(np.any(np.isfinite(eigenvalues_of(point)), axis=-1))
+    c, _ = quasipolynomial(point)
+    main = c[..., 0, :]
+    top = np.where(main[..., -1] == 0, main[..., -2], main[..., -1])[..., None, None]
+    return np.asarray(np.all(np.isfinite(c) & np.isfinite(c / np.where(top == 0, 1.0, top)), axis=(-2, -1)))
 
 
 def surely_in_range(point: OperatingPoint, complete: bool) -> bool:

@@ -417,6 +417,8 @@ def _inputs(
         given[one.push] = acting.get(one.name, sp.Integer(0))
         if EVERYWHERE in acting:
             given[one.push] = acting[EVERYWHERE] * share_of(one.push)
+        for name, row in model.points.items():
+            given[one.push] += acting.get(name, 0) * row.get(one.name, 0)
     for contact in model.contacts:
         pressed = pressing.get(contact.name, sp.Integer(0)) / contact.area
         if EVERYWHERE in pressing:

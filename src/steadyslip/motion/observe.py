@@ -48,6 +48,8 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
     """Names and units for a machine: by body and by contact, in forces."""
     units: dict[str, str] = {}
     for one in model.coordinates:
+        if one.inner:
+            continue
         units |= {
             f"{one.name}.x": one.unit,
             f"{one.name}.v": f"{one.unit}/s",
@@ -59,13 +61,15 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
         units |= {f"{contact.name}.slip": "m", f"{contact.name}.slip_rate": "m/s"}
     unit = model.roles["drive.velocity"].unit.removesuffix("/s")
     turning = "rad" if all(one.unit == "rad" for one in model.coordinates) else "m"  # where nothing is pushed
-    ways = {LOAD_POINT: unit} | {one.name: one.unit for one in model.coordinates}
+    ways = {LOAD_POINT: unit} | {one.name: one.unit for one in model.coordinates} | dict.fromkeys(model.points, "m")
     units |= {"load_displacement": unit, "load_velocity": f"{unit}/s"}
     for name, (_, kind, on) in acting.named().items():
         turns = kind == "push" and ways.get(on, turning) == "rad"
         units[name] = "1" if kind == "share" else "N m" if turns else "N"
     units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}
-    return units | {m.name: m.unit for m in model.variables if m.name not in units and m.kind not in UNSEEN}
+    inner = {symbol for one in model.coordinates if one.inner for symbol in (one.displacement, one.velocity)}
+    own = (m for m in model.variables if m.kind not in UNSEEN and m.symbol not in inner)
+    return units | {m.name: m.unit for m in own if m.name not in units}
 
 
 def out_of_range(found: dict[str, Array]) -> Array:

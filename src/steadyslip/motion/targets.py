@@ -86,7 +86,7 @@ class _TargetSearch:
     def __init__(self, rig: Slider | Machine, plan: Protocol) -> None:
         self.plan, self.rig = plan, rig
         self.laws = {name: own.contact for name, own in rig.laws_by_contact().items()}
-        self.bodies = list(rig.bodies) or [""]
+        self.bodies = list(rig.ends()) or [""]
         self.problems: list[Problem] = []
 
     def found(self) -> Targets:

@@ -25,6 +25,10 @@ from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mecha
 from steadyslip.model.numeric.contact_laws import ContactFunctions, functions_of, numbers_of
 
 _VARIED = inner_symbol("n_varied", real=True)
+NO_PULL = (
+    "contacts.{name}: the normal force of this law follows the pull of a spring, which a structure does not have; "
+    "write law = 'compliant' or 'constant'"
+)
 _DELAYED = "a controller with a delay is not offered beside a structure given by matrices"
 
 
@@ -268,10 +272,7 @@ class _Assembler:
         """
         body, pulling = next(name for name in port.slip if name != LOAD_POINT), self.mechanism.pulling(port)
         if body not in {one.name for one in self.mechanism.coordinates}:
-            raise NotAvailable(
-                f"contacts.{port.name}: the normal force of this law follows the pull of a spring, which a structure "
-                "does not have; write law = 'compliant' or 'constant'"
-            )
+            raise NotAvailable(NO_PULL.format(name=port.name))
         belt = LOAD_POINT in port.slip
         if port.loaded_by:
             body = next(name for name in port.slip if name in pulling[0].acts)

@@ -32,6 +32,8 @@ from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.model.eigenvalues import eigenvalues_of
+from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import quasipolynomial, require_range
@@ -253,12 +255,22 @@ def _points_at(rig: Slider | Machine, name: str, at: Any, branch: int) -> Operat
 
 
 def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int) -> float:
-    """Re(dλ/dp) from the characteristic function: central differences along the parameter, Richardson's rule."""
+    """Re(dλ/dp) from the characteristic function, or from eigenvalues where its polynomial is too long to be written.
+
+    By central differences along the parameter, and Richardson's rule.
+    """
     size = abs(edge.value) or 1e-3
     steps = np.array([1e-3, -1e-3, 5e-4, -5e-4]) * size
-    s = 1j * edge.angular_frequency
-    at, _ = _characteristic(_points_at(rig, name, edge.value + steps, branch), s)
+    s, points = 1j * edge.angular_frequency, _points_at(rig, name, edge.value + steps, branch)
+    by_roots = not (points.model.delays or is_written_out(points.model))
+    if by_roots:
+        found = eigenvalues_of(points)
+        at = found[np.arange(len(steps)), np.nanargmin(np.abs(found - s), axis=-1)]
+    else:
+        at, _ = _characteristic(points, s)
     slope = (4 * (at[2] - at[3]) / (2 * steps[2]) - (at[0] - at[1]) / (2 * steps[0])) / 3
+    if by_roots:
+        return float(slope.real)
     _, down = _characteristic(_points_at(rig, name, [edge.value], branch), s)
     return float((-slope / down[0]).real)
 

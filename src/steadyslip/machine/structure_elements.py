@@ -1,0 +1,175 @@
+"""Structures as coordinates and elements of a mechanism, so that a Model can be assembled from them.
+
+The matrices keep all they say: displacements are written in coordinates z, u = B z, in which the inertia is diagonal
+and forces at contacts and links act on the first few only. Of a structure with symmetric stiffness the others follow
+as in a chain (band Lanczos, Golub & Van Loan, Matrix Computations, 10.1), so that equations stay short.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
+from steadyslip.machine.mechanism import DegreeOfFreedom, Element, Mechanism, Shares, StructurePart
+
+_DEPENDENT = 1e-10  # of a direction's length left beside the directions before it, below which it is one of them
+_ROUNDING = 8 * np.finfo(float).eps  # of a matrix's norm, times its size: what products of matrices leave of zero
+MOST_TERMS = 2500
+"""Most entries of damping and stiffness: code is compiled for each, and that of 2500 takes a minute."""
+
+
+def with_elements(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with structures replaced by coordinates, springs and dashpots.
+
+    Raises
+    ------
+    NotAvailable
+        If a structure has so many terms that code for its motion would take minutes to compile.
+    """
+    for part in mechanism.structures:
+        mechanism = _with_elements(mechanism, part)
+    return replace(mechanism, structures=())
+
+
+def _with_elements(own: Mechanism, part: StructurePart) -> Mechanism:
+    names = {name: i for i, name in enumerate(part.coordinates)}
+    basis = _Basis(part, [_numbers(row, names) for row in _rows(own)])
+    basis.check()
+
+    def written(row: Shares) -> dict[str, Any]:
+        """A row in the new coordinates."""
+        inside = _numbers(row, names) @ basis.vectors
+        kept = np.flatnonzero(np.abs(inside) > _ROUNDING * len(names) * np.max(np.abs(inside), initial=0.0))
+        others = {name: share for name, share in row.items() if name not in names}
+        return others | {part.coordinates[i]: float(inside[i]) for i in kept}
+
+    coordinates = [
+        DegreeOfFreedom(name, float(inertia), _plain(speed), _plain(force), inner=True)
+        for name, inertia, speed, force in zip(
+            part.coordinates, basis.inertia, basis.inverse @ part.speeds, basis.vectors.T @ part.force, strict=True
+        )
+    ]
+    elements = [replace(one, acts=written(one.acts), senses=written(one.senses)) for one in own.elements]
+    integral = own.integral and replace(
+        own.integral, acts=written(own.integral.acts), senses=written(own.integral.senses)
+    )
+    return replace(
+        own,
+        coordinates=(*own.coordinates, *coordinates),
+        elements=(*elements, *basis.elements()),
+        integral=integral,
+        contacts=tuple(
+            replace(one, slip=written(one.slip), separation=written(one.separation)) for one in own.contacts
+        ),
+        points={name: written(row) for name, row in own.points.items()},
+    )
+
+
+def _rows(own: Mechanism) -> Iterable[Shares]:
+    """Rows of contacts, then of links and controllers: the directions in which forces act, or that they sense."""
+    for port in own.contacts:
+        yield from (port.slip, port.separation)
+    for one in own.elements:
+        yield from (one.acts, one.senses)
+    if own.integral is not None:
+        yield from (own.integral.acts, own.integral.senses)
+
+
+def _numbers(row: Shares, names: dict[str, int]) -> Array:
+    found = np.zeros(len(names))
+    for name, share in row.items():
+        if name in names:
+            found[names[name]] = float(share)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """A number or expression, with 0 for 0.0."""
+    return 0 if value == 0 else value
+
+
+class _Basis:
+    """Coordinates of a structure in which few terms couple them.
+
+    Attributes
+    ----------
+    vectors, inverse : ndarray (n, n)
+        u = vectors z, z = inverse u.
+    inertia : ndarray (n,)
+    """
+
+    def __init__(self, part: StructurePart, directions: list[Array]) -> None:
+        self.part = part
+        root = np.linalg.cholesky(part.mass)
+        lower = np.linalg.inv(root)  # M = root rootᵀ
+        self.stiffness, self.damping = (lower @ one @ lower.T for one in (part.stiffness, part.damping))
+        even = 0.5 * (self.stiffness + self.stiffness.T)
+        pushed = [lower @ one for one in directions if np.any(one)]
+        axes = _chain(even, pushed)
+        size = (
+            1 / np.linalg.norm(pushed[0]) if pushed else 1.0
+        )  # with which the first coordinate is the first row, in m
+        self.vectors = size * (lower.T @ axes)
+        self.inverse = axes.T @ root.T / size
+        self.inertia = np.full(len(axes), size**2)
+        self.stiffness, self.damping = (size**2 * _clean(axes.T @ one @ axes) for one in (self.stiffness, self.damping))
+
+    def check(self) -> None:
+        """Raise NotAvailable if code for the motion would take minutes to compile."""
+        terms = int(np.count_nonzero(self.stiffness) + np.count_nonzero(self.damping))
+        if terms > MOST_TERMS:
+            raise NotAvailable(
+                f"bodies.{self.part.name}: motion with its {len(self.inertia)} degrees of freedom has {terms} terms, "
+                f"allowed: {MOST_TERMS}; reduce it to fewer, kept where links and contacts act: ss.machine.reduced "
+                "(`kept` degrees of freedom and `modes`), or damping of the form alpha M + beta K"
+            )
+
+    def elements(self) -> list[Element]:
+        """Springs and dashpots, each of one row of the matrices."""
+        found = []
+        for i, name in enumerate(self.part.coordinates):
+            for matrix, own in ((self.stiffness, (1, 0)), (self.damping, (0, 1))):
+                senses = {self.part.coordinates[j]: float(matrix[i, j]) for j in np.flatnonzero(matrix[i])}
+                if senses:
+                    found.append(Element("", {name: 1}, senses, *own, grounded=True))
+        return found
+
+
+def _clean(matrix: Array) -> Array:
+    """Matrix with entries of rounding as zeros."""
+    least = _ROUNDING * len(matrix) * np.linalg.norm(matrix, 2)
+    return np.where(np.abs(matrix) > least, matrix, 0.0)
+
+
+def _chain(even: Array, first: list[Array]) -> Array:
+    """Orthonormal axes (n, n): of the directions `first`, then of what a symmetric matrix makes of those before."""
+    axes = np.zeros((0, len(even)))
+    waiting = [*first]
+    for place in range(len(even)):
+        axes = _with_axis(axes, waiting, even)
+        if len(axes) <= place:  # all that forces reach: any others complete them
+            rest = np.linalg.svd(axes)[2][len(axes) :] if len(axes) else np.eye(len(even))
+            waiting = [*rest]
+            axes = _with_axis(axes, waiting, even)
+    return np.asarray(axes.T)
+
+
+def _with_axis(axes: Array, waiting: list[Array], even: Array) -> Array:
+    """Axes (k, n) and the next: of the first of those `waiting` that is not made of them; it makes another wait."""
+    while waiting:
+        one = waiting.pop(0)
+        length, left = np.linalg.norm(one), one
+        for _ in range(2):  # twice is enough for orthogonality to rounding
+            left = left - axes.T @ (axes @ left)
+        if np.linalg.norm(left) > _DEPENDENT * length:
+            axis = left / np.linalg.norm(left)
+            axis = axis - axes.T @ (axes @ axis)
+            axis = axis / np.linalg.norm(axis)
+            waiting.append(even @ axis)
+            return np.vstack([axes, axis])
+    return axes

@@ -6,7 +6,7 @@ import gc
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from steadyslip.cli.analysis import analyze, compare, cure, modes
 from steadyslip.cli.answers import print_text
@@ -23,6 +23,7 @@ COMMANDS = (
     *(simulate, cycles, threshold, response, hunt, verdicts),
     *(map_, sensitivity, reproduce, examples, init, schema),
 )
+WRITTEN = (".html", ".png", ".svg", ".pdf", ".csv", ".nc", ".toml")  # files that commands write
 GARBAGE = 50_000
 """Objects made between two searches for garbage: imports and formulas make some 10⁵ that live on, and Python's own 700
 take a tenth of a verdict's time."""
@@ -36,6 +37,28 @@ class _Commands(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt as stopped:
             raise typer.Exit(print_message(str(stopped) or "before there was an answer", 130, "stopped")) from None
+
+
+class _Command(TyperCommand):
+    """Command that says with which option a word too many is meant."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        ctx.allow_extra_args = True  # so that they come back in place of an error without advice
+        rest: list[str] = super().parse_args(ctx, args)
+        if rest and not ctx.resilient_parsing:
+            ctx.fail(self._surplus(rest[0]))
+        return rest
+
+    def _surplus(self, word: str) -> str:
+        """Message on the first word that is neither an option nor an argument."""
+        if "=" in word:
+            option, advice = "--set", f"to change a value write --set '{word}'"
+        elif word.lower().endswith(WRITTEN):
+            option, advice = "--output", f"to write a file write -o {word}"
+        else:
+            option, advice = "--along", f"to name the parameter that is varied write --along {word}"
+        known = any(option in one.opts for one in self.params)
+        return f"{word!r} is a word too many{f'; {advice}' if known else ''}"
 
 
 app = typer.Typer(
@@ -56,7 +79,7 @@ def _start(version: Annotated[bool, typer.Option("--version", help="print the ve
 
 
 for command in COMMANDS:
-    app.command(command.__name__.rstrip("_"))(command)
+    app.command(command.__name__.rstrip("_"), cls=_Command)(command)
 
 
 def main() -> None:

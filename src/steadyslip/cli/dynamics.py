@@ -96,7 +96,7 @@ def threshold(
     ] = "before",
     up_to: Annotated[
         float | None,
-        typer.Option("--up-to", help="largest size of interest, as sizes are told; 1e4 times the drive, or so"),
+        typer.Option("--up-to", help="largest size of interest, as `size` of --json; 1e4 times the drive, or so"),
     ] = None,
     output: Annotated[
         list[Path] | None, outputs("write .html, or draw the basin in the phase plane: .png, .svg or .pdf")

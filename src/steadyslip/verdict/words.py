@@ -162,7 +162,7 @@ def onset_words(onset: Onset) -> str:
 
 
 _KICKS = {
-    "velocity": ("velocity step", "a velocity step{at} to"),
+    "velocity": ("lasting velocity step", "a lasting velocity step{at} to"),
     "displacement": ("displacement step", "a displacement step{at} of"),
     "normal-stress": ("normal-stress step", "a normal-stress step{at} of"),
     "normal-force": ("normal-force step", "a step of the normal force{at} of"),

@@ -220,7 +220,7 @@ def test_doubt_is_carried_through(monkeypatch):
     assert found.bracket == pytest.approx((5.0, 6.0), rel=0.02)
     why = doubt_of(EXHAUSTED)
     assert f"survives up to {found.survived / 1e-6:.6g}"[:-1] in str(found)
-    assert f"undecided ({why}) between" in str(found)
+    assert f"; from there to 5.512244 um, not decided: {why}; beyond: blow-up" in str(found)
     assert (found.to_dict()["decided"], found.to_dict()["doubt"]) == (False, why)
     assert found.survived == pytest.approx(found.bracket[0] / found.size * found.amount, rel=1e-12)
     brackets, _, _ = threshold_brackets(a_rig, {"mass": np.zeros(2)}, "displacement")
@@ -300,7 +300,7 @@ def test_narrow_doubt_leaves_a_threshold_and_endless_doubt_none(monkeypatch):
     monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(5.0, np.inf, 1e9))
     found = ss.threshold(a_rig, "displacement")
     assert np.isnan(found.size)
-    assert "undecided beyond" in str(found)
+    assert "; beyond not decided: " in str(found)
     assert found.to_dict()["size"] is None
     assert np.isnan(ss.threshold_map(a_rig, {"mass": np.zeros(1)}, "displacement")[0])
 

@@ -20,11 +20,11 @@ from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.protocol.segments import Segments
 
 DOUBTS = (
-    "neither near steady sliding nor on a cycle that was found when its longest time was over",
-    "the steps of integration allowed for one motion are used up, as where something rings on almost undamped",
-    "the steps of integration allowed for all motions together are used up",
-    "the integrator came to where it cannot go on",
-    "no neighbourhood of steady sliding was found, so that a return cannot be told",
+    "within the longest time simulated it neither came back nor settled on a cycle",
+    "one motion took more steps than are allowed, as where something rings on almost undamped",
+    "all motions together took more steps than are allowed",
+    "the integration could not go on",
+    "how near to steady sliding counts as back was not found",
 )
 """Why a motion is undecided."""
 OUTCOMES = ("returns", "blow-up", "contact lost", "oscillation", "no solution", "interrupted",

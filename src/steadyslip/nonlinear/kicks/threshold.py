@@ -38,6 +38,7 @@ BLOCK = 48  # sizes simulated at a time
 FINE = 47  # sizes between the ends of a bracket in each round of narrowing
 STEPS = 1e9  # integration steps for all motions of one threshold
 AT_EDGE = 1e-5  # relative width of a bracket that ends at an edge: motions return ever more slowly towards it
+LASTING = ("velocity", "normal-stress", "normal-force", "force")  # steps of what stays; others move a place, or blow
 BEYOND = 1.01  # factor on the size of an edge at which the outcome beyond is simulated
 
 
@@ -106,35 +107,25 @@ class Threshold(Displayed):
         return self.rig.area
 
     def __str__(self) -> str:
-        what = f"{self.kick} kick" + (f" at {self.at}" if self.at else "")
-        low, high = self.bracket
-        where = f" at {self.contact}" if self.contact else ""
+        what = f"{self.kick} kick{' that lasts' if self.kick in LASTING else ''}{f' at {self.at}' if self.at else ''}"
+        low, _ = self.bracket
         if self.size == 0:
             return f"{what}: none survived, steady sliding is unstable"
-        if np.isinf(self.size):
-            most = format_quantity(self.survived, self.unit, 4, self.area)
-            return f"{what}: none is large enough, up to {most} (size {self.searched:.4g})"
         if self.interrupted and low == 0 and np.isnan(self.size):
             return f"{what}: stopped before anything was found"
+        survived = format_quantity(self.survived, self.unit, 4 if not np.isfinite(self.size) else 7, self.area)
+        if np.isinf(self.size):
+            return f"{what}: survives all up to {survived}, the largest tried"
+        why = "stopped there" if self.interrupted else f"not decided: {self.doubt}"
         if np.isnan(self.size):
-            beyond = "stopped there" if self.interrupted else f"undecided beyond ({self.doubt})"
-            if low == 0 and not self.interrupted:
-                return f"{what}: undecided for every size, even the smallest tried ({self.doubt})"
-            most = format_quantity(self.survived, self.unit, 4, self.area)
-            return f"{what}: all that were tried are survived up to {most} (size {low:.4g}); {beyond}"
-        edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
-        after = self.outcome + where if self.outcome != "undecided" else f"undecided ({self.doubt})"
+            return f"{what}: {f'survives up to {survived}; beyond ' if low else ''}{why}"
         amount = format_quantity(self.amount, self.unit, 7, self.area)
+        edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
+        where = f" at {self.contact}" if self.contact else ""
+        after = self.outcome + where if self.outcome != "undecided" else f"not decided ({self.doubt})"
         if self.decided:
-            return (
-                f"{what}: survives up to {amount} (size {self.size:.7g}, bracket {low:.9g} to {high:.9g}){edge}; "
-                f"beyond: {after}"
-            )
-        why = "stopped when it was between" if self.interrupted else f"undecided ({self.doubt}) between"
-        return (
-            f"{what}: survives up to {format_quantity(self.survived, self.unit, 7, self.area)} (size {low:.7g}); "
-            f"{why} that and size {high:.7g}{edge}; beyond: {after}"
-        )
+            return f"{what}: survives up to {amount}{edge}; beyond: {after}"
+        return f"{what}: survives up to {survived}; from there to {amount}{edge}, {why}; beyond: {after}"
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-ready dict, SI units."""
@@ -240,7 +231,7 @@ def threshold(
     --------
     >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
     >>> print(ss.threshold(rig))
-    velocity kick: survives up to 7.67288... um/s (size 2.037693, bracket ...); beyond: blow-up
+    velocity kick that lasts: survives up to 7.67288... um/s; beyond: blow-up
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
@@ -456,7 +447,7 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
     >>> step = ss.protocol.VelocityStep(at=0, to="2 um/s")
     >>> print(ss.margin_to_kick(rig, step))
     survives it: the limit is 2.94 times this step
-    velocity kick: survives up to 7.67288... um/s (size 2.037692, bracket ...); beyond: blow-up
+    velocity kick that lasts: survives up to 7.67288... um/s; beyond: blow-up
     """
     possible = kicks_of(rig)
     kinds: dict[type, tuple[str, str]] = {

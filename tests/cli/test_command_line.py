@@ -264,7 +264,7 @@ def test_a_changed_value_is_told_in_its_own_unit():
     [
         (
             ("cycles", EXAMPLE, "drive.kp"),
-            "'drive.kp' is a word too many; to name the parameter that is varied write --along",
+            "'drive.kp' is a word too many; to name the parameter that is varied write",
         ),
         (("analyze", EXAMPLE, "stiffness=3"), "'stiffness=3' is a word too many; to change a value write --set 'stiff"),
         (("cure", EXAMPLE, "x.html"), "'x.html' is a word too many; to write a file write -o x.html"),

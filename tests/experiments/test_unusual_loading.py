@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import lab_records as lab
 import steadyslip as ss
@@ -85,6 +86,20 @@ def test_rounding_of_a_displacement_is_no_spring():
     """The displacement of this record is exact: what moves with friction is its last digit."""
     fit, _ = ss.fit_files(["examples/data/made_velocity_step.csv"])
     assert "cannot show" not in str(fit)
+
+
+@pytest.mark.parametrize("noise", ["waves", "slow", "white"])
+def test_waves_of_a_sensor_are_told_and_slow_noise_is_not(noise):
+    """Waves of half a micrometre made a servo and errors of four standard deviations, without a word."""
+    chance = np.random.default_rng(4)
+    found = lab.columns(lab.rig(), ss.Protocol(pieces=(ss.protocol.VelocityStep(at=20.0, to=1e-5),), until=60.0), 3000)
+    steps, time = chance.standard_normal(3000), found["time"]
+    added = {"white": 5e-8 * steps, "slow": 5e-8 * lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], steps),
+             "waves": 5e-8 * steps + 5e-7 * np.sin(2 * np.pi * time / 16)}[noise]  # fmt: skip
+    friction = found["friction"] + lab.NOISE * chance.standard_normal(3000)
+    columns = found | {"friction": friction, "displacement": found["displacement"] + added}
+    said = " ".join(str(ss.fit(ss.lab_rig(), ss.record_from_arrays(**columns))).split())
+    assert ("the displacement wanders about straight lines" in said) == (noise == "waves")
 
 
 def test_a_column_of_slip_is_noted(tmp_path):

@@ -10,6 +10,7 @@ from steadyslip.core.format import enumerated, format_percent, format_quantity
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.protocol_words import protocol_against_record
 from steadyslip.experiments.loading.across import yielding
+from steadyslip.experiments.numerics.noise import STRUCTURE, whiteness
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -19,13 +20,14 @@ from steadyslip.protocol.protocol import LOAD_POINT
 _RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a thousandth of its stretch: of no account
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
 CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
+WAVY = 4.0  # times its noise from sample to sample by which a displacement wanders, from which waves are told
 LISTED = 4  # changes listed in a warning
 
 
 def loading_warnings(fit: FitNumbers) -> list[str]:
     """Warnings on the loading, each a sentence."""
     found = _assumed_rate(fit) + _against_protocol(fit) + _loading_outliers(fit) + _across_fault(fit)
-    found += _small_changes(fit) + _unusual_distances(fit) + _off_calibration(fit)
+    found += _small_changes(fit) + _waves(fit) + _unusual_distances(fit) + _off_calibration(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
@@ -92,6 +94,29 @@ def _across_fault(fit: FitNumbers) -> list[str]:
             f"{record.source}: the displacement falls where friction rises, as across the fault, or behind a spring of "
             f"{spring}: rates were found without what that takes, but it cannot show how a servo follows; give the "
             "rates that were commanded as a protocol, or add shear stress over that stiffness where it is known"
+        )
+    return found
+
+
+def _waves(fit: FitNumbers) -> list[str]:
+    """Warnings on displacements that wander about their lines by much more than noise, and not as slow noise does."""
+    found = []
+    for record, loading in zip(fit.plan.records, fit.plan.loading if fit.plan.follows else (), strict=False):
+        load, moved = loading.load, record.displacement
+        if load is None or moved is None or load.curve is not None or any(one.pieces for one in load.changes):
+            continue
+        times = load.strays / displacement_noise(record.time, moved)
+        if times < WAVY or whiteness([moved - load.integral(record.time)]).p >= STRUCTURE:
+            continue
+        if yielding(record.time, moved, record.friction, load) is not None:  # told already
+            continue
+        late = ", the lag of a servo" if any(one.lag for one in load.changes) else ""
+        found.append(
+            f"{record.source}: the displacement wanders about straight lines by "
+            f"{format_quantity(load.strays, 'm', 2)}, {times:.0f} times its noise from sample to sample: a wavy "
+            f"sensor, or a load point that does not keep its rate; rates{late} and times of changes found in it may be "
+            "off by more than their errors; give the rates that were commanded as a protocol, or, if the load point "
+            "moves so, drive = 'smoothed'"
         )
     return found
 

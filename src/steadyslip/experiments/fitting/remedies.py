@@ -117,7 +117,7 @@ def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
         if not _choice(plan, own) or not _is_brief(own, values):
             continue
         try:
-            best = _from_minimum(own, _effort(own), values)
+            best = _from_minimum(own, _effort(own), values, LAGS[:3])
         except NotAvailable:
             continue
         if samples * float(np.log(ssq / best.ssq)) < STRONG_EVIDENCE:
@@ -203,12 +203,12 @@ def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, 
     return Remedy(_choice(plan, own), least, gain, whiteness(parts).p, ends)
 
 
-def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float]) -> FoundMinimum:
+def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float], lags: Sequence[float] = LAGS) -> FoundMinimum:
     """Minimum of a plan with a lag or a trend more, from several values of those and the minimum without."""
     space, comparison = own.space(), own.comparison(effort)
     begin = space.coordinates(np.array([values.get(one.name, 0.0) for one in space.unknowns]))
     added = np.array([one.parameter == "lag" and one.name not in values for one in space.unknowns])
-    z = begin + np.outer(LAGS if np.any(added) else [0.0], added)
+    z = begin + np.outer(lags if np.any(added) else [0.0], added)
     low, high = np.transpose([one.bounds for one in space.unknowns])
     stop = effort.budget.part(np.inf)
     enough, near = NOTHING / comparison.size, DAMPING_NEAR

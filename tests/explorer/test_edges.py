@@ -10,8 +10,9 @@ import pytest
 import steadyslip as ss
 import users_laws
 from explored_edges import Edges, drawn, judged, other_edges, walked
+from machines import block, undamped_at_random
 from rigs_of_theory import SIGMA, V0, rate_state, rig
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.linear.status import ABSENT, STABLE, UNDAMPED, UNSTABLE
 from steadyslip.verdict.words import BEYOND
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -151,6 +152,78 @@ def test_thin_parts_of_a_track_are_seen_and_leave_the_own_place():
         assert colour[0] == colour[1]
         assert [one["from"] for one in seen[1:]] == [one["to"] for one in seen[:-1]]
         assert all(one["to"] >= one["from"] for one in seen)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_statuses_of_undamped_machines_are_those_of_python(seed):
+    """At values drawn at random, and from a hundredth to 1e-12 beside every edge of growth (theory 13)."""
+    machine, chance, seen = undamped_at_random(seed), np.random.default_rng(seed), set()
+    there = Edges(machine)
+    shares = [(there.names[i], 10 ** chance.normal(0, 0.4)) for i in chance.integers(0, len(there.names), 60)]
+    tried = [(name, share * machine.value(name)) for name, share in shares]
+    for name in there.names:
+        edges = [one.value for one in ss.boundary(machine, name) if one.kind == "coupling"]
+        tried += [(name, edge * (1 + h)) for edge in edges for h in (1e-2, -1e-2, 1e-6, -1e-6, 1e-12, -1e-12)]
+    for name, value in tried:
+        i = there.names.index(name)
+        if there.allowed(i, value):
+            found = there.script("rig.status(i, x)", i=i, x=value)
+            assert found == judged(machine.with_values({name: value}))[0], (name, value)
+            seen.add(found)
+    assert UNDAMPED in seen
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(2, 8))])
+def test_edges_of_growth_are_those_of_python(seed):
+    there = Edges(undamped_at_random(seed))
+    assert walked(there, np.random.default_rng(seed), presses=1) == []
+
+
+def test_a_page_tells_where_nothing_damps_what_python_tells():
+    """Beside the edge of Hoffmann & Gaul; a machine that is damped by its friction beyond 0 is stable there."""
+    there = Edges(block())
+    told = {}
+    for mu in (0.5, 1.0284051669940213 * (1 - 1e-9), 1.1):
+        values = [mu if name.endswith("mu_coulomb") else one for name, one in zip(there.names, there.home, strict=True)]
+        wrong, edges = other_edges(there, values)
+        assert wrong == []
+        told[mu] = there(values)["headline"], {there.names[one["i"]].split(".")[-1]: one["words"] for one in edges}
+    first, near, beyond = told.values()
+    assert first[0].startswith("Undamped: no disturbance of steady sliding at 1 m/s grows, and none dies out")
+    assert first[1]["mu_coulomb"] == "two oscillations couple and one grows"
+    assert near[1]["mu_coulomb"] == "on the edge"
+    assert beyond[0].startswith("Unstable")
+    assert beyond[1]["mu_coulomb"] == "no disturbance grows"
+    viscous = there.names.index("contacts.belt.friction.viscous")
+    assert there(there.home)["found"][viscous]["status"] == STABLE  # not that of its end, 0
+    assert [there.script("rig.status(i, x)", i=viscous, x=x) for x in (0.0, 0.1, 3.0)] == [UNDAMPED, STABLE, UNSTABLE]
+    rough = [0.9 if name.endswith("mu_coulomb") else one for name, one in zip(there.names, there.home, strict=True)]
+    assert there(rough)["found"][viscous] | {"low": 0, "high": 0} == {
+        "edges": [],
+        "status": UNSTABLE,
+        "low": 0,
+        "high": 0,
+    }
+
+
+def test_a_window_of_growth_is_found_until_it_closes():
+    """In a stiffness, as friction falls: its ends are those of Python, less than .003 apart."""
+    there = Edges(block())
+    i, k = (there.names.index(name) for name in ("links.one.stiffness", "contacts.belt.friction.mu_coulomb"))
+
+    def window(mu):
+        values = [mu if j == k else one for j, one in enumerate(there.home)]
+        return [one["at"] for one in there.script("(rig.values = values, changes(rig, i)).edges", values=values, i=i)]
+
+    low, high = 0.01, 0.5
+    while high - low > 1e-9 * low:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if window(middle) else (middle, high)
+    mu = high * (1 + 1e-7)
+    begin, end = window(mu)
+    assert 0 < end - begin < 3e-3
+    found = [one.value for one in ss.boundary(block().with_values({"mu_coulomb": mu}), "links.one.stiffness")]
+    assert [begin, end] == pytest.approx(found, rel=1e-6)
 
 
 @pytest.mark.campaign

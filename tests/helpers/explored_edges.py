@@ -33,7 +33,7 @@ from steadyslip.core.format import typeset
 from steadyslip.core.written import display_units
 from steadyslip.explorer.assembly import _data
 from steadyslip.explorer.equations import linear_part
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
+from steadyslip.linear.status import ABSENT, STABLE, UNDAMPED, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.causes import ILL_POSED, why_always_stable, why_never_stable
 from steadyslip.verdict.words import edge_rows, headline, is_undecided
@@ -49,7 +49,7 @@ function edgesAt(values, coarse) {
   const found = data.parameters.map((_, i) => changes(rig, i, undefined, coarse));
   const page = { rig, found, answer: rig.assess(), rounded: Page.prototype.rounded, with: Page.prototype.with };
   const texts = ({ i, at }) => [values[i], at].map((x) => told(data.parameters[i], x));
-  const edges = edgesOf(page).map((edge) => ({ ...edge, words: beyondWords(edge, page), told: texts(edge) }));
+  const edges = edgesOf(page).map((edge) => ({ ...edge, words: edgeWords(edge, page), told: texts(edge) }));
   const { answer } = page, banner = { data, page }, { told: full, speed } = Banner.prototype;
   const first = answer.status === UNKNOWN ? "" : headline(answer, speed.call(banner, answer), data);
   const why = data.phrases ? full.call(banner, answer, edges[0]) : reason(answer, data);
@@ -135,7 +135,8 @@ def _other_edges(page, values, own):
     found = ss.analyze(own)
     if is_undecided(found):
         return wrong, told["edges"]
-    now = ABSENT if found.stable is None else STABLE if found.stable else UNSTABLE
+    undamped = found.undamped and found.on_edge
+    now = ABSENT if found.stable is None else STABLE if found.stable else UNDAMPED if undamped else UNSTABLE
     if (now, found.on_edge) != (told["status"], told["onEdge"]):
         wrong.append(f"status {told['status']}, on edge {told['onEdge']} for {now}, {found.on_edge}")
     growth = found.growth_rate
@@ -145,7 +146,7 @@ def _other_edges(page, values, own):
             wrong.append(f"growth {mine} for {growth}")
     for name, value, along in zip(page.names, values, told["found"], strict=True):
         here = next((one["above"] for one in along["edges"][::-1] if one["at"] < value), along["status"])
-        if here != now and not found.on_edge:
+        if here != now and ((undamped and value) or not found.on_edge):
             wrong.append(f"the track of {name} has {here} at its own value for {now}")
     wrong += other_lists(page, found, told["edges"])
     is_machine = isinstance(own, ss.Machine)

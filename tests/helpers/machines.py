@@ -40,6 +40,25 @@ def block(*more, contact=0.0):
     return ss.rig_from_text("\n".join([BLOCK, *more])).with_values({"normal_damping": contact})
 
 
+def undamped_at_random(seed):
+    """Block of Hoffmann & Gaul on two random springs, for odd seeds with a second body that hangs on it."""
+    chance = np.random.default_rng(seed)
+
+    def spring(*ends, angle=0.0):
+        return ss.machine.Spring(between=ends, stiffness=float(chance.uniform(0.5, 5)), angle=angle)
+
+    bodies = {"block": ss.machine.PlanarBody(mass=float(chance.uniform(0.5, 2)), press=float(chance.uniform(5, 20)))}
+    angles = chance.uniform(0.1, 1.4), -chance.uniform(0.1, 1.4)
+    links = {name: spring("drive", "block", angle=float(angle)) for name, angle in zip("ab", angles, strict=True)}
+    if seed % 2:
+        bodies["arm"] = ss.machine.SlidingBody(mass=float(chance.uniform(0.5, 2)))
+        links["c"] = spring("block", "arm")
+    law = ss.laws.Coulomb(mu_coulomb=float(chance.uniform(0.05, 0.8)))
+    held = ss.laws.Compliant(normal_stiffness=float(chance.uniform(0.3, 3)))
+    belt = ss.machine.Surface(body="block", friction=law, contact=held)
+    return ss.Machine(bodies=bodies, links=links, contacts={"belt": belt}, drive=ss.machine.Pull(velocity=1.0))
+
+
 def leading(machine):
     return ss.eigenvalues(machine)[0]
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from command import run
-from machines import ACROSS, ALONG, BLOCK, block
+from machines import ACROSS, ALONG, block
 from steadyslip.linear.undamped import is_undamped
 from steadyslip.model.point import operating_point
 
@@ -124,15 +123,6 @@ def test_the_verdict_says_that_nothing_dies_out():
     assert beyond.stable is False
     assert "no disturbance grows" in str(beyond)
     assert ss.analyze(block(ALONG.format(0.05))).undamped is False
-
-
-def test_a_page_refuses_what_nothing_damps(tmp_path):
-    path = tmp_path / "block.toml"
-    path.write_text(BLOCK)
-    done = run("explore", path, "-o", tmp_path / "block.html")
-    assert done.returncode == 2
-    assert "nothing damps this machine" in done.stderr
-    assert run("explore", path, "--set", "normal_damping=0.1", "-o", tmp_path / "damped.html").returncode == 0
 
 
 def test_a_map_tells_where_nothing_grows_from_where_two_modes_couple(tmp_path):

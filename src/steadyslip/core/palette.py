@@ -29,19 +29,20 @@ LINES: Final = ("-", "--", "-.", ":")
 
 LIGHT: Final = {
     "ink": "#1b2430", "soft": "#566173", "paper": "#f7f7f5", "card": "#ffffff", "line": "#cfd5dd", "accent": "#005a92",
-    "bad": "#a83200", "stable": STABLE, "unstable": UNSTABLE, "blow-up": BLOW_UP, "none": ABSENT, "unknown": UNKNOWN,
+    "bad": "#a83200", "stable": STABLE, "undamped": STABLE, "unstable": UNSTABLE, "blow-up": BLOW_UP, "none": ABSENT,
+    "unknown": UNKNOWN,
 }  # fmt: skip
 """Colours of a light page, of figures and of paper, by role."""
 DARK: Final = {
     "ink": "#e8ecf1", "soft": "#a9b4c2", "paper": "#12161c", "card": "#1a2028", "line": "#3a4452", "accent": "#6cc0f5",
-    "bad": "#ff9a5c", "stable": "#5ba5d8", "unstable": "#8a4b00", "blow-up": "#f08cc4", "none": "#3c3550",
-    "unknown": "#7b818b",
+    "bad": "#ff9a5c", "stable": "#5ba5d8", "undamped": "#5ba5d8", "unstable": "#8a4b00", "blow-up": "#f08cc4",
+    "none": "#3c3550", "unknown": "#7b818b",
 }  # fmt: skip
 """Colours of a dark page, by role."""
 FORCED: Final = {
     "ink": "CanvasText", "soft": "CanvasText", "paper": "Canvas", "card": "Canvas", "line": "CanvasText",
-    "accent": "Highlight", "bad": "CanvasText", "stable": "Canvas", "unstable": "CanvasText", "blow-up": "Highlight",
-    "none": "Canvas", "unknown": "GrayText",
+    "accent": "Highlight", "bad": "CanvasText", "stable": "Canvas", "undamped": "Canvas", "unstable": "CanvasText",
+    "blow-up": "Highlight", "none": "Canvas", "unknown": "GrayText",
 }  # fmt: skip
 """System colours by role, where the reader's system sets all colours."""
 

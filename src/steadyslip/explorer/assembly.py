@@ -41,7 +41,7 @@ from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.search import Search
-from steadyslip.linear.status import STABLE, UNSTABLE, status
+from steadyslip.linear.status import STABLE, UNDAMPED, UNSTABLE, status
 from steadyslip.machine.letters import letter_of, said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -213,11 +213,11 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "toml": file.pieces,
         "stiffness": ways_of(rig).compared(rig, names),
         **ways_of(rig).further(rig, facts),
-        "headlines": {kind: words for kind, words in HEADLINES.items() if kind not in _UNTOLD},
-        "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints]},
+        "headlines": {kind: words for kind, words in HEADLINES.items() if kind != "undecided"} | _NO_RIG,
+        "absent": ABSENT | {"hints": [f"; {one}" if one else "" for one in hints], "unfit": _UNFIT},
         "remote": REMOTE,
         "written": _written_units(rig),
-        "beyond": {kind: words for kind, words in (BEYOND | EDGE_WORDS).items() if kind not in _UNTOLD},
+        "beyond": BEYOND | EDGE_WORDS,
         "pace": PACE,
         "judders": JUDDERS,
         "ends": causes(rig),
@@ -226,8 +226,9 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
     }
 
 
-_UNTOLD = frozenset({"undecided", "undamped", "coupling"})
-"""Kinds of verdicts and edges that a page does not tell apart from others."""
+_NO_RIG = {"unknown": ("No such rig", ": numbers outside what a rig can have")}
+"""Headline at values that a page can be given and a rig cannot."""
+_UNFIT = "a number leaves its range, or breaks a condition that several obey together"
 _TOLD_BESIDES = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N m", "Pa/m", "N/m", "N m/rad"})
 """SI units of what a page tells beside parameters: motion, times, rates, stresses, forces, stiffnesses."""
 
@@ -338,7 +339,7 @@ def _answer(rig: Slider | Machine, branch: int, bar: str | None) -> dict[str, An
         "eigenvalues": [],
     }
     require_range(point)
-    if answer["status"] in (STABLE, UNSTABLE):
+    if answer["status"] in (STABLE, UNSTABLE, UNDAMPED):
         with np.errstate(all="ignore"):
             answer["critical"], eigenvalues = ways_of(rig).judged(rig, point, bar)
         answer["eigenvalues"] = [[_rounded(s.real, 12), _rounded(s.imag, 12)] for s in eigenvalues]

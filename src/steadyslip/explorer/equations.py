@@ -22,13 +22,11 @@ from steadyslip.linear import crossing, cubic
 from steadyslip.linear.response import has_closed_form, response
 from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.linear.stiffness import interval_ingredients
-from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
-from steadyslip.model.point import operating_point
 from steadyslip.model.posed import vanishing_terms
 from steadyslip.model.range import highest_coefficients, highest_is_lost
 from steadyslip.model.sliding import observed_in_steady_sliding
@@ -53,6 +51,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         ``parameters`` (dotted names in the order of R), ``contacts`` (their names), ``searched`` (for each contact,
         True if σss is a root of its `residual`, False if `steady` has it), ``joint`` (True if all σss follow together),
         ``degree`` of the characteristic polynomial, ``closed`` (True if there is an `interval` in closed form),
+        ``couples`` (True if oscillations can couple, so that growth is told where nothing damps),
         ``edge`` (relative size of rounding at an edge), ``grid`` (number of stresses of the search, first and last
         power of ten),
         ``solved`` (residual of a root over the stress), ``observed`` (names, units and meanings of `observables`); for
@@ -73,11 +72,6 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         raise NotAvailable(
             "the page judges by a polynomial, and the characteristic equation of a rig with delay is none; "
             "steadyslip analyze and boundary take it, and stable_values in Python"
-        )
-    if is_undamped(operating_point(rig)):
-        raise NotAvailable(
-            "the page tells growth from decay, and nothing damps this machine, so that none of its oscillations dies "
-            "out; steadyslip analyze and boundary tell where two couple and one grows; for a page give it a damping"
         )
     coefficients = characteristic_coefficients(model)
     names, observables = _shown_observables(model)
@@ -110,6 +104,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         "degree": len(coefficients) - 1,
         "squares": len(edges[0].stores) - 2,
         "closed": closed,
+        "couples": not model.is_single,
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
         "solved": ROOT_TOLERANCE,

@@ -17,7 +17,7 @@ from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.verdict.causes import why_delay_is_ill_posed
 from steadyslip.verdict.measured import response_facts
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
-from steadyslip.verdict.words import BEYOND, QUIET, STABLE_MEANS, beyond, instead, told
+from steadyslip.verdict.words import BEYOND, EDGE_WORDS, STABLE_MEANS, beyond, instead, told
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
@@ -60,6 +60,7 @@ PHRASES = {
     "are ill-posed": "the equations are ill-posed: somewhere mass, direct effect and dampings do not outweigh what "
     "friction, directly or by way of the normal force, may fall by at once, so any small lag grows at once",
     "on edge": ON_EDGE,
+    "undamped": UNDAMPED,
     "dies out": "every small disturbance dies out",
     "nearest": "the nearest edge is that of {name}: {side} {value} {beyond}",
     "stable": "it is stable",
@@ -76,7 +77,7 @@ def reason(found: Findings) -> str:
     first = next((one for one in found.margins if one.edge is not None), None)
     hint = "" if first is None else f"; {_nearest(found, first)}"
     if found.on_edge:
-        return UNDAMPED + hint if found.undamped else PHRASES["on edge"]
+        return PHRASES["undamped"] + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
         counted = not found.eigenvalues and found.unstable_roots  # pairs, as far as they are not odd
         swings = counted % 2 == 0 if counted else any(s.imag for s in found.eigenvalues[:1])
@@ -91,7 +92,7 @@ def _nearest(found: Findings, margin: Margin) -> str:
         return ""
     side = "above" if edge.value > margin.value else "below"
     value = told(found.rig, margin.parameter, edge.value)
-    what = PHRASES["stable"] if edge.stable == side else QUIET if edge.quiet == side else beyond(edge)
+    what = PHRASES["stable"] if edge.stable == side else EDGE_WORDS["quiet"] if edge.quiet == side else beyond(edge)
     return PHRASES["nearest"].format(name=said(found.rig, margin.parameter), side=side, value=value, beyond=what)
 
 

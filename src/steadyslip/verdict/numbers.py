@@ -13,10 +13,12 @@ from steadyslip.linear.polynomials import routh_column
 from steadyslip.linear.quasipolynomial import INFINITE
 from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import growth, is_ill_posed, is_stable, spectrum, unstable_roots
+from steadyslip.linear.undamped import is_undamped
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import relative_errors
 
+_BESIDE_AXIS = 1e-12  # share of a real part that is rounding: the least of a pair that leaves the axis is some 1e-8
 _TERMS = 4_000_000  # evaluated on the imaginary axis for the roots of a rig with delays: two to four seconds
 
 
@@ -75,10 +77,19 @@ def _numbers(values: OperatingPoint) -> dict[str, Any]:
         no_rightmost = found.complete and not found.values.size
         rate = float(found.values[0].real) if leading else float(growth(values)) if no_rightmost else None
         rate = None if rate is not None and math.isnan(rate) else rate
+    if bool(is_undamped(values)):
+        numbers["eigenvalues"] = _on_the_axis(numbers["eigenvalues"])
+        rate = max((s.real for s in numbers["eigenvalues"]), default=rate)
     eigenvalues = numbers["eigenvalues"]
     if eigenvalues and eigenvalues[-1].imag > 0:  # a list of some of infinitely many ends between two of a pair
         eigenvalues = numbers["eigenvalues"] = (*eigenvalues, eigenvalues[-1].conjugate())
     return numbers | rates_of(eigenvalues, rate)
+
+
+def _on_the_axis(eigenvalues: tuple[complex, ...]) -> tuple[complex, ...]:
+    """Eigenvalues of a machine that nothing damps, without rounding beside the imaginary axis, the slowest first."""
+    found = (s if abs(s.real) > _BESIDE_AXIS * abs(s) else complex(0.0, s.imag) for s in eigenvalues)
+    return tuple(sorted(found, key=lambda s: (-s.real, abs(s.imag), -s.imag)))
 
 
 def rates_of(eigenvalues: tuple[complex, ...], rate: float | None) -> dict[str, Any]:

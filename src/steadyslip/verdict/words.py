@@ -44,6 +44,7 @@ BEYOND = {
 
 EDGE_WORDS = {
     "stable": "becomes stable",
+    "quiet": "no disturbance grows",
     "unstable": "slides steadily, but unstable",
     "here": "on the edge",
     "beside": "on the edge, stable {side} it",
@@ -51,14 +52,11 @@ EDGE_WORDS = {
 }
 """Phrases of the table of nearest edges beside those in `BEYOND`; pages use both."""
 
-PACE = {"grows": "doubles in {time}", "decays": "halves in {time}"}
+PACE = {"grows": "doubles in {time}", "decays": "halves in {time}", "stays": "neither grows nor dies"}
 """Phrases on how fast a disturbance changes; pages and reports use the same."""
 
 STABLE_MEANS = "Stable means: small disturbances die out. A large enough kick may still start {what}."
 """What the verdict "stable" leaves open, with a hole for what a large kick may start; pages say it too."""
-
-QUIET = "no disturbance grows"
-"""Phrase on the quiet side of an edge of an undamped rig."""
 
 
 def beyond(edge: Boundary) -> str:
@@ -206,7 +204,7 @@ def disturbance(analysis: Findings) -> str:
     if analysis.growth_rate is None:
         return f"{'dies away' if analysis.stable else 'grows'}; not decided: how fast"
     if analysis.on_edge:
-        text = "neither grows nor dies" + ("" if analysis.undamped else ", to within rounding")
+        text = PACE["stays"] + ("" if analysis.undamped else ", to within rounding")
     elif analysis.time_to_double is not None:
         text = PACE["grows"].format(time=format_quantity(analysis.time_to_double, "s"))
     elif analysis.time_to_halve is not None:
@@ -269,7 +267,7 @@ def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str
     elif edge.stable == towards:
         words = EDGE_WORDS["stable"]
     elif edge.quiet == towards:
-        words = QUIET
+        words = EDGE_WORDS["quiet"]
     elif analysis.stable is None:
         words = EDGE_WORDS["unstable"]
     else:

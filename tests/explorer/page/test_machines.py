@@ -7,6 +7,7 @@ import pytest
 
 import steadyslip as ss
 from explored_pages import Visit
+from machines import block
 from steadyslip.machine.letters import said
 
 MACHINES = Path(__file__).parents[3] / "examples" / "machines"
@@ -18,6 +19,29 @@ def page_of_servo(tmp_path_factory):
     machine = ss.read_rig(MACHINES / "geared-servo.toml")
     ss.explore(machine, title="servo").save(path)
     return machine, path
+
+
+def test_a_page_of_what_nothing_damps_says_undamped(browser, tmp_path):
+    """Verdict, bar, chart, eigenvalues and the guess; beyond the edge it is unstable, and damped it is stable."""
+    ss.explore(block()).save(tmp_path / "block.html")
+    with Visit(browser, tmp_path / "block.html") as visit:
+        assert visit.sentence().startswith("Undamped: no disturbance of steady sliding at 1 m/s grows")
+        assert visit.page.locator(".verdict").get_attribute("data-kind") == "undamped"
+        assert (
+            visit.page.locator(".bar").get_attribute("aria-label").startswith("undamped values of link one stiffness")
+        )
+        assert "undamped" in visit.page.locator(".map .word").all_text_contents()
+        assert "neither grows" in visit.page.locator(".facts tbody").inner_text()
+        visit.type("contacts.belt.friction.viscous", "0.1")
+        assert visit.sentence().startswith("Stable")
+        visit.page.get_by_role("button", name="undo").click()
+        visit.type("contacts.belt.friction.mu_coulomb", "1.1")
+        assert visit.sentence().startswith("Unstable")
+        visit.page.get_by_role("button", name="reset").click()
+        visit.page.get_by_role("button", name="guess first").click()
+        visit.type("bodies.block.mass", "2")
+        visit.page.locator(".guess").get_by_role("button", name="undamped", exact=True).click()
+        assert visit.page.locator(".said").inner_text().startswith("Right: Undamped")
 
 
 def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):

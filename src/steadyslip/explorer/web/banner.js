@@ -1,7 +1,7 @@
 // Banner: the verdict, its reason, and a bar with the stable values of one parameter.
 import { inMenu } from "./controls.js";
 import { make, put, svg, tell, unbroken } from "./dom.js";
-import { ABSENT, STABLE } from "./linear.js";
+import { ABSENT, STABLE, UNDAMPED, isQuiet } from "./linear.js";
 import { ticks } from "./plot.js";
 import { digits, shown, told, unitFor } from "./quantities.js";
 import { asStiffness, besides, beyondWords, headline, kindOf, kindWords, reason } from "./words.js";
@@ -40,7 +40,7 @@ export class Banner {
     this.choice.addEventListener("change", () => page.tell(this.choice.selectedIndex));
     this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar ", this.choice));
     const ask = (kind) => make("button", { type: "button", textContent: kindWords(kind, this.data), onclick: () => page.guessed(kind) });
-    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ask("unstable"), " ", ask("none"));
+    const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ...(page.rig.assess().status === UNDAMPED ? [ask("undamped"), " "] : []), ask("unstable"), " ", ask("none"));
     this.box = make("section", { className: "verdict", "aria-label": "verdict", tabIndex: -1 }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice, guess);
   }
 
@@ -89,12 +89,12 @@ export class Banner {
       if (!marks.length) return null;
       const low = Math.log(Math.min(...marks)) - DECADE, high = Math.log(Math.max(...marks)) + DECADE;
       const x = (k) => (k > 0 ? (Math.log(k) - low) / (high - low) : 0);
-      return { told, intervals, ends, own, gain, x, range: [Math.exp(low), Math.exp(high)], logarithmic: true };
+      return { told, word: kindWords("stable", data), intervals, ends, own, gain, x, range: [Math.exp(low), Math.exp(high)], logarithmic: true };
     }
     if (!page.tracks || rig.bar < 0) return null;
     const scale = page.scale(rig.bar), range = page.ranges[rig.bar], parts = page.tracks[rig.bar], logarithmic = range[0] > 0 && range[1] / range[0] > 30;
-    const intervals = parts.flatMap(({ status, at }, n) => (status === STABLE ? [{ low: n ? parts[n - 1].at : -Infinity, high: n + 1 < parts.length ? at : Infinity }] : []));
-    return { told: one, intervals, ends: parts.slice(0, -1).map(({ at }) => at), own: rig.values[rig.bar], gain: 0, x: (v) => (Number.isFinite(v) ? scale.of(v) : Number(v > 0)), range, logarithmic };
+    const intervals = parts.flatMap(({ status, at }, n) => (isQuiet(status) ? [{ low: n ? parts[n - 1].at : -Infinity, high: n + 1 < parts.length ? at : Infinity }] : []));
+    return { told: one, word: kindWords(parts.some(({ status }) => status === UNDAMPED) ? "undamped" : "stable", data), intervals, ends: parts.slice(0, -1).map(({ at }) => at), own: rig.values[rig.bar], gain: 0, x: (v) => (Number.isFinite(v) ? scale.of(v) : Number(v > 0)), range, logarithmic };
   }
 
   /** True if the bar shows a spring stiffness, perhaps with a gain added, rather than another parameter or a gain alone. */
@@ -107,7 +107,7 @@ export class Banner {
     const found = this.drawn(answer);
     this.bar.hidden = !found;
     if (!found) return put(this.bar, "aria-label", "no stiffness is stable");
-    const { told: one, intervals, ends, own, gain, logarithmic } = found, { phrases, parameters } = this.data, { bar } = this.page.rig;
+    const { told: one, word, intervals, ends, own, gain, logarithmic } = found, { phrases, parameters } = this.data, { bar } = this.page.rig;
     const whole = !phrases && this.springs(answer), marks = [...ends, own, gain].filter((v) => v > 0), [factor, name] = unitFor(one, own || marks[0] || 1);
     const together = logarithmic && Math.max(...marks) < ASUNDER * Math.min(...marks);
     const value = (v) => (together ? `${digits(v / factor)} ${name}`.trim() : told(one, v)); // one unit for all marks, unless they span decades
@@ -118,14 +118,14 @@ export class Banner {
     const [size] = unitFor(one, found.range[1]), scale = ticks(found.range[0] / size, found.range[1] / size, logarithmic, 4).map((v) => v * size).filter((v) => x(v) > 6 && x(v) < 94);
     const marked = [...scale.map((v) => ["tick", x(v), ""]), ["own", x(own), ""], ...ends.map((v) => ["edge", x(v), ""])];
     const begins = new Set(intervals.map(({ low }) => low)), closes = new Set(intervals.map(({ high }) => high)), words = whole ? (gain > 0 ? `gain${own > gain ? " and stiffness" : ""} ` : "stiffness ") : "";
-    const labels = [...ends].sort((a, b) => Math.abs(x(a) - x(own)) - Math.abs(x(b) - x(own))).map((v) => ["", x(v), `${begins.has(v) ? "stable from" : closes.has(v) ? (intervals.some((one) => one.high === v && ends.includes(one.low)) ? "to" : "stable to") : "from"} ${value(v)}`]);
+    const labels = [...ends].sort((a, b) => Math.abs(x(a) - x(own)) - Math.abs(x(b) - x(own))).map((v) => ["", x(v), `${begins.has(v) ? `${word} from` : closes.has(v) ? (intervals.some((one) => one.high === v && ends.includes(one.low)) ? "to" : `${word} to`) : "from"} ${value(v)}`]);
     if (own > gain && gain > 0 && !ends.length) labels.push(["", x(gain), `the gain alone ${value(gain)}`]);
     placed(this.marks, marked, "i");
     placed(this.labels, [...this.fitted(scale.map((v) => ["tick", x(v), value(v)])), ...this.fitted([["now", x(own), `${words}now ${value(own)}`]]), ...this.fitted(labels)], "span");
     const starts = (low) => low > (whole || phrases ? gain : -Infinity) && low > -Infinity; // otherwise the interval begins at the lowest possible value
     const said = intervals.map(({ low, high }) => (high < Infinity ? (starts(low) ? `${value(low)} to ${value(high)}` : `below ${value(high)}`) : starts(low) ? `above ${value(low)}` : "any"));
     const what = whole ? (gain > 0 ? `stiffness and gain together, of which the gain is ${value(gain)}` : "stiffness") : `values of ${parameters[bar].title}`;
-    put(this.bar, "aria-label", `stable ${what}: ${said.join(", or ") || "none"}`);
+    put(this.bar, "aria-label", `${word} ${what}: ${said.join(", or ") || "none"}`);
   }
 
   /** Place the labels of one row within the bar, most important first; labels that would overlap are left out. */

@@ -1,7 +1,5 @@
 // Stability chart over two parameters: regions filled row by row, outlines by marching squares.
-import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
-
-export const CLASSES = { [ABSENT]: "none", [STABLE]: "stable", [UNSTABLE]: "unstable", [UNKNOWN]: "unknown" };
+import { ABSENT, CLASSES } from "./linear.js";
 
 /**
  * SVG paths of the regions, of the outlines between them (`lost` where there is no steady sliding on one side), and places for words.
@@ -10,7 +8,7 @@ export const CLASSES = { [ABSENT]: "none", [STABLE]: "stable", [UNSTABLE]: "unst
  */
 export function regions(status, rows, width, height) {
   const columns = Math.round(rows * 1.3), grid = [];
-  const paths = { stable: "", unstable: "", none: "", unknown: "" };
+  const paths = Object.fromEntries(CLASSES.map((name) => [name, ""]));
   const cut = (at, a, b, first) => { // boundary point between two positions of different status, by bisection
     for (let step = 0; step < 10; step++) {
       const middle = 0.5 * (a + b);

@@ -1,6 +1,6 @@
 // Controls of parameters: a slider and a text field each; the slider track has the colour of the status at each value.
-import { CLASSES } from "./chart.js";
 import { make, put, subscripted, tell } from "./dom.js";
+import { CLASSES } from "./linear.js";
 import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
 import { named } from "./words.js";

@@ -1,5 +1,5 @@
 // Nearest edge of every parameter, and values just beside it.
-import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { ABSENT, STABLE, UNKNOWN, isQuiet } from "./linear.js";
 import { about, doublings } from "./nearness.js";
 import { inside } from "./rig.js";
 import { NEXT_TO_IT } from "./words.js";
@@ -21,7 +21,7 @@ export function edgesOf(page) {
     if (!edge) return;
     const { at, below, above } = edge, n = edges.indexOf(edge), away = at > value, [here, beyond] = away ? [below, above] : [above, below], doubled = doublings(value, at, one.unit);
     const isFar = (end) => one.unit !== "rad" && doublings(value, end) >= most;
-    const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // true if the side to land on is behind the edge
+    const across = isQuiet(beyond) || (beyond !== ABSENT && !isQuiet(here)); // true if the side to land on is behind the edge
     const room = (up) => (up ? (edges[n + 1]?.at ?? high) : (edges[n - 1]?.at ?? low)) - at;
     found.push({ i, at, gap: Math.abs(at - value), stable: above === STABLE ? "above" : below === STABLE ? "below" : "", distance: !value && one.unit !== "rad" ? Infinity : doubled > NEXT_TO_IT ? Number(doubled.toPrecision(TIED)) : 0, beyond, far: isFar(at), landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)), other: other && !isFar(other.at) ? other.at : undefined });
   });

@@ -7,7 +7,7 @@ import { Locus } from "./locus.js";
 import { fill, words } from "./modes.js";
 import { digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
-import { NEXT_TO_IT, beyondWords, named, quantity } from "./words.js";
+import { NEXT_TO_IT, edgeWords, named, quantity } from "./words.js";
 
 /** Legend of the root locus: meaning, path and class of each mark. */
 const MARKS = [
@@ -65,7 +65,7 @@ export class Facts {
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
-      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", fill(rig.data.pace[s.re > 0 ? "grows" : "decays"], { time })];
+      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", fill(rig.data.pace[s.re > 0 ? "grows" : s.re < 0 ? "decays" : "stays"], { time })];
       return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // no line break between number and unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
@@ -82,7 +82,7 @@ export class Facts {
         if (inside(one, edge.landing)) page.put(page.with(edge.i, edge.landing));
       });
       const moved = (at) => change(one, page.rig.values[edge.i], at), other = edge.other === undefined ? "" : `; the other edge: ${told(one, edge.other)}, ${moved(edge.other)}`;
-      return make("li", {}, go, ` ${moved(edge.at)}: ${beyondWords(edge, page)}${other}`);
+      return make("li", {}, go, ` ${moved(edge.at)}: ${edgeWords(edge, page)}${other}`);
     });
     const found = page.edges(), far = found.filter((edge) => edge.far);
     const near = found.filter((edge) => !edge.far), [next] = near, one = next && page.rig.data.parameters[next.i];

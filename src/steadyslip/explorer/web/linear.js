@@ -2,12 +2,12 @@
 // The equations themselves are generated (steadyslip/explorer/equations.py).
 import { modeOf } from "./modes.js";
 import { about } from "./nearness.js";
-import { roots } from "./polynomials.js";
+import { isEven, roots } from "./polynomials.js";
 
 /** @typedef {import("./polynomials.js").Complex} Complex */
 /** @typedef {{low: number, high: number}} Interval */
 /** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
-/** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, degree: number, squares: number, closed: boolean, gain?: string | null, edge: number, grid: [number, number, number], solved: number,
+/** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, couples: boolean, degree: number, squares: number, closed: boolean, gain?: string | null, edge: number, grid: [number, number, number], solved: number,
  *   observed: [string, string, string][], coordinates?: string[], matrix?: any, stores?: any, shape?: any}} Facts */
 
 const NEARLY_REAL = 1e-6; // imaginary part over |s| of a root below which it is also tried as real
@@ -16,7 +16,12 @@ const HUGE = 1e150, SIGNED = 1e4; // HUGE: sizes whose products do not overflow;
 const FORMULA = 5, REAL = 1e-9; // FORMULA: values of `steady` for each contact; REAL: relative imaginary part of a gain that is rounding
 const APART = [1e-6, 1, 1e6]; // factors on a parameter for the test that it enters linearly
 const SIZED_APART = 1e12; // ratio of an edge to the size of a parameter above which the edge is rounding of 0 or infinity
-export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
+/** Names of the statuses, as in the style sheet and in what Python sends of each. */
+export const CLASSES = ["none", "stable", "unstable", "unknown", "undamped"];
+export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3, UNDAMPED = 4; // as in steadyslip/linear/status.py
+
+/** True if no disturbance grows. @param {number} status */
+export const isQuiet = (status) => status === STABLE || status === UNDAMPED;
 
 export class Linear {
   bar = -1; // index of the parameter on the bar of a machine
@@ -111,7 +116,7 @@ export class Linear {
     return real.reduce((most, s) => Math.max(most, s.re), -Infinity);
   }
 
-  /** Status ABSENT, STABLE, UNSTABLE (also ill-posed) or UNKNOWN; called for each point of a chart, so it makes no arrays. */
+  /** Status; UNSTABLE also if ill-posed. It is called for each point of a chart, so it makes no arrays where something damps. */
   status(branch = 0) {
     const { R, c, y, programs } = this;
     programs.allowed(R, 0, y);
@@ -121,7 +126,19 @@ export class Linear {
     programs.coefficients(R, 0, c);
     const { degree } = this.facts, top = c[degree] || c[degree - 1] || 1; // as in steadyslip/model/range.py
     for (let i = 0; i <= degree; i++) if (!Number.isFinite(c[i]) || !Number.isFinite(c[i] / top)) return UNKNOWN;
-    return c[degree + 1] === 1 ? STABLE : UNSTABLE;
+    if (c[degree + 1] === 1) return STABLE;
+    return this.isUndamped() && roots(c.subarray(0, degree + 1)).every(({ re }) => re <= 0) ? UNDAMPED : UNSTABLE;
+  }
+
+  /** True if nothing damps a machine, as in steadyslip/linear/undamped.py; call `status` before. */
+  isUndamped() {
+    const { c, facts: { degree, couples } } = this;
+    let some = false;
+    for (let k = 1; k <= degree && couples; k++) {
+      if (c[k] !== 0 && k % 2) return false;
+      some ||= c[k] !== 0;
+    }
+    return some;
   }
 
   /**
@@ -139,6 +156,7 @@ export class Linear {
       for (let i = 0; i < many; i++) found.push(signedLog(left * y[i]));
     } else if (!searched.some(Boolean)) for (let i = 0; i < many; i++) found.push(signedLog(1 - y[FORMULA * i + 1]), signedLog(y[FORMULA * i + 2]));
     if (status === ABSENT) return found;
+    if (this.isUndamped()) return [...found, signedLog(c[0]), ...this.apart()];
     let product = 1, size = SIGNED;
     for (let k = degree + 5; k < 2 * degree + 4; k++) {
       product *= c[k];
@@ -146,6 +164,16 @@ export class Linear {
     }
     found.push(signedLog(c[degree + 3]), signedLog(c[degree + 4]), signedLog(product, size));
     return found;
+  }
+
+  /** Highest coefficient, and size of the discriminant in s², of a machine that nothing damps: that is zero where two roots meet. */
+  apart() {
+    const { c, facts: { degree } } = this, even = Array.from(c.subarray(0, degree + 1)).filter((_, k) => k % 2 === 0), u = roots(even);
+    let size = SIGNED;
+    u.forEach((one, n) => {
+      for (const other of u.slice(n + 1)) size += 2 * Math.log(Math.hypot(one.re - other.re, one.im - other.im) / (Math.hypot(one.re, one.im) + Math.hypot(other.re, other.im)));
+    });
+    return [signedLog(even[even.length - 1]), Math.max(size, 0)];
   }
 
   /** Complete answer at the parameters that are set: status, steady sliding, stable values, eigenvalues. */
@@ -235,7 +263,7 @@ export class Linear {
     };
   }
 
-  /** p and q of the characteristic polynomial p + f q, f a factor on a parameter; null if not linear in it. @param {number} place */
+  /** p and q of the characteristic polynomial p + f q, f a factor on a parameter; null if not linear in it, or undamped. @param {number} place */
   linearIn(place, branch) {
     const { R, facts: { degree }, count } = this, many = degree + 1, told = new Float64Array(3 * many), own = R[place], sigmas = R.slice(count);
     const known = APART.every((factor, n) => {
@@ -254,7 +282,8 @@ export class Linear {
       p.push(rest);
       q.push(slope);
     }
-    return q.some((slope) => slope !== 0) ? { p, q } : null;
+    const undamped = this.facts.couples && isEven(p) && isEven(q); // with roots on the axis at all values
+    return q.some((slope) => slope !== 0) && !undamped ? { p, q } : null;
   }
 
   /** Positive factors on a parameter, rising, with a root on the imaginary axis; null if it does not enter linearly. @param {number} place */

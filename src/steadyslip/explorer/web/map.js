@@ -1,8 +1,8 @@
 // Stability chart over two parameters with the point of the rig.
-import { CLASSES, carried, line, regions } from "./chart.js";
+import { carried, line, regions } from "./chart.js";
 import { inMenu } from "./controls.js";
 import { make, put, putAt, svg } from "./dom.js";
-import { UPPER } from "./linear.js";
+import { CLASSES, UPPER } from "./linear.js";
 import { axis, frame } from "./plot.js";
 import { digits, told } from "./quantities.js";
 import { kindWords } from "./words.js";
@@ -15,6 +15,7 @@ const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowD
 
 export class Chart {
   /** @type {Record<string, any>} */ regions;
+  /** @type {Record<string, any>} */ patterned;
 
   /** @param {import("./page.js").Page} page @param {[number, number]} axes indices of the parameters at first */
   constructor(page, axes) {
@@ -42,7 +43,7 @@ export class Chart {
     this.canvas.addEventListener("pointermove", (event) => this.canvas.hasPointerCapture(event.pointerId) && this.drag(event, true));
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => page.rest());
     this.canvas.addEventListener("keydown", (event) => this.nudge(event));
-    this.key = ["stable", "unstable", "none", "unknown"].map((name) => make("span", { className: name }, make("i", { className: name }), kindWords(name, page.rig.data)));
+    this.key = ["stable", "undamped", "unstable", "none", "unknown"].map((name) => make("span", { className: name }, make("i", { className: name }), kindWords(name, page.rig.data)));
     this.box = make("section", { className: "map", "aria-label": "chart of stability", tabIndex: -1 }, make("h2", { textContent: "Where is it stable?" }),
       make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys; solid line: edge of stability, dashed: edge of steady sliding" })),
       this.canvas, make("p", { className: "key" }, ...this.key, make("span", {}, "thin lines: ", ...(page.rig.data.phrases ? ["growth rate, 1/s"] : ["stiffness over critical k/k", make("sub", { textContent: "cr" })]))));
@@ -81,12 +82,12 @@ export class Chart {
       const { paths, outline, lost, places } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
       this.frame(i, j, x, y);
       for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);
-      put(this.hatched, "d", paths.none);
+      for (const [name, path] of Object.entries(this.patterned)) put(path, "d", paths[name]);
       const seen = new Set(this.page.tracks.flatMap((track) => track.map((part) => CLASSES[part.status])));
       for (const one of this.key) one.hidden = !paths[one.className] && !seen.has(one.className); // no legend for regions that are not in the chart
       put(this.outline, "d", outline);
       put(this.lost, "d", lost);
-      put(this.slides, "d", paths.stable + paths.unstable);
+      put(this.slides, "d", paths.stable + paths.unstable + paths.undamped);
       this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, kindWords(name, this.page.rig.data))));
       this.contours(i, x, j, y, places);
     }
@@ -135,15 +136,16 @@ export class Chart {
     if (known === this.framed) return;
     this.framed = known;
     const inner = svg("g", { transform: `translate(${box.left} ${box.top})` });
-    this.regions = Object.fromEntries(Object.values(CLASSES).map((name) => [name, inner.appendChild(svg("path", { class: `region ${name}` }))]));
-    const stripes = svg("pattern", { id: this.stripes, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("line", { x1: 0, y1: 0, x2: 0, y2: 8, class: "stripe" }));
-    this.hatched = svg("path", { fill: `url(#${this.stripes})` });
+    this.regions = Object.fromEntries(CLASSES.map((name) => [name, inner.appendChild(svg("path", { class: `region ${name}` }))]));
+    const marks = { none: svg("line", { x1: 0, y1: 0, x2: 0, y2: 8 }), undamped: svg("circle", { cx: 4, cy: 4, r: 0.5 }) };
+    const patterns = Object.entries(marks).map(([name, mark]) => svg("pattern", { id: `${this.stripes}-${name}`, class: "stripe", width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, mark));
+    this.patterned = Object.fromEntries(Object.keys(marks).map((name) => [name, svg("path", { fill: `url(#${this.stripes}-${name})` })]));
     this.outline = svg("path", { class: "outline" });
     this.lost = svg("path", { class: "outline lost" });
     this.words = svg("g", {});
     this.lines = svg("g", { class: "contours" });
     this.slides = svg("path", {}); // contours end where sliding is not steady
-    inner.append(stripes, svg("clipPath", { id: `${this.stripes}-clip` }, this.slides), this.hatched, this.lines, this.outline, this.lost, this.words);
+    inner.append(...patterns, svg("clipPath", { id: `${this.stripes}-clip` }, this.slides), ...Object.values(this.patterned), this.lines, this.outline, this.lost, this.words);
     this.point = svg("circle", { r: 8, class: "point" });
     this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
     this.canvas.replaceChildren(inner,

@@ -140,6 +140,16 @@ function factor(c, middle, times) {
   return quadratic(w, u, 1).map((s) => ({ re: s.re * size, im: s.im * size }));
 }
 
+/** True if a polynomial has even powers only. @param {ArrayLike<number>} c */
+export const isEven = (c) => Array.from(c).every((value, k) => k % 2 === 0 || value === 0);
+
+/** Both square roots of a root in s², exactly on the axis where that is negative. @param {Complex} u @returns {Complex[]} */
+function squareRoots({ re, im }) {
+  const large = Math.sqrt(0.5 * (Math.hypot(re, im) + Math.abs(re))), small = im && (0.5 * Math.abs(im)) / large;
+  const [x, y] = re < 0 ? [small, large] : [large, small];
+  return [{ re: x, im: im < 0 ? -y : y }, { re: -x || 0, im: im < 0 ? y : -y || 0 }];
+}
+
 /**
  * All roots, by falling real part.
  * @param {ArrayLike<number>} given
@@ -147,6 +157,7 @@ function factor(c, middle, times) {
  */
 export function roots(given) {
   const c = Array.from(given);
+  if (c.length > 3 && isEven(c)) return falling(roots(c.filter((_, k) => k % 2 === 0)).flatMap(squareRoots));
   while (c.length > 1 && c[c.length - 1] === 0) c.pop();
   let zeros = 0;
   while (c.length > 1 && c[0] === 0) {
@@ -159,5 +170,8 @@ export function roots(given) {
     else if (d === 2) found.push(...quadratic(c[0], c[1], c[2]));
     else if (d > 2) found.push(...paired(c, ...aberth(c)));
   }
-  return found.sort((a, b) => b.re - a.re || b.im - a.im);
+  return falling(found);
 }
+
+/** Roots by falling real part, those with the same one by rising frequency. @param {Complex[]} found */
+const falling = (found) => found.sort((a, b) => b.re - a.re || Math.abs(a.im) - Math.abs(b.im) || b.im - a.im);

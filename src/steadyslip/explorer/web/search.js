@@ -1,7 +1,7 @@
 // Changes of status along one parameter, found as in steadyslip/linear/search.py: the parameter is sampled over its range,
 // functions that vanish at every edge are searched where they dip between samples, and parameters that enter linearly
 // have exact edges. These functions are generated (steadyslip/explorer/equations.py, sliding.py).
-import { ABSENT, SAME, UNKNOWN } from "./linear.js";
+import { ABSENT, SAME, UNDAMPED, UNKNOWN } from "./linear.js";
 import { inside } from "./rig.js";
 
 /** @typedef {{x: number, status: number, functions: number[], edge?: boolean}} Sample `functions` as `Linear.functions` has them */
@@ -55,7 +55,7 @@ class Search {
       row = this.certain(this.divided(ordered([...row, ...edges.flatMap(({ at }) => this.beside(at, row))])));
       edges = this.edges(row);
     }
-    return { edges, status: edges.length ? edges[0].below : own.status, low, high };
+    return { edges, status: edges.length ? edges[0].below : row[row.length - 1].status, low, high };
   }
 
   /** Search range and its sample values, as a function of the index 0 to `count`. @param {[number, number]} [range] */
@@ -136,7 +136,7 @@ class Search {
 
   /** Samples without those beside a change whose status depends on rounding. @param {Sample[]} row */
   certain(row) {
-    const found = /** @type {Sample[]} */ ([]), doubtful = (one) => (one.edge ??= this.rig.onEdge(this.i, one.x));
+    const found = /** @type {Sample[]} */ ([]), doubtful = (one) => (one.edge ??= one.status !== UNDAMPED && this.rig.onEdge(this.i, one.x));
     for (const one of row) {
       while (found.length && found[found.length - 1].status !== one.status && doubtful(found[found.length - 1])) found.pop();
       if (!found.length || found[found.length - 1].status === one.status || !doubtful(one)) found.push(one);

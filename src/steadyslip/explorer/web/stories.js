@@ -1,7 +1,7 @@
 // Stories: rigs to begin with, made from the values of the file and their nearest edges.
 import { inMenu } from "./controls.js";
 import { make } from "./dom.js";
-import { STABLE } from "./linear.js";
+import { STABLE, isQuiet } from "./linear.js";
 import { told } from "./quantities.js";
 import { inside } from "./rig.js";
 
@@ -12,7 +12,7 @@ export function stories(page) {
   const { parameters, speed } = page.rig.data, home = parameters.map((one) => one.value), drive = parameters.findIndex((one) => one.name === speed);
   const found = /** @type {[string, number, number][]} */ ([]);
   for (const edge of page.edges().filter((one) => !one.far).slice(0, TALES)) {
-    const one = parameters[edge.i], value = edge.beyond === STABLE ? edge.landing : edge.behind;
+    const one = parameters[edge.i], value = isQuiet(edge.beyond) ? edge.landing : edge.behind;
     if (inside(one, value)) found.push([`${edge.beyond === STABLE ? "just stable" : "just beyond the edge"}: ${inMenu(one, parameters)} ${told(one, value)}`, edge.i, value]);
   }
   for (const [words, times] of /** @type {[string, number][]} */ ([["ten times as fast", 10], ["a tenth of the speed", 0.1]])) {

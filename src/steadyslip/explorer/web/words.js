@@ -1,5 +1,5 @@
 // Sentences of the page about verdicts and motions.
-import { ABSENT, SAME, STABLE, UNKNOWN } from "./linear.js";
+import { ABSENT, CLASSES, SAME, STABLE, UNDAMPED, UNKNOWN, UNSTABLE } from "./linear.js";
 import { fill } from "./modes.js";
 import { extent } from "./plot.js";
 import { digits, shown, told } from "./quantities.js";
@@ -22,27 +22,23 @@ export function asStiffness({ parameters, stiffness, area }) {
 
 /** Kind of an answer, as a word used by the style sheet. */
 export function kindOf(answer) {
-  if (answer.status === ABSENT) return "none";
-  if (answer.status === UNKNOWN) return "unknown";
-  return answer.onEdge ? "edge" : answer.status === STABLE ? "stable" : "unstable";
+  return answer.onEdge && answer.status !== UNDAMPED ? "edge" : CLASSES[answer.status];
 }
 
 /** Text that begins with a capital letter. @param {string} text */
 const begun = (text) => text[0].toUpperCase() + text.slice(1);
-const UNFIT = "A number leaves its range, or breaks a condition that several obey together.";
 export const NEXT_TO_IT = 1e-6; // relative distance from the edge that counts as on it; as in steadyslip/verdict/reasons.py, whose phrases are used here
 
 /** Headline of the verdict. @param {string} speed velocity with its preposition, "at" or "of" */
-export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)]?.join("") ?? "Numbers outside what a rig can have", { speed });
+export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)].join(""), { speed });
 
 /** Words for a kind of answer, such as those in the areas of the chart. @param {string} kind @param {any} data */
-export const kindWords = (kind, { headlines }) => (headlines[kind]?.[0] ?? "No such rig").toLowerCase();
+export const kindWords = (kind, { headlines }) => headlines[kind][0].toLowerCase();
 
 /** Reason for the verdict, with the phrases of Python. @param {any} answer @param {any} data @param {any} [edge] nearest edge of a machine */
 export function reason(answer, data, edge) {
-  if (answer.status === UNKNOWN) return UNFIT;
   const { phrases, reasons } = data, words = phrases ?? reasons;
-  const text = answer.status === ABSENT ? absence(answer, data) : answer.illPosed ? words["are ill-posed"] : phrases ? ofMachine(answer, data, edge) : ofSlider(answer, data);
+  const text = answer.status === UNKNOWN ? data.absent.unfit : answer.status === ABSENT ? absence(answer, data) : answer.illPosed ? words["are ill-posed"] : phrases ? ofMachine(answer, data, edge) : ofSlider(answer, data);
   return `${begun(text)}.`;
 }
 
@@ -79,8 +75,8 @@ export function besides({ critical, illPosed, frequency, gain, share }, data) {
 
 /** Reason for the verdict on a machine: growth or decay, and the nearest edge. */
 function ofMachine(answer, { phrases, beyond }, edge) {
-  if (answer.onEdge) return phrases["on edge"];
-  const what = answer.status === STABLE ? phrases["dies out"] : beyond[kindBeyond(answer)];
+  if (kindOf(answer) === "edge") return phrases["on edge"];
+  const what = answer.status === STABLE ? phrases["dies out"] : answer.status === UNDAMPED ? phrases.undamped : beyond[kindBeyond(answer)];
   return edge ? `${what}; ${fill(phrases.nearest, edge)}` : what;
 }
 
@@ -93,15 +89,24 @@ function kindBeyond(answer) {
 /** Phrase such as "it lifts off" with the name of the contact of a machine. @param {string} words @param {any} answer @param {any} facts */
 const ofContact = (words, answer, { contacts }) => (answer.status === ABSENT && contacts[answer.contact] ? words.replace(/^it /, `${contacts[answer.contact]} `) : words);
 
-/** Phrase for what happens beyond an edge, as in Python. @param {any} edge @param {any} page */
-export function beyondWords({ i, at, gap, stable, beyond, behind }, page) {
-  const { answer: now, rig: { values, data: { beyond: words, facts } } } = page;
-  if (now.onEdge && gap <= NEXT_TO_IT * Math.abs(values[i])) return stable ? fill(words.beside, { side: stable }) : words.here;
+/** Phrase for an edge in the list, as in Python. @param {any} edge @param {any} page */
+export function edgeWords(edge, page) {
+  const { answer, rig: { values, data: { beyond } } } = page, { i, gap, stable } = edge;
+  if (answer.onEdge && gap <= NEXT_TO_IT * Math.abs(values[i])) return stable ? fill(beyond.beside, { side: stable }) : beyond.here;
+  return beyondWords(edge, page);
+}
+
+/** Phrase for what happens beyond an edge. @param {any} edge @param {any} page */
+export function beyondWords({ i, at, beyond, behind }, page) {
+  const { answer: now, rig: { data: { beyond: words, facts } } } = page;
   if (beyond === STABLE) return words.stable;
+  if (beyond === UNDAMPED) return words.quiet;
   if (beyond !== ABSENT && now.status === ABSENT) return words.unstable;
   const there = (value) => page.rig.assess(page.with(i, value)), answer = there(behind);
   if (beyond === ABSENT) return ofContact(words[kindBeyond({ ...answer, status: beyond })], answer, facts);
   const step = SAME * Math.abs(at) || Math.abs(behind), below = there(at - step), above = there(at + step); // decided at the edge, as in steadyslip/linear/search.py
+  const growing = [below, above].find(({ status }) => status === UNSTABLE);
+  if ([below, above].some(({ status }) => status === UNDAMPED)) return words[growing?.eigenvalues[0].im ? "coupling" : "divergence"];
   if (below.illPosed !== above.illPosed) return words["ill-posed"];
   return words[below.still * above.still > 0 && below.eigenvalues.some(({ im }) => im) ? "oscillatory" : "divergence"];
 }

@@ -198,12 +198,12 @@ class Fitted(ReadOnly):
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion; of fits to the same records, the least is the best."""
+        """Akaike's information criterion, with the fit's own noise; `compare_laws` gives laws one noise in common."""
         return self.criteria(self.noise)[0]
 
     @property
     def bic(self) -> float:
-        """Schwarz's (Bayesian) information criterion."""
+        """Schwarz's (Bayesian) information criterion, with the fit's own noise as `aic`."""
         return self.criteria(self.noise)[1]
 
     def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.plan import Plan, with_lag
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
-from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, minimise
+from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, SMALL_FALL, minimise
 from steadyslip.experiments.numerics.noise import STRUCTURE, describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
 
@@ -27,8 +27,6 @@ STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass 
 ROUNDS = 2  # changes that are tried on top of each other
 TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3  # of each trial; on made records they end where the default ones do
 MAX_TREND = 2  # orders of a trend that are tried
-
-NOTHING = 0.1  # fall of −2 log likelihood of white noise below which the search for a change is over
 
 NESTED = {"lag", "trend"}
 """Unknowns without effect at 0, so that a fit with them begins at the minimum without."""
@@ -211,7 +209,7 @@ def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float], lags: 
     z = begin + np.outer(lags if np.any(added) else [0.0], added)
     low, high = np.transpose([one.bounds for one in space.unknowns])
     stop = effort.budget.part(np.inf)
-    enough, near = NOTHING / comparison.size, DAMPING_NEAR
+    enough, near = SMALL_FALL / comparison.size, DAMPING_NEAR
     ends = minimise(
         lambda x, _: comparison.residuals(x), z, low, high, MAX_ITERATIONS, tolerance=enough, stop=stop, damping=near
     )

@@ -53,7 +53,7 @@ from steadyslip.motion.status import causes
 from steadyslip.verdict import machine as machine_words, slider as slider_words
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import page_reasons
-from steadyslip.verdict.words import BEYOND, EDGE_WORDS, HEADLINES, PACE
+from steadyslip.verdict.words import BEYOND, EDGE_WORDS, EIGENVALUE_COLUMNS, HEADLINES, NO_PERIOD, PACE
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "nearness", "linear", "rig", "search", "words", "plot", "chart",
@@ -219,6 +219,8 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "written": _written_units(rig),
         "beyond": BEYOND | EDGE_WORDS,
         "pace": PACE,
+        "columns": EIGENVALUE_COLUMNS,
+        "aperiodic": NO_PERIOD,
         "judders": JUDDERS,
         "ends": causes(rig),
         "usual": DEFAULTS,

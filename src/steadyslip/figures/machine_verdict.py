@@ -20,7 +20,7 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import Analysis
-from steadyslip.verdict.words import told
+from steadyslip.verdict.words import PACE, told
 
 _SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
 LOST = ("lock-up", "lift-off", "no solution")
@@ -188,7 +188,8 @@ def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
     ax.axvline(0.0, color=BLACK, linewidth=1)
     _label_rows(ax, labels)
     ax.set_xlim(-1.1, 1.1)
-    does = "grows" if mode.eigenvalue.real > 0 else "decays"
+    rate = mode.eigenvalue.real
+    does = "grows" if rate > 0 else "decays" if rate < 0 else PACE["stays"]
     kind = (
         f"period {format_quantity(2 * math.pi / abs(mode.eigenvalue.imag), 's')}"
         if mode.eigenvalue.imag

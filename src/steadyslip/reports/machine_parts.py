@@ -17,7 +17,7 @@ from steadyslip.reports.recommendation import ORDER, Order, recommendation
 from steadyslip.reports.sections import assumptions, motion, notes_of, references, tolerances_of
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.whole_text import facts
-from steadyslip.verdict.words import PACE, headline, told
+from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row, headline, told
 
 _MAX_ROOTS = 12  # rows of the table of eigenvalues, so that it fits half a page (by trial)
 
@@ -71,19 +71,6 @@ def _verdict_section(analysis: Analysis) -> Iterator[str]:
     yield table(contacts, ("contact", "slides at", "normal force", "friction force", "friction"))
     yield heading("Eigenvalues", 3)
     roots = [s for s in analysis.eigenvalues if s.imag >= 0]
-    yield table(map(_eigenvalue_row, roots[:_MAX_ROOTS]), ("rate", "period", "size"))
+    yield table(map(eigenvalue_row, roots[:_MAX_ROOTS]), EIGENVALUE_COLUMNS)
     if len(roots) > _MAX_ROOTS:
         yield paragraph(f"and {len(roots) - _MAX_ROOTS} more, which decay faster", "small")
-
-
-def _eigenvalue_row(s: complex) -> tuple[str, str, str]:
-    from math import log, pi
-
-    period = format_quantity(2 * pi / s.imag, "s") if s.imag else "none"
-    if s.real == 0:
-        return "0 1/s", period, "stays"
-    return (
-        f"{s.real:.4g} 1/s",
-        period,
-        PACE["grows" if s.real > 0 else "decays"].format(time=format_quantity(log(2) / abs(s.real), "s")),
-    )

@@ -55,6 +55,19 @@ EDGE_WORDS = {
 PACE = {"grows": "doubles in {time}", "decays": "halves in {time}", "stays": "neither grows nor dies"}
 """Phrases on how fast a disturbance changes; pages and reports use the same."""
 
+EIGENVALUE_COLUMNS = ("rate", "period", "size")
+NO_PERIOD = "none"
+"""Head of a table of eigenvalues, and the period of one that does not oscillate; pages and reports use the same."""
+
+
+def eigenvalue_row(s: complex) -> tuple[str, str, str]:
+    """Row of a table of eigenvalues (1/s) with the columns of `EIGENVALUE_COLUMNS`."""
+    kind = "grows" if s.real > 0 else "decays" if s.real < 0 else "stays"
+    time = format_quantity(math.log(2) / abs(s.real), "s") if s.real else ""
+    period = format_quantity(2 * math.pi / abs(s.imag), "s") if s.imag else NO_PERIOD
+    return format_quantity(s.real, "1/s"), period, PACE[kind].format(time=time)
+
+
 STABLE_MEANS = "Stable means: small disturbances die out. A large enough kick may still start {what}."
 """What the verdict "stable" leaves open, with a hole for what a large kick may start; pages say it too."""
 

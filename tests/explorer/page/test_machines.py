@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 
 import steadyslip as ss
+from explored_edges import written
 from explored_pages import Visit
 from machines import block
 from steadyslip.machine.letters import said
+from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row
 
 MACHINES = Path(__file__).parents[3] / "examples" / "machines"
 
@@ -52,6 +54,11 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
         reason = visit.reason()
         assert reason.lower() == f"{analysis.reason}.".lower()
         assert analysis.mode.words() in visit.page.locator(".mode").inner_text()
+        rows = [row.split("\t") for row in visit.page.locator(".facts tbody").inner_text().split("\n")]
+        theirs = [[written(cell) for cell in eigenvalue_row(s)] for s in analysis.eigenvalues if s.imag >= 0]
+        assert [[written(cell.replace("\u00a0", " ")) for cell in row] for row in rows] == theirs
+        heads = visit.page.locator(".facts thead th").all_inner_texts()
+        assert heads == list(EIGENVALUE_COLUMNS)
         first = analysis.margins[0].parameter
         bar = visit.page.locator(".bar").get_attribute("aria-label")
         assert said(machine, first) in bar, "the bar begins with the nearest edge"

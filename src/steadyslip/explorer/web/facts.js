@@ -46,7 +46,7 @@ export class Facts {
     this.locus = new Locus();
     this.near = make("ol", { className: "edges" });
     this.far = make("details", {}, make("summary", {}), make("ol", { className: "edges" }));
-    const head = make("thead", {}, make("tr", {}, ...["growth rate", "oscillation", "size"].map((text) => make("th", { textContent: text, scope: "col" }))));
+    const head = make("thead", {}, make("tr", {}, ...page.rig.data.columns.map((text) => make("th", { textContent: text, scope: "col" }))));
     this.box = make("section", { className: "facts", "aria-label": "details", tabIndex: -1 },
       make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: `one parameter changed, the others as they are; press to go ${100 * BESIDE} % to its stable side, or to the one that slides steadily` }), this.near, this.far),
       this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
@@ -56,7 +56,7 @@ export class Facts {
 
   /** Update the numbers. @param {any} answer */
   show(answer) {
-    const { rig } = this.page, { area, phrases } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
+    const { rig } = this.page, { area, phrases, aperiodic } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
     this.sliding.hidden = this.swings.hidden = absent;
     tell(this.shape, answer.mode ? `In the leading mode ${words(answer.mode, rig.data.facts.shape)}.` : "");
     const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/_/g, " "), answer.observed[name], unit, meaning])];
@@ -65,7 +65,7 @@ export class Facts {
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
-      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", fill(rig.data.pace[s.re > 0 ? "grows" : s.re < 0 ? "decays" : "stays"], { time })];
+      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? shown((2 * Math.PI) / s.im, "s") : aperiodic, fill(rig.data.pace[s.re > 0 ? "grows" : s.re < 0 ? "decays" : "stays"], { time })];
       return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // no line break between number and unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));

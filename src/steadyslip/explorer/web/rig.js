@@ -10,7 +10,7 @@ import { exactly, tellIn } from "./quantities.js";
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: (number | string)[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
  *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string,
- *   pace: any, beyond: any, ends: any, means: string, usual: any}} Data
+ *   pace: any, columns: string[], aperiodic: string, beyond: any, ends: any, means: string, usual: any}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from explored import page_modules
+from explored_edges import same_text
 from guide_and_seal import GUIDE_AND_SEAL
-from steadyslip.core.format import format_quantity
+from javascript import Script
+from steadyslip.core.dimensions import unit
+from steadyslip.core.format import digits_apart, format_quantity, own_units
+from steadyslip.core.written import display_units
 
 AXIS = """
 [friction]
@@ -111,3 +116,53 @@ def test_an_edge_and_its_value_are_told_at_the_load_of_their_contact():
         assert re.search(rf"seal\.friction\.viscous +0\.24 N s/mm at 60 N{then}[\d.]+ N s/mm at 60 N", text)
     assert rig.load_of("contacts.seal.friction.viscous") == 60.0
     assert rig.load_of("bodies.carriage.mass") is None
+
+
+@pytest.mark.parametrize(
+    ("units", "value", "si", "text"),
+    [
+        (["mm/s"], 8.333e-6, "m/s", "0.008333 mm/s"),
+        (["mm/s"], 8e-7, "m/s", "800 nm/s"),
+        (["um/s"], 4.73e-3, "m/s", "4730 um/s"),
+        (["um/s"], 0.1136, "m/s", "113.6 mm/s"),
+        (["um/s", "mm/s"], 0.1136, "m/s", "113.6 mm/s"),
+        (["N m/rad"], 0.05, "N m/rad", "0.05 N m/rad"),
+        (["N m/rad"], 12e3, "N m/rad", "12 kN m/rad"),
+        (["arcsec/s"], 7.2921e-5, "rad/s", "15.04 arcsec/s"),
+        (["arcsec/s"], 0.02625, "rad/s", "1.504 deg/s"),
+        (["arcsec/s"], 4.564e-6, "rad", "0.9414 arcsec"),
+        (["arcsec"], 7.2921e-5, "rad/s", "15.04 arcsec/s"),
+        (["deg"], 4.564e-6, "rad", "0.9414 arcsec"),
+        ([], 4.564e-6, "rad", "0.9414 arcsec"),
+        ([], -0.7853981633974483, "rad", "-45 deg"),
+        (["rpm"], 10.0, "rad/s", "95.49 rpm"),
+        (["kN"], 393.55, "N", "393.6 N"),
+        (["ms"], 4.924, "s", "4.924 s"),
+    ],
+)
+def test_speeds_and_angles_keep_the_scale_of_the_file(units, value, si, text):
+    """Within four digits; forces, lengths and times, of which a file has some of other sizes, do not."""
+    with display_units(units):
+        assert format_quantity(value, si) == text
+
+
+def test_a_page_tells_speeds_and_angles_alike():
+    chance, script = np.random.default_rng(33), Script(f"{page_modules()}")
+    for _ in range(200):
+        units = [str(one) for one in chance.choice(["mm/s", "um/s", "arcsec/s", "arcsec", "deg", "rpm", "N m/rad"], 2)]
+        si, value = str(chance.choice(["m/s", "rad", "rad/s", "N m/rad"])), float(10 ** chance.uniform(-9, 6))
+        own = own_units(frozenset(units)).get(unit(si)[1], ())
+        written = {si: [(name, unit(name)[0]) for name in own]} if own else {}
+        with display_units(units):
+            told = format_quantity(value, si)
+        none = dict.fromkeys(("m/s", "rad", "rad/s", "N m/rad"))
+        shown = script("(tellIn(units), shown(value, si))", units=none | written, value=value, si=si)
+        assert same_text(shown, told) or "e" in told, (units, value, si)
+
+
+def test_close_values_are_told_apart():
+    for gap in 10.0 ** np.arange(-11.0, 0.0):
+        value, other = 1.0, 1.0 + 2 * gap
+        many = digits_apart(value, other)
+        assert format_quantity(value, "m", many) != format_quantity(other, "m", many)
+    assert digits_apart(1.0, 1.0) == digits_apart(0.0, 1.0) == 4

@@ -48,7 +48,7 @@ function edgesAt(values, coarse) {
   rig.values = values;
   const found = data.parameters.map((_, i) => changes(rig, i, undefined, coarse));
   const page = { rig, found, answer: rig.assess(), rounded: Page.prototype.rounded, with: Page.prototype.with };
-  const texts = ({ i, at }) => [values[i], at].map((x) => told(data.parameters[i], x));
+  const texts = ({ i, at }) => [values[i], at].map((x) => told(data.parameters[i], x, apart(values[i], at)));
   const edges = edgesOf(page).map((edge) => ({ ...edge, words: edgeWords(edge, page), told: texts(edge) }));
   const { answer } = page, banner = { data, page }, { told: full, speed } = Banner.prototype;
   const first = answer.status === UNKNOWN ? "" : headline(answer, speed.call(banner, answer), data);

@@ -8,6 +8,7 @@ import sympy as sp
 import steadyslip as ss
 from read_pages import Balanced, words
 from rigs_of_theory import rate_state, rig
+from steadyslip.core.expressions import latex
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.elements import html_text, math, table
 
@@ -88,3 +89,14 @@ def test_formulas_look_alike_in_every_font():
     assert "<mo>/</mo>" in text
     assert text.count("<mfrac>") == 0  # within exp fractions stand on the line
     assert '<mspace width=".2em"/><mrow><mi>arcsinh</mi>' in text
+
+
+def test_numbers_of_many_zeros_are_powers_of_ten():
+    """As in the Stribeck curve with an exponent, whose slope at rest is kept finite."""
+    tiny, x = sp.Rational(1, 10**24), sp.Symbol("x")
+    for expression in (x**2 + tiny, (x + tiny) ** sp.Symbol("n"), x * tiny, sp.exp(x * 10**12)):
+        assert "00000" not in math(expression)
+        assert "00000" not in latex(expression)
+    assert "<msup><mn>10</mn><mn>-24</mn></msup>" in math(x**2 + tiny)
+    assert latex(x**2 + tiny) == "x^{2} + 10^{-24}"
+    assert latex(x / 100) == sp.latex(x / 100)

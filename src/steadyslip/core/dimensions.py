@@ -56,6 +56,8 @@ _TABLE: dict[str, tuple[float, Dimension]] = {
     "degree": (deg, Dimension(0, 0, 0, 1)),
     "degrees": (deg, Dimension(0, 0, 0, 1)),
     "°": (deg, Dimension(0, 0, 0, 1)),
+    "arcmin": (deg / 60, Dimension(0, 0, 0, 1)),
+    "arcsec": (deg / 3600, Dimension(0, 0, 0, 1)),
     "rev": (2 * math.pi, Dimension(0, 0, 0, 1)),
     "turn": (2 * math.pi, Dimension(0, 0, 0, 1)),
     "rpm": (2 * math.pi / minute, Dimension(0, 0, -1, 1)),

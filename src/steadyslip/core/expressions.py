@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 from sympy.functions.elementary.piecewise import ExprCondPair
 from sympy.logic.boolalg import BooleanAtom
+from sympy.printing.latex import LatexPrinter
 
 from steadyslip.core.errors import NotAvailable
 
@@ -44,6 +45,40 @@ class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like 
     def _eval_evalf(self, prec: int) -> sp.Expr:
         x, y = self.args
         return sp.asinh(x * sp.exp(y))._eval_evalf(prec)
+
+
+LONG_POWER = 4
+"""Power of ten, of either sign, from which formulas show a number as such, as 10⁻²⁴."""
+
+
+def power_of_ten(number: sp.Rational) -> int:
+    """Power of ten that a number is; 0 for one and for all others.
+
+    >>> power_of_ten(sp.Rational(1, 10**24)), power_of_ten(sp.Integer(1000)), power_of_ten(sp.Rational(3, 10))
+    (-24, 3, 0)
+    """
+    digits = max(len(str(number.p)), len(str(number.q))) - 1
+    if number == sp.Integer(10) ** digits:
+        return digits
+    return -digits if number == sp.Integer(10) ** -digits else 0
+
+
+class _Latex(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
+    """Printer of LaTeX with powers of ten in place of numbers of many zeros."""
+
+    def _print_Rational(self, number: sp.Rational) -> str:  # noqa: N802 -- SymPy's name
+        power = power_of_ten(number)
+        if abs(power) >= LONG_POWER:
+            return f"10^{{{power}}}"
+        return str(number) if number.q == 1 else str(super()._print_Rational(number))
+
+    _print_Integer = _print_Rational  # noqa: N815 -- SymPy's name
+
+
+def latex(expression: sp.Basic) -> str:
+    """LaTeX of an expression, numbers such as 10⁻²⁴ as powers of ten."""
+    text: str = _Latex().doprint(expression)
+    return text
 
 
 def numpy_asinh_exp(x: Any, y: Any) -> Any:

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
 from steadyslip.core.written import display_load, display_names
-from steadyslip.units import day, deg, hour, year
+from steadyslip.units import day, hour, year
 
 _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "N s/mm"))}
 """Units of the force of bristles and of viscous friction, by the dimension that they have per load."""
 
 
+_SPEED, _ANGLE, _TURNING = (unit(name)[1] for name in ("m/s", "rad", "rad/s"))
+_FINE = ("arcsec", "arcmin")
+"""Parts of a degree: whoever writes one has the others told in it too."""
+
+
 @lru_cache(maxsize=256)
 def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
-    """Units of a context by dimension, where one of them differs from the default by more than a leading prefix."""
+    """Units of a context by dimension, where one of them differs from the default by more than a leading prefix.
+
+    Speeds and all that turns are told with the prefixes of the context as well, and angles in what its speeds of
+    turning have, or these in what its angles have.
+    """
     found: dict[Dimension, set[str]] = {}
     for name in names:
         found.setdefault(unit(name)[1], set()).add(name)
@@ -26,10 +36,18 @@ def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     for kind, si in _PER_LOAD.items():  # what is told at a load is so throughout
         if loads and not any(" at " in name for name in found.get(kind, ())):
             found[kind] = {f"{si} at {load}" for load in loads}
+    for kind, other, add in ((_ANGLE, _TURNING, ""), (_TURNING, _ANGLE, "/s")):
+        fine = {name.removesuffix("/s") for name in found.get(other, ())}.intersection(_FINE)
+        if fine and kind not in found:
+            found[kind] = {f"{name}{add}" for name in fine}
     for several in found.values():
         if named := {name for name in several if " at " in name}:
             several &= named
-    return {kind: tuple(sorted(several)) for kind, several in found.items() if any(map(_is_own, several))}
+    return {
+        kind: tuple(sorted(several))
+        for kind, several in found.items()
+        if kind == _SPEED or kind.angle or any(map(_is_own, several))
+    }
 
 
 def _is_own(name: str) -> bool:
@@ -59,6 +77,18 @@ _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (
 HIDDEN = 1e-3  # share of its error below which a value is told as 0: no digit of it is known
 MOST_DIGITS = 12  # of the ends of a narrow range; beyond, digits are rounding errors
 _SHORTEST, _LONGEST = 1e-3, 1e5  # numbers between are written without exponent; others in the SI unit without prefix
+_LONG = 1e4  # from which a number takes another prefix than that of the file
+
+
+def _turned(value: float, name: str) -> str:
+    """Unit of an angle or speed of turning: arcsec where a degree is too large, deg where an arcsecond is too small."""
+    part, _, rest = name.partition("/")
+    size = abs(value) / unit(name)[0]
+    if part == "deg" and 0 < size < _SHORTEST:
+        part = "arcsec"
+    elif part == "arcsec" and 3600 <= size < math.inf:
+        part = "deg"
+    return f"{part}/{rest}" if rest else part
 
 
 def _few(value: float, digits: int) -> str:
@@ -84,10 +114,12 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     names = _at_one_load(own_units(display_names()).get(unit(si_unit)[1], ()), display_load())
     own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
-    if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < _LONGEST):
+    longest = _LONGEST if own is not None and _is_own(own) else _LONG
+    if si_unit == "rad" and own is None:
+        own = "deg"
+    if own is not None and (value == 0 or scaled is None or _SHORTEST <= abs(value / unit(own)[0]) < longest):
+        own = _turned(value, own)
         return f"{_few(value / unit(own)[0], digits)} {own}"
-    if si_unit == "rad":
-        return f"{_few(value / deg, digits)} deg"
     if si_unit == "m/rad":
         value, si_unit = value * 2 * math.pi, "m/rev"
     if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:  # times below 10 min stay in s
@@ -105,6 +137,16 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     if not _SHORTEST <= size / factor < _LONGEST:
         return f"{_few(value, digits)} {si_unit}"
     return f"{_few(value / factor, digits)} {prefix}{si_unit}"
+
+
+def digits_apart(value: float, other: float) -> int:
+    """Digits with which two values read differently: four, or for close ones as many as it takes, up to twelve.
+
+    >>> digits_apart(1.0, 1.5), digits_apart(1.0, 1.00001)
+    (4, 6)
+    """
+    gap = abs(other - value) / max(abs(value), abs(other), sys.float_info.min)
+    return min(12, max(4, 1 - math.floor(math.log10(gap)))) if 1e-12 < gap < math.inf else 4
 
 
 def format_with_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:

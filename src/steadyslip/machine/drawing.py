@@ -336,12 +336,8 @@ class Drawing:
             self.drive_drawn = True
             begin = (x - 0.55, y + 0.58) if abs(along) > abs(up) else (x - 0.4, y + 0.2)
             self.pencil.arrow(begin, (begin[0] + 0.9, begin[1]))
-            speed = format_quantity(
-                float(self.machine.drive.velocity), self.machine.parameters()["drive.velocity"].role.unit
-            )
-            self.pencil.words(
-                begin[0] + 0.45, begin[1] + 0.12, speed if self.values else "drive", color=DRIVEN, va="bottom"
-            )
+            words = self._speed() if self.values else "drive"
+            self.pencil.words(begin[0] + 0.45, begin[1] + 0.12, words, color=DRIVEN, va="bottom")
 
     def _named(self, name: str, link: Link, at: tuple[float, float], **style: Any) -> None:
         if not self.values:
@@ -362,13 +358,18 @@ class Drawing:
 
     # -- the drive
 
+    def _speed(self) -> str:
+        """Text of the drive's speed, or of that of the body whose speed was given."""
+        told = format_quantity(*self.machine.told("drive.velocity", float(self.machine.drive.velocity)))
+        return told if self.machine.fed is None else f"{told} of {self.machine.fed}"
+
     def _drive(self) -> None:
         drive = self.machine.drive
         body = drive.driven()
         if body is None:
             return
         place = self.places[body]
-        speed = format_quantity(float(drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
+        speed = self._speed()
         late = f"\n{format_quantity(float(drive.lateness()), 's')} late" if drive.lateness() else ""
         top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.levels
         self.pencil.frame(place.x - 1.0, top, 2.0, 0.75)

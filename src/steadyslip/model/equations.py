@@ -9,7 +9,7 @@ from functools import cached_property
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import ArrayFunction, replaced
+from steadyslip.core.expressions import ArrayFunction, latex, replaced
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.roles import Parameter
@@ -420,7 +420,7 @@ class Model(Keeper, Displayed):
         return "\n".join(lines)
 
     def _repr_latex_(self) -> str:
-        rows = [f"{sp.latex(e.lhs)} &= {sp.latex(e.rhs)}" for e in self.equations()]
+        rows = [f"{latex(e.lhs)} &= {latex(e.rhs)}" for e in self.equations()]
         return "$$\\begin{aligned}" + r" \\ ".join(rows) + "\\end{aligned}$$"
 
 

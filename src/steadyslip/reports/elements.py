@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.mathml import MathMLPresentationPrinter
 
-from steadyslip.core.expressions import asinh_exp
+from steadyslip.core.expressions import LONG_POWER, asinh_exp, power_of_ten
 
 _REPLACEMENTS = (
     (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
@@ -243,6 +243,15 @@ class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no
         whole.appendChild(self._closed(base, not base.is_Symbol))
         whole.appendChild(self._row([self._print(sp.Integer(1)), self._sign("/"), self._print(sp.Integer(2))]))
         return whole
+
+    def _print_Rational(self, number: sp.Rational) -> Any:  # noqa: N802 -- SymPy's name
+        power = power_of_ten(number)
+        if abs(power) < LONG_POWER:
+            return super()._print_Rational(number)
+        raised = self.dom.createElement("msup")
+        raised.appendChild(self._print(sp.Integer(10)))
+        raised.appendChild(self._print(sp.Integer(power)))
+        return raised
 
     def _closed(self, expression: Any, brackets: bool) -> Any:
         inner = self._print(expression)

@@ -296,4 +296,4 @@ def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> tu
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:
-    return told(analysis.rig, margin.parameter, value)
+    return told(analysis.rig, margin.parameter, value, margin.value)

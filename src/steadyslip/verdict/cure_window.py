@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.format import digits_apart, format_quantity, format_range
 from steadyslip.core.pages import Displayed
 from steadyslip.core.written import of_load
 from steadyslip.linear.nearness import doublings, ends_about
@@ -94,4 +94,4 @@ class Window(Displayed):
             return "anything above 0"  # the edge is zero itself, as of what damps an undamped machine
         factor, unit = self.told or (1.0, self.unit)
         with of_load(self.load):
-            return format_quantity(value * factor, unit, area=self.area)
+            return format_quantity(value * factor, unit, digits_apart(value, self.value), area=self.area)

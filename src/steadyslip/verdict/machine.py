@@ -91,7 +91,7 @@ def _nearest(found: Findings, margin: Margin) -> str:
     if edge is None:
         return ""
     side = "above" if edge.value > margin.value else "below"
-    value = told(found.rig, margin.parameter, edge.value)
+    value = told(found.rig, margin.parameter, edge.value, margin.value)
     what = PHRASES["stable"] if edge.stable == side else EDGE_WORDS["quiet"] if edge.quiet == side else beyond(edge)
     return PHRASES["nearest"].format(name=said(found.rig, margin.parameter), side=side, value=value, beyond=what)
 

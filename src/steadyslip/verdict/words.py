@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
-from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.format import digits_apart, format_quantity, format_range
 from steadyslip.core.written import of_load
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.machine.letters import said
@@ -110,10 +110,11 @@ def headline(analysis: Findings, capitals: bool = True) -> str:
     return (first.upper() if capitals else first) + rest.format(speed=f"at {speed}")
 
 
-def told(rig: Rig, name: str, value: float) -> str:
-    """Value of a parameter in words."""
+def told(rig: Rig, name: str, value: float, beside: float | None = None) -> str:
+    """Value of a parameter in words, with as many digits as tell it from another `beside` it."""
+    digits = 4 if beside is None else digits_apart(value, beside)
     with of_load(rig.load_of(name)):
-        return format_quantity(*rig.told(name, value), area=rig.printed_area(name))
+        return format_quantity(*rig.told(name, value), digits, area=rig.printed_area(name))
 
 
 def told_range(rig: Rig, name: str, low: float, high: float) -> str:
@@ -287,8 +288,8 @@ def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str
         words = beyond(edge)
     return (
         margin.parameter,
-        told(analysis.rig, margin.parameter, margin.value),
-        told(analysis.rig, margin.parameter, edge.value),
+        told(analysis.rig, margin.parameter, margin.value, edge.value),
+        told(analysis.rig, margin.parameter, edge.value, margin.value),
         change,
         words,
     )

@@ -3,7 +3,7 @@ import { inMenu } from "./controls.js";
 import { make, put, svg, tell, unbroken } from "./dom.js";
 import { ABSENT, STABLE, UNDAMPED, isQuiet } from "./linear.js";
 import { ticks } from "./plot.js";
-import { digits, shown, told, unitFor } from "./quantities.js";
+import { apart, digits, shown, told, unitFor } from "./quantities.js";
 import { asStiffness, besides, beyondWords, headline, kindOf, kindWords, reason } from "./words.js";
 
 const DECADE = Math.log(10); // natural logarithm of ten: margin of the bar beyond its outermost marks
@@ -73,7 +73,7 @@ export class Banner {
     const { rig } = this.page, own = Array.from(rig.set(rig.values).R);
     if (!first) return reason({ ...answer, own }, this.data);
     const one = this.data.parameters[first.i], beyond = first.beyond === STABLE ? this.data.phrases.stable : beyondWords(first, this.page);
-    const edge = { name: one.title, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at), beyond };
+    const edge = { name: one.title, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at, apart(rig.values[first.i], first.at)), beyond };
     return reason({ ...answer, own }, this.data, edge);
   }
 

@@ -5,7 +5,7 @@ import { BESIDE } from "./edges.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Locus } from "./locus.js";
 import { fill, words } from "./modes.js";
-import { digits, shown, told } from "./quantities.js";
+import { apart, digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
 import { NEXT_TO_IT, edgeWords, named, quantity } from "./words.js";
 
@@ -77,7 +77,7 @@ export class Facts {
   showEdges() {
     const { page } = this;
     const rows = (edges) => edges.map((edge) => {
-      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", "data-name": one.name }, ...lettered(one), ` → ${told(one, edge.at).replace(/ /g, "\u00a0")}`);
+      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", "data-name": one.name }, ...lettered(one), ` → ${told(one, edge.at, apart(page.rig.values[edge.i], edge.at)).replace(/ /g, "\u00a0")}`);
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.put(page.with(edge.i, edge.landing));
       });
@@ -87,7 +87,7 @@ export class Facts {
     const found = page.edges(), far = found.filter((edge) => edge.far);
     const near = found.filter((edge) => !edge.far), [next] = near, one = next && page.rig.data.parameters[next.i];
     this.near.replaceChildren(...rows(near));
-    tell(page.next, one ? `nearest edge: ${one.title} → ${told(one, next.at)}, ${change(one, page.rig.values[next.i], next.at)}` : "");
+    tell(page.next, one ? `nearest edge: ${one.title} → ${told(one, next.at, apart(page.rig.values[next.i], next.at))}, ${change(one, page.rig.values[next.i], next.at)}` : "");
     this.far.hidden = !far.length;
     if (far.length === found.length) this.far.open = true;
     tell(this.far.firstChild, `${far.length} ${fill(page.rig.data.beyond.far, page.rig.data)}`);

@@ -4,7 +4,7 @@
 const TABLE = {
   g: [1e-3, [1, 0, 0, 0]], kg: [1, [1, 0, 0, 0]], t: [1e3, [1, 0, 0, 0]], min: [60, [0, 0, 1, 0]],
   h: [3600, [0, 0, 1, 0]], day: [86400, [0, 0, 1, 0]], days: [86400, [0, 0, 1, 0]], yr: [31557600, [0, 0, 1, 0]],
-  bar: [1e5, [1, -1, -2, 0]], rad: [1, [0, 0, 0, 1]], deg: [Math.PI / 180, [0, 0, 0, 1]], rev: [2 * Math.PI, [0, 0, 0, 1]], turn: [2 * Math.PI, [0, 0, 0, 1]], rpm: [Math.PI / 30, [0, 0, -1, 1]],
+  bar: [1e5, [1, -1, -2, 0]], rad: [1, [0, 0, 0, 1]], deg: [Math.PI / 180, [0, 0, 0, 1]], arcmin: [Math.PI / 10800, [0, 0, 0, 1]], arcsec: [Math.PI / 648000, [0, 0, 0, 1]], rev: [2 * Math.PI, [0, 0, 0, 1]], turn: [2 * Math.PI, [0, 0, 0, 1]], rpm: [Math.PI / 30, [0, 0, -1, 1]],
   hour: [3600, [0, 0, 1, 0]], year: [31557600, [0, 0, 1, 0]], degree: [Math.PI / 180, [0, 0, 0, 1]], degrees: [Math.PI / 180, [0, 0, 0, 1]],
   "°": [Math.PI / 180, [0, 0, 0, 1]], "%": [0.01, [0, 0, 0, 0]], 1: [1, [0, 0, 0, 0]],
 };
@@ -93,12 +93,23 @@ const written = {};
 /** Tell quantities in these units. @param {Record<string, [string, number][]>} [units] */
 export const tellIn = (units) => Object.assign(written, units);
 
+/** True for a number that is not too long in its unit, as in Python. @param {number} number @param {string} name */
+const fits = (number, name) => Math.abs(number) >= 1e-3 && Math.abs(number) < (PREFIXED.test(name) ? 1e4 : 1e5);
+
+/** Size and name of a unit, arcsec in place of a thousandth of a degree and deg of 3600 arcsec. @returns {[number, string]} */
+function turned(value, size, name) {
+  const number = Math.abs(value / size), [part] = name.split("/");
+  if (part === "deg" && number > 0 && number < 1e-3) return [size / 3600, name.replace(part, "arcsec")];
+  if (part === "arcsec" && number >= 3600 && number < Infinity) return [size * 3600, name.replace(part, "deg")];
+  return [size, name];
+}
+
 /** Factor and name of the most readable unit for a value. @param {number} value @param {string} si @returns {[number, string]} */
 export function display(value, si) {
   if (si === "1") return [1, ""];
   const from10 = ([, size]) => Math.abs(Math.log10(Math.abs(value) / size) - 1), mine = written[si]?.reduce((a, b) => (from10(b) < from10(a) ? b : a));
-  if (mine && (!value || !SCALED.test(si) || (Math.abs(value / mine[1]) >= 1e-3 && Math.abs(value / mine[1]) < 1e5))) return [mine[1], mine[0]];
-  if (si === "rad") return [Math.PI / 180, "deg"];
+  if (mine && (!value || !SCALED.test(si) || fits(value / mine[1], mine[0]))) return turned(value, mine[1], mine[0]);
+  if (si === "rad") return turned(value, Math.PI / 180, "deg");
   if (si === "m/rad") return [display(value * 2 * Math.PI, "m/rev")[0] / (2 * Math.PI), display(value * 2 * Math.PI, "m/rev")[1]];
   const first = SCALED.exec(si), size = Math.abs(value);
   if (si === "s" && Number.isFinite(size)) for (const [factor, name] of LONG) if (size >= Math.max(600, 2 * factor)) return [factor, name];
@@ -115,7 +126,10 @@ export function display(value, si) {
  */
 export function unitFor({ unit, factor, own: [name, own] }, value) {
   const size = Math.abs((value * factor) / own);
-  if (name && (!(size < 1e-3 || size >= 1e5) || !value || !PREFIXED.test(name) || !SCALED.test(unit))) return [own / factor, printed(name)];
+  if (name && (!value || !SCALED.test(unit) || !PREFIXED.test(name) || fits(size, name))) {
+    const [least, told] = turned(value * factor, own, name);
+    return [least / factor, printed(told)];
+  }
   const [best, found] = display(value * factor, unit);
   return [best / factor, printed(found)];
 }
@@ -124,6 +138,12 @@ export function unitFor({ unit, factor, own: [name, own] }, value) {
 export function told(one, value, many = 4) {
   const [size, name] = unitFor(one, value);
   return `${digits(value / size, many)} ${name}`.trim();
+}
+
+/** Digits with which two values read differently, as in Python. @param {number} value @param {number} other */
+export function apart(value, other) {
+  const gap = Math.abs(other - value) / Math.max(Math.abs(value), Math.abs(other));
+  return gap > 1e-12 ? Math.min(12, Math.max(4, 1 - Math.floor(Math.log10(gap)))) : 4;
 }
 
 /** Text of an SI value with a readable unit. @param {number} value @param {string} si */

@@ -222,7 +222,7 @@ def test_the_longest_report_and_that_of_a_structure_are_documents(name):
     assert len(found.encode()) <= 500_000
     assert "Change preload" in text or "Change reed.tip angle φ" in text
     assert ("structures move as their matrices say" in text) == ("reed" in name)
-    assert ("oscillates at 726.6 Hz, doubles in 55.59 ms and after 184.7 ms" in text) == ("reed" in name)
+    assert ("tip oscillates more and more" in text) == ("reed" in name)
     assert path.read_text() in html.unescape(found)  # with its comments, not as the program writes it
 
 

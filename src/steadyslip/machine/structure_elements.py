@@ -19,8 +19,9 @@ from steadyslip.machine.mechanism import DegreeOfFreedom, Element, Mechanism, Sh
 
 _DEPENDENT = 1e-10  # of a direction's length left beside the directions before it, below which it is one of them
 _ROUNDING = 8 * np.finfo(float).eps  # of a matrix's norm, times its size: what products of matrices leave of zero
-MOST_TERMS = 2500
-"""Most entries of damping and stiffness: code is compiled for each, and that of 2500 takes a minute."""
+MOST_COORDINATES, MOST_TERMS = 100, 1500
+"""Most degrees of freedom of a structure that moves, and most entries of its damping and stiffness together: code is
+compiled for each, some half a minute for 100 in a chain or for 1500 of full matrices."""
 
 
 def with_elements(mechanism: Mechanism) -> Mechanism:
@@ -29,17 +30,25 @@ def with_elements(mechanism: Mechanism) -> Mechanism:
     Raises
     ------
     NotAvailable
-        If a structure has so many terms that code for its motion would take minutes to compile.
+        If a structure is so large that code for its motion would take minutes to compile.
     """
     for part in mechanism.structures:
         mechanism = _with_elements(mechanism, part)
     return replace(mechanism, structures=())
 
 
+def terms_of(mechanism: Mechanism) -> int:
+    """Number of entries of the matrices of structures for which code is compiled; raises as `with_elements`."""
+    return sum(len(one.senses) for one in with_elements(mechanism).elements) if mechanism.structures else 0
+
+
 def _with_elements(own: Mechanism, part: StructurePart) -> Mechanism:
+    if len(part.coordinates) > MOST_COORDINATES:
+        raise _too_large(part, f"allowed: {MOST_COORDINATES}")
     names = {name: i for i, name in enumerate(part.coordinates)}
     basis = _Basis(part, [_numbers(row, names) for row in _rows(own)])
-    basis.check()
+    if (terms := int(np.count_nonzero(basis.stiffness) + np.count_nonzero(basis.damping))) > MOST_TERMS:
+        raise _too_large(part, f"whose matrices have {terms} entries, allowed: {MOST_TERMS}")
 
     def written(row: Shares) -> dict[str, Any]:
         """A row in the new coordinates."""
@@ -88,6 +97,13 @@ def _numbers(row: Shares, names: dict[str, int]) -> Array:
     return found
 
 
+def _too_large(part: StructurePart, why: str) -> NotAvailable:
+    return NotAvailable(
+        f"bodies.{part.name}: motion is not offered with {len(part.coordinates)} degrees of freedom, {why}; reduce "
+        "them: ss.machine.reduced keeps those where links and contacts act, and some modes"
+    )
+
+
 def _plain(value: Any) -> Any:
     """A number or expression, with 0 for 0.0."""
     return 0 if value == 0 else value
@@ -118,16 +134,6 @@ class _Basis:
         self.inverse = axes.T @ root.T / size
         self.inertia = np.full(len(axes), size**2)
         self.stiffness, self.damping = (size**2 * _clean(axes.T @ one @ axes) for one in (self.stiffness, self.damping))
-
-    def check(self) -> None:
-        """Raise NotAvailable if code for the motion would take minutes to compile."""
-        terms = int(np.count_nonzero(self.stiffness) + np.count_nonzero(self.damping))
-        if terms > MOST_TERMS:
-            raise NotAvailable(
-                f"bodies.{self.part.name}: motion with its {len(self.inertia)} degrees of freedom has {terms} terms, "
-                f"allowed: {MOST_TERMS}; reduce it to fewer, kept where links and contacts act: ss.machine.reduced "
-                "(`kept` degrees of freedom and `modes`), or damping of the form alpha M + beta K"
-            )
 
     def elements(self) -> list[Element]:
         """Springs and dashpots, each of one row of the matrices."""

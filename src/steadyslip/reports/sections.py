@@ -92,10 +92,7 @@ def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
         branch, unstable = getattr(analysis, "branch", 0), analysis.stable is False
         run = None if analysis.stable is None else motion_after(rig, analysis.eigenvalues, branch, repeated=unstable)
     except SteadyslipError as refused:
-        if has_structure(rig):
-            yield paragraph(_of_structure(analysis))
-        else:
-            yield paragraph(f"It was not simulated: {why(refused)}.")
+        yield paragraph(f"It was not simulated: {why(refused)}.{_by_eigenvalues(analysis)}")
         return
     if run is None:
         yield paragraph("There is no steady sliding to disturb, or no rate at which a disturbance changes.")
@@ -121,17 +118,16 @@ def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
     yield beside(figure(*one) for one in drawn)
 
 
-def _of_structure(analysis: Analysis) -> str:
-    """Why the motion of a structure is not simulated, and what its eigenvalues tell of it."""
-    text = "The motion of a structure is not simulated, as its equations are matrices instead of formulas."
+def _by_eigenvalues(analysis: Analysis) -> str:
+    """Sentence on what the eigenvalues of a structure tell of its motion; empty for other rigs."""
     leading = next(iter(analysis.eigenvalues), None)
-    if leading is None or not leading.real:
-        return text
+    if not has_structure(analysis.rig) or leading is None or not leading.real:
+        return ""
     grows, share = leading.real > 0, STEP - 1
     first = f"a disturbance of the slip rate by {100 * share:.0f} %"
     swings = f"oscillates at {format_quantity(leading.imag / (2 * math.pi), 'Hz')}, " if leading.imag else ""
     changes = PACE["grows" if grows else "decays"].format(time=format_quantity(math.log(2) / abs(leading.real), "s"))
-    text += f" By its eigenvalues {first} {swings}{changes}"
+    text = f" By its eigenvalues {first} {swings}{changes}"
     if not grows:
         return f"{text} and dies out."
     after = format_quantity(-math.log(share) / leading.real, "s")

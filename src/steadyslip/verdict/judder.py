@@ -11,6 +11,7 @@ from steadyslip.core.errors import SteadyslipError
 from steadyslip.core.format import format_quantity
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.machine.structure_elements import terms_of
 from steadyslip.motion import History, simulate
 from steadyslip.motion.events import AnySlip
 from steadyslip.motion.sentence import (
@@ -35,6 +36,7 @@ PERIODS = 12  # length of the first run in periods of the leading disturbance, s
 BEGIN, END = 0.05, 0.1  # shares of the first run between which the drive is faster
 LONGER = 4.0  # length of a run over that of the run before
 MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
+MOST_TERMS = 300  # entries of structures' matrices up to which code is compiled within some seconds
 FEWEST = 8  # events in the second half of a run from which it is told that they have no trend
 TURNS = 0.25  # share of these, by trial, at which slips of irregular events turn from growing to shrinking or back
 ENDINGS = {LOST: ", until contact is lost after {time}", BLOWN_UP: ", until it runs away after {time}"}
@@ -133,6 +135,8 @@ def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branc
     That is its slip events, if they repeat or vary without a trend, an oscillation that goes on, or how it ends.
     """
     try:
+        if terms_of(rig.mechanism()) > MOST_TERMS:
+            return ""
         run = motion_after(rig, eigenvalues, branch, repeated=True)
     except SteadyslipError:
         return ""

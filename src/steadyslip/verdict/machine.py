@@ -11,7 +11,7 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.structures import StructureBody
-from steadyslip.model.numeric import by_matrices, has_response, has_structure
+from steadyslip.model.numeric import by_matrices, has_response
 from steadyslip.model.point import operating_point
 from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.verdict.causes import why_delay_is_ill_posed
@@ -52,7 +52,7 @@ def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
 def meaning(analysis: Findings) -> list[str]:
     """Lines on the limits of a decided verdict "stable", and on what to ask next of an unstable machine."""
     if not analysis.stable:
-        return [] if analysis.growth_rate == math.inf or has_structure(analysis.rig) else [instead(analysis)]
+        return [] if analysis.growth_rate == math.inf or has_response(analysis.rig) else [instead(analysis)]
     return [MEANS]
 
 

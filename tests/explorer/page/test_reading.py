@@ -46,9 +46,9 @@ CONTRAST = """() => {
 
 def test_letters_in_sentences_have_their_subscripts_below_the_line(browser, tmp_path):
     """The reason had "d_c" or "K_p" as text, where lists and fields had K with a subscript."""
-    ss.explore(ss.read_rig("examples/machines/feed-axis.toml")).save(tmp_path / "axis.html")
-    with Visit(browser, tmp_path / "axis.html") as visit:
-        visit.page.locator(".verdict p sub").first.wait_for()  # d_c, the nearest edge
+    ss.explore(ss.read_rig("examples/machines/brake-pad.toml")).save(tmp_path / "pad.html")
+    with Visit(browser, tmp_path / "pad.html") as visit:
+        visit.page.locator(".verdict p sub").first.wait_for()  # k_n, the nearest edge
         assert not re.search(r"\b[A-Za-z]_\w", visit.reason())
 
 

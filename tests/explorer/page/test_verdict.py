@@ -44,7 +44,7 @@ def explained(visit):
     marks = visit.page.locator(".facts .key")
     for words in (
         "now, grows",
-        "now, dies out",
+        "now, does not grow",
         "at the edge of stability",
         "at other values of what the bar shows, the larger the higher",
     ):

@@ -11,7 +11,7 @@ import { NEXT_TO_IT, edgeWords, named, quantity } from "./words.js";
 
 /** Legend of the root locus: meaning, path and class of each mark. */
 const MARKS = [
-  ["M2 2l10 10m0 -10l-10 10", "own grows", "now, grows"], ["M2 2l10 10m0 -10l-10 10", "own", "now, dies out"],
+  ["M1 12h12l-6 -11z", "own grows", "now, grows"], ["M2 2l10 10m0 -10l-10 10", "own", "now, does not grow"],
   ["M2 7l5 -5l5 5l-5 5z", "crossing", "at the edge of stability"],
 ];
 const DOTS = "M2 7h0", LARGER = "M11 7h0";

@@ -5,7 +5,7 @@ import { roots } from "./polynomials.js";
 
 const POINTS = 90, DECADES = 2, VIEW = 1.8; // POINTS: stiffnesses, over DECADES to each side; VIEW: half the width over the largest |s| at the edge
 const SIZES = [1.8, 2.6, 3.4, 4.2]; // radii of dots, SVG units, by rising stiffness
-const BOX = { left: 62, top: 8, width: 290, height: 220 };
+const BOX = { left: 70, top: 8, width: 290, height: 220 };
 
 /** Stiffnesses of the locus, around the critical or own one; empty if there is neither. */
 function stiffnesses(answer) {
@@ -51,7 +51,7 @@ export class Locus {
     put(this.crossings, "d", drawn(beyond.flat(), "m-5 0l5 -5l5 5l-5 5z"));
     const cross = "m-5 -5l10 10m0 -10l-10 10";
     put(this.decays, "d", drawn(eigenvalues.filter((s) => !(s.re > 0)), cross));
-    put(this.grows, "d", drawn(eigenvalues.filter((s) => s.re > 0), cross));
+    put(this.grows, "d", drawn(eigenvalues.filter((s) => s.re > 0), "m-6 5h12l-6 -11z")); // told from the others without colours, too
     const seen = eigenvalues.filter(shows).length;
     tell(this.note, seen < eigenvalues.length ? `${eigenvalues.length - seen} of ${eigenvalues.length} ${eigenvalues.length - seen > 1 ? "are" : "is"} further out than the picture` : "");
     put(this.canvas, "aria-label", `eigenvalues in the complex plane, ${seen} of ${eigenvalues.length} in view; dots: as what the bar shows rises`);
@@ -62,7 +62,7 @@ export class Locus {
     this.half = half;
     this.canvas.replaceChildren(
       svg("rect", { class: "stable left", x: BOX.left, y: BOX.top, width: BOX.width / 2, height: BOX.height }),
-      axis(BOX, across, [-half, half], { unit: "1/s" }, "growth rate", false), axis(BOX, up, [up.at(0), up.at(1)], { unit: "rad/s" }, "frequency", true),
+      axis(BOX, across, [-half, half], { unit: "1/s" }, "growth rate", false), axis(BOX, up, [up.at(0), up.at(1)], { unit: "rad/s", own: ["rad/s", 1, ""] }, "frequency", true),
       svg("line", { class: "zero", x1: BOX.left + BOX.width / 2, x2: BOX.left + BOX.width / 2, y1: BOX.top, y2: BOX.top + BOX.height }),
       svg("rect", { x: BOX.left, y: BOX.top, width: BOX.width, height: BOX.height, class: "frame" }),
       ...this.dots, this.crossings, this.decays, this.grows);

@@ -33,6 +33,14 @@ def test_below_a_chart_stand_its_file_and_what_it_holds(tmp_path):
     assert "proportional gain" not in text
 
 
+def test_the_name_of_a_file_below_a_figure_is_no_mathematics(tmp_path):
+    path = tmp_path / "5$ a_b $k_x$ {-z.toml"
+    path.write_text((EXAMPLES / "slow-axis.toml").read_text())
+    found = ss.analyze(ss.read_rig(path))
+    text = footer_of(found.plot(), found, tmp_path)
+    assert text.startswith(r"5\$ a_b \$k_x\$ {-z.toml. held: direct effect a 0.01, ")
+
+
 def test_below_a_reopened_map_stands_the_file_of_its_rig(tmp_path):
     rig = ss.read_rig(EXAMPLES / "slow-axis.toml")
     grids = {"friction.b": ss.maps.Grid(0.011, 0.02, 3), "drive.kp": ss.maps.Grid("0.1 N/um", "2 N/um", 3)}

@@ -1,5 +1,6 @@
 """Answers of records as documents."""
 
+import html
 import re
 
 import pytest
@@ -51,4 +52,8 @@ def test_answers_of_records_have_documents(lab_results, name, request):
         assert "friction.a" not in above
     shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
     assert not re.search(r"\d um\b", shown)
+    if name in ("fit", "draws"):
+        assert "friction.a" not in shown
+        details = [line.split("  ")[1] for line in html.unescape(shown).splitlines() if re.match(r"  \S.* ± ", line)]
+        assert details[:3] == ["direct effect a", "evolution effect b", "slip distance d_c"]
     assert len(document.encode()) <= 500_000

@@ -153,8 +153,10 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
     """Save the figure of Axes with rig, values that no axis has, version and date below it, and its fonts inside."""
     figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
     width, height = figure.get_size_inches()
-    words = fill(_footer(result, figure.axes), int(width * 72 / (0.55 * _FOOTER)))  # letters: .55 of their size wide
-    text = with_subscripts(words)
+    file, told = _footer(result, figure.axes)
+    most = int(width * 72 / (0.55 * _FOOTER))  # letters: .55 of their size wide
+    words = fill(f"{file}{told}", most, break_long_words=False, break_on_hyphens=False)
+    text = _plain(file) + with_subscripts(words[len(file) :])  # a_b in a file's name is no letter with a subscript
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
     if engine := figure.get_layout_engine():
@@ -176,12 +178,12 @@ def _part_ticks(figure: Any, bins: int) -> None:
             ax.locator_params(axis="x", nbins=bins)
 
 
-def _footer(result: Any, axes: Sequence[Axes]) -> str:
-    """File and law of a result, its values with their letters: fitted, or held; version of the program, and date."""
+def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
+    """File of a result, and its law and values with their letters (fitted, or held), version of the program, date."""
     fit = getattr(result, "fit", result)  # of draws
     plan = getattr(fit, "plan", None)
     rig = fit.rig() if hasattr(plan, "records") else getattr(result, "rig", None)
-    parts = []
+    parts, file = [], ""
     if isinstance(rig, Rig):
         estimates = {one.name: one for one in getattr(fit, "estimates", ())}
         fitted = {name.partition("@")[0] for name in estimates}
@@ -194,9 +196,10 @@ def _footer(result: Any, axes: Sequence[Axes]) -> str:
         laws = [one.friction for one in rig.laws_by_contact().values()] if fitted else []
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
         file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # that of a map
-        parts = [file, *words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
+        parts = [*words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
     parts.append(f"steadyslip\xa0{version()}, {datetime.now(UTC):%Y-%m-%d}")
-    return ". ".join(one for one in parts if one)
+    told = ". ".join(one for one in parts if one)
+    return (file.replace(" ", "\xa0"), f". {told}") if file else ("", told)
 
 
 def _values_of(rig: Rig, without: Collection[str]) -> Iterator[str]:
@@ -299,5 +302,9 @@ def _subscript(base: str, below: str) -> str:
 
 def with_subscripts(text: str) -> str:
     """Text for Matplotlib with letters such as d_c set as mathematics, dollar signs as they are."""
-    escaped = text.replace("$", r"\$")
-    return re.sub(r"(?<![^\W_])(\w)_(\w+)", lambda found: _subscript(found[1], found[2]), escaped)
+    return re.sub(r"(?<![^\W_])(\w)_(\w+)", lambda found: _subscript(found[1], found[2]), _plain(text))
+
+
+def _plain(text: str) -> str:
+    """Text for Matplotlib in which dollar signs are no mathematics."""
+    return text.replace("$", r"\$")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,16 +11,17 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments import Draws, Fit, LawComparison, MachineFit, Population, Prediction
 from steadyslip.experiments.fitting.words import better, warnings
 from steadyslip.figures.inline import figure_html
-from steadyslip.machine.letters import estimate_words
+from steadyslip.machine.letters import estimate_words, worded
 from steadyslip.machine.rig import Rig
 from steadyslip.reports import rig as rig_report
 from steadyslip.reports.brief import result_html
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import figure, heading, paragraph, result_listing, table
+from steadyslip.reports.elements import figure, heading, listing, paragraph, result_listing, table, typographic
 from steadyslip.reports.results import parts_of
 from steadyslip.verdict import analyze
 
 _FOUND = ("parameter", "value", "95 %")
+_OVER_STRESS = "k/σ"  # name of stiffness over normal stress in the text of a fit
 
 
 def record_names(fit: Fit) -> str:
@@ -44,7 +46,7 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
         steps = figure_html(lambda i=i: figures.steps(result, record=i), "steps of the record", 7.0)  # type: ignore[misc]
         body += [figure(fitted, f"{name}: record and fit."), figure(steps, "Its steps.")]
     corner = figure_html(lambda: figures.corner(result), "uncertainty", max(6.5, 1.3 * len(rows)))
-    body += [figure(corner, "What the records leave open."), heading("Details"), result_listing(result)]
+    body += [figure(corner, "What the records leave open."), heading("Details"), _details(result, rig)]
     for record in result.plan.records:
         body += [heading(f"Record {Path(record.source).name}", 3), result_listing(record)]
     question = f"Which friction do these records show, and how sure is that: {record_names(result)}?"
@@ -85,6 +87,16 @@ def _estimate_rows(fit: Fit | MachineFit, rig: Rig) -> list[tuple[str, str, str]
     ]
 
 
+def _details(fit: Fit | MachineFit, rig: Rig) -> str:
+    """Listing of the text of a fit, with words and letters instead of the names that keys of files have."""
+    found = [*fit.estimates, *(fit.derived if isinstance(fit, Fit) else ())]
+    words = {one.name: estimate_words(rig, one.name) for one in found} | {_OVER_STRESS: _OVER_STRESS}
+    wide = max(map(len, words.values()))
+    names = "|".join(map(re.escape, words))
+    aligned = re.sub(rf"^  ({names}) {{2,}}", lambda row: f"  {words[row[1]]:<{wide}}  ", str(fit), flags=re.M)
+    return listing(typographic(worded(rig, aligned)))
+
+
 def _lead(fit: Fit | MachineFit, rig: Rig) -> str:
     """Sentence with the values that are determined."""
     told = ", ".join(f"{estimate_words(rig, one.name)} {one.shown()}" for one in fit.estimates if one.determined)
@@ -98,7 +110,7 @@ def _machine_fit(result: MachineFit, comparison: None = None, draws: None = None
     for i, record in enumerate(result.plan.records):
         shown = figure_html(lambda i=i: figures.machine_fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
         body.append(figure(shown, f"{Path(record.source).name}: record and machine."))
-    body += [heading("Details"), result_listing(result)]
+    body += [heading("Details"), _details(result, rig)]
     names = ", ".join(Path(record.source).name for record in result.plan.records)
     question = f"Which machine do these records show, and how sure is that: {names}?"
     return Parts(f"Machine fitted to {names}", _lead(result, rig), question, body, rig)
@@ -130,7 +142,7 @@ def _draws(result: Draws) -> Parts:
     rig, names = result.fit.rig(), record_names(result.fit)
     body = [
         heading("What was found"), *_draws_section(result),
-        heading("The fit"), *(paragraph(text, "warning") for text in warnings(result.fit)), result_listing(result.fit),
+        heading("The fit"), *(paragraph(text, "warning") for text in warnings(result.fit)), _details(result.fit, rig),
     ]  # fmt: skip
     question = f"Which values of friction do the records allow: {names}?"
     return Parts(f"{len(result)} draws, {result.kind}, from {names}", "", question, body, rig)

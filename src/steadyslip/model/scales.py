@@ -36,6 +36,19 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
         return scales, (unknown,)
 
 
+def memory_scales(point: OperatingPoint) -> dict[str, float]:
+    """Change of each memory variable of a slider that goes with one e-fold of velocity, by name; 1 without a weight.
+
+    Unlike its natural scale, that of a logarithm is no smaller where its steady value happens to be near 0.
+    """
+    found = weights(point, 0)
+    direct = direct_effect_scale(found, np.where)
+    with np.errstate(all="ignore"):
+        sizes = [float(np.max(direct / np.abs(weight))) for weight in found.by_memory]
+    memory = point.model.contacts[0].memory
+    return {one.name: x if 0 < x < np.inf else 1.0 for one, x in zip(memory, sizes, strict=True)}
+
+
 @question
 def _single_function(model: Model) -> ArrayFunction:
     """Array function of a slider's slip rate and weights."""

@@ -33,7 +33,7 @@ from steadyslip.kernels.experiment import experiment_program
 from steadyslip.laws.contact import pressed_at
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
-from steadyslip.model.scales import natural_scales
+from steadyslip.model.scales import memory_scales
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
@@ -140,8 +140,8 @@ class Plan:
         """Natural sizes of the initial differences from steady sliding: 0.01 of friction, an e-fold of each state."""
         point = operating_point(self.rig, {})
         program = experiment_program(point.model, 0, "tsit5", settled=False)
-        scales, _ = natural_scales(point, program.reduction)
-        return {name: float(np.max(scales.get(name, FRICTION_SIZE))) for name in program.unsettled}
+        scales = memory_scales(point)
+        return {name: scales.get(name, FRICTION_SIZE) for name in program.unsettled}
 
     def _unknown(self, name: str, record: int | None) -> Unknown:
         if name.startswith("protocol."):

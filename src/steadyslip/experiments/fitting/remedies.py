@@ -6,7 +6,7 @@ where a law or a channel is wrong; a fit with another law, a lag or a trend tell
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
 
@@ -88,18 +88,26 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remed
         changed = {_choice(plan, own): own for own in _changed(base)}
         new = [own for choice, own in changed.items() if choice not in known]
         known |= set(changed)
-        for first in (True, False):
-            some = [own for own in new if (_is_brief(own, values) or _recalls(own, base)) == first]
-            fitted = [(_fitted(own, plan, ssq, size, values), own) for own in some]
-            tried += [(one, own) for one, own in fitted if one is not None]
-            if any(one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE for one, _ in tried):
-                return _ranked([*found, *(one for one, _ in tried)])
+        lacks = [_recalls(own, base) for own in new]
+        longer = [not _is_brief(own, values) and not recalls for own, recalls in zip(new, lacks, strict=True)]
+        for long, recalls, own in sorted(zip(longer, lacks, new, strict=True), key=lambda each: each[:2]):
+            if (long or recalls) and _is_mended(one for one, other in tried if not any(lacks) or _recalls(other, base)):
+                break
+            if (one := _fitted(own, plan, ssq, size, values)) is not None:
+                tried.append((one, own))
         found += [one for one, _ in tried]
+        if _is_mended(one for one, other in tried if not any(lacks) or _recalls(other, base)):
+            break
         best = max(tried, key=lambda pair: pair[0].gain, default=None)
         if best is None or best[0].gain <= max([STRONG_EVIDENCE, *(one.gain for one in found if one is not best[0])]):
             break
         base, values = best[1], best[0].values
     return _ranked(found)
+
+
+def _is_mended(tried: Iterable[Remedy]) -> bool:
+    """True if one leaves no structure, and is better by strong evidence."""
+    return any(one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE for one in tried)
 
 
 def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
@@ -181,8 +189,13 @@ def _is_brief(own: Plan, values: Mapping[str, float]) -> bool:
 
 
 def _recalls(own: Plan, base: Plan) -> bool:
-    """True if a plan has the memory of normal stress that another lacks: no other change may stand in for it."""
-    return base.rig.friction.forgets_stress() and not own.rig.friction.forgets_stress()
+    """True if a plan has the memory of normal stress that another lacks: no other change may stand in for it.
+
+    Not with more states besides, which take long.
+    """
+    before, after = base.rig, own.rig
+    states = len(after.of_kind("evolution effect")) > len(before.of_kind("evolution effect"))
+    return before.friction.forgets_stress() and not after.friction.forgets_stress() and not states
 
 
 def _effort(own: Plan) -> Effort:

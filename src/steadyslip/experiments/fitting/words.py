@@ -99,10 +99,18 @@ def _left_out(fit: FitNumbers) -> list[str]:
 
 
 def warnings(fit: FitNumbers) -> list[str]:
-    """Warnings on a fit, each a sentence, that a reader must know before using the numbers."""
-    found = fitted_warnings(fit) + _open_memory(fit) + _left_out(fit) + _ends_off_model(fit)
+    """Warnings on a fit, each a sentence, that a reader must know before using the numbers.
+
+    A better model comes first; where it leaves noise alone, times at their bounds are a consequence that it mends.
+    """
+    best = better(fit)
+    follows = fit.at_bounds if best is not None and best.p >= STRUCTURE else ()
+    first = _structure(fit) if best is not None else []
+    found = [one for one in fitted_warnings(fit) if one not in follows]
+    found += _open_memory(fit) + _left_out(fit) + _ends_off_model(fit)
     found += _vague_jumps(fit) + _possible_ramps(fit) + loading_warnings(fit)
-    return found + _structure(fit) + _drained_at_once(fit) + version_warnings(fit)
+    last = _structure(fit) if best is None else []
+    return first + found + last + _drained_at_once(fit) + version_warnings(fit)
 
 
 def _ends_off_model(fit: FitNumbers) -> list[str]:

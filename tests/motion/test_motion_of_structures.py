@@ -14,7 +14,10 @@ from steadyslip.machine import (
     StructureData,
     StructurePoint,
     Surface,
+    reduced,
 )
+from steadyslip.model.point import operating_point
+from steadyslip.nonlinear.kicks.places import struck
 from steadyslip.reports.sections import motion
 from structures_at_random import random_structure, reed
 
@@ -226,3 +229,52 @@ def test_verdict_on_the_reed_tells_what_it_does_instead():
     found = ss.analyze(ss.read_rig(EXAMPLE))
     assert found.judders.startswith("tip oscillates more and more")
     assert found.judders in str(found).replace("\n", " ")
+
+
+def test_a_blow_at_a_point_changes_velocities_by_the_inverse_of_the_inertia():
+    """q' changes by M⁻¹ e J; where that changes the velocity at the point by one, J is the mass felt there."""
+    mass = np.array([[0.7, 0.2, 0.1], [0.2, 0.5, -0.1], [0.1, -0.1, 0.4]])
+    body = structure(mass, np.eye(3), 1e4 * (np.eye(3) + 0.1))
+    machine = on_belt("s.p{}", body, {0: ss.laws.ConstantNormalStress(preload=10.0)})
+    point = operating_point(machine)
+    speeds = struck(point, "s.p1", 1.0)
+    found = [
+        sum(float(share) * speeds[f"{name}.v"] for name, share in point.model.points[f"s.p{i}"].items())
+        for i in range(3)
+    ]
+    right = np.linalg.inv(mass)[:, 1]
+    np.testing.assert_allclose(found, right / right[1], rtol=1e-12, atol=1e-14)
+
+
+def reduced_reed(modes, force):
+    machine = ss.read_rig(EXAMPLE)
+    small, _ = reduced(machine.bodies["reed"].matrices, (22, 23), modes)
+    body = StructureBody(matrices=small, points={"tip": StructurePoint(x=1, y=2, angle=np.radians(60))})
+    whole = Machine(bodies={"reed": body}, contacts=dict(machine.contacts), drive=machine.drive)
+    return whole.with_values({"steady_normal_stress": force})
+
+
+def test_cycles_of_a_reduced_reed_are_what_it_settles_on():
+    machine = reduced_reed(1, 100.0)
+    branch = ss.cycles(machine, along="steady_normal_stress", doublings=0)
+    (cycle,) = (one for one in branch.at(100.0) if one.stable)
+    times = np.linspace(4.95, 5.0, 20001)
+    push = ss.protocol.DisturbancePulse(at=0, by=1.0, duration=1e-3, on="reed.tip")
+    run = ss.simulate(machine, push, times=times, until=5.0)
+    assert run["tip.slip_rate"].max() == pytest.approx(cycle.peak_velocity, rel=1e-3)
+
+
+@pytest.mark.parametrize("ask", [
+    lambda rig: ss.cycles(rig, along="steady_normal_stress"), lambda rig: ss.threshold(rig, "force", at="reed.tip"),
+])  # fmt: skip
+def test_cycles_and_kicks_of_many_degrees_of_freedom_say_what_to_do(ask):
+    with pytest.raises(ss.NotAvailable, match=r"with 24 degrees of freedom .* reduce them"):
+        ask(ss.read_rig(EXAMPLE))
+
+
+@pytest.mark.parametrize(("kick", "at", "said"), [
+    ("displacement", "reed.tip", "in many ways"), ("force", "reed", r"reed\.tip"), ("impulse", None, r"reed\.tip"),
+])  # fmt: skip
+def test_kicks_are_at_points(kick, at, said):
+    with pytest.raises(ss.ParameterError, match=said):
+        ss.threshold(reduced_reed(1, 600.0), kick, at=at)

@@ -26,7 +26,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import HELD
-from steadyslip.model.numeric import by_matrices, has_response, has_structure
+from steadyslip.model.numeric import by_matrices, has_response
 from steadyslip.model.numeric.measured import measured_machine
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_machine, steady_states
@@ -143,8 +143,6 @@ def _by_matrices(rig: Machine) -> _Linear:
 def _judged(rig: Any, branch: int, kicks: Sequence[str]) -> Analysis:
     """Verdict on a rig by its equations or, where these would be too long, by its matrices: then without an onset."""
     matrices = by_matrices(rig)
-    if kicks and has_structure(rig):
-        raise NotAvailable("kicks are not offered for a machine with a structure, whose equations are matrices")
     states = steady_states(rig)
     if not 0 <= branch < len(states):
         raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")

@@ -165,7 +165,7 @@ def basin(
     [['returns'], ['returns']]
     """
     steady_states(rig)  # raises, and says why
-    if problems := rig.place_problems("at", at, rig.bodies):
+    if problems := rig.place_problems("at", at, rig.ends()):
         raise ParameterError(problems)
     options = options_for(operating_point(rig, branch=branch).model, rtol)
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
@@ -226,6 +226,11 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
     touch = list(rig.contacts)[rest.contact]
     body = at or rig.contacts[touch].held
     by_name = {item.name: item for item in model.variables}
+    if f"{body}.x" not in by_name:
+        raise NotAvailable(
+            f"a basin is drawn over place and velocity of one body, and a structure has more of both than {body}; "
+            "threshold tells which kicks there are survived"
+        )
     place, speed = by_name[f"{body}.x"], f"{body}.v"
     length = float(np.ravel(scales[place.name])[0])
     if speed in by_name or model.is_single:

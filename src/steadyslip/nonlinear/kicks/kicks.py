@@ -24,9 +24,10 @@ from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.motion.status import NEEDS_MASS
 from steadyslip.motion.targets import Targets
+from steadyslip.nonlinear.inner_coordinates import refuse_many_inner
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
-from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, steady_speeds
+from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, struck
 from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
@@ -168,6 +169,7 @@ class Kicked:
         self.of_drive = not at and kick in ("velocity", "displacement")
         self.from_other = kick == "velocity" and reference == "after" and self.of_drive
         values = operating_point(rig, vary, branch=branch)
+        refuse_many_inner(values.model, "kicks")
         if kick == "impulse" and not at and "slider.mass" not in values.named():
             raise NotAvailable(
                 f"an impulse {NEEDS_MASS}; use a displacement or normal-stress kick, or give the slider a mass"
@@ -301,8 +303,7 @@ class Kicked:
         """Jobs that start with another velocity of the block or of a body."""
         if not self.at:
             return self._started(jobs, {"v": self.drive[which] + change})
-        own = np.asarray(steady_speeds(jobs.point, self.at), dtype=float)
-        return self._started(jobs, {f"{self.at}.v": own + change})
+        return self._started(jobs, struck(jobs.point, self.at, change))
 
     def _started(self, jobs: Jobs, given: Mapping[str, Any]) -> Jobs:
         """Jobs that start from other initial values."""

@@ -18,6 +18,7 @@ from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.scales import natural_scales
 from steadyslip.model.start import coordinate_speeds
+from steadyslip.model.weights import slip_rates
 from steadyslip.motion.jobs import Jobs
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.motion.status import THROUGH_DASHPOT
@@ -26,7 +27,7 @@ from steadyslip.nonlinear.kicks.rest import Rest
 
 def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Problem]:
     """Problems with the place of a kick, as a list for error messages."""
-    known = list(rig.contacts) if kick == "normal-force" else list(rig.bodies)
+    known = list(rig.contacts) if kick == "normal-force" else list(rig.ends())
     what = "contact" if kick == "normal-force" else "body"
     if at is None:
         if kick in ("velocity", "displacement") or not known:
@@ -34,6 +35,11 @@ def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Pro
         return [Problem("at", f"missing; name the {what} that a {kick} kick acts at: {', '.join(known)}")]
     if problems := rig.place_problems("at", at, known, what):
         return problems
+    if at not in rig.bodies:  # a contact, or a point of a structure
+        if kick != "displacement":
+            return []
+        message = f"{at!r} is a point of a structure, which can be displaced in many ways; allowed: another kick there"
+        return [Problem("at", message)]
     if kick == "impulse" and not rig.bodies[at].inertia_of():
         return [Problem("at", f"an impulse needs a mass, and {at!r} has none; allowed: a displacement or force kick")]
     if kick == "velocity" and not rig.bodies[at].inertia_of():
@@ -70,6 +76,11 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
         if kick == "velocity":
             return unit, np.abs(np.asarray(point.drive, dtype=float)), none
         return unit.removesuffix("/s"), rest.natural_slip, none
+    if at in model.points:
+        speed = np.abs(np.asarray(slip_rates(point)[0], dtype=float))
+        if kick == "force":
+            return "N", _largest_force(point, model), none
+        return ("m/s", speed, speed) if kick == "velocity" else ("N s", _felt_mass(point, model, at) * speed, speed)
     body = next(one for one in model.coordinates if one.name == at)
     scales, _ = natural_scales(point, jobs.reduction)
     turns = body.unit == "rad"
@@ -87,20 +98,57 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
     return "N m" if turns else "N", _force(point, model, at), none
 
 
+def _normal_forces(point: OperatingPoint, model: Model) -> list[Array]:
+    """Steady normal force (N) of each contact."""
+    areas = point.evaluate(areas_of(model))
+    return [area * np.asarray(sigma, dtype=float) for area, sigma in zip(areas, point.sigmas, strict=True)]
+
+
+def _largest_force(point: OperatingPoint, model: Model) -> Array:
+    found: Array = np.maximum.reduce(np.broadcast_arrays(*_normal_forces(point, model)))
+    return found
+
+
 def _force(point: OperatingPoint, model: Model, at: str) -> Array:
     """Largest steady normal force (N) as felt at a body, through the lever at which contacts rub."""
     numbers = [np.asarray(one, dtype=float) for one in point.evaluate(_levers(model, at))]
-    areas = point.evaluate(areas_of(model))
-    normal = [area * np.asarray(sigma, dtype=float) for area, sigma in zip(areas, point.sigmas, strict=True)]
-    felt = [np.abs(lever) * force for lever, force in zip(numbers, normal, strict=True)]
+    felt = [np.abs(lever) * force for lever, force in zip(numbers, _normal_forces(point, model), strict=True)]
     largest: Array = np.maximum.reduce(np.broadcast_arrays(*felt))
-    whole: Array = np.maximum.reduce(np.broadcast_arrays(*normal))
-    return np.asarray(np.where(largest > 0, largest, whole))
+    return np.asarray(np.where(largest > 0, largest, _largest_force(point, model)))
 
 
 def steady_speeds(point: OperatingPoint, at: str) -> Any:
     """Velocity of a body in steady sliding, m/s (rad/s for a rotation)."""
     return point.evaluate(coordinate_speeds(point.model))[_place(point.model, at)]
+
+
+def struck(point: OperatingPoint, at: str, change: Any) -> dict[str, Any]:
+    """Velocities after a blow (m/s, rad/s) by the names of variables, with the change of velocity at its place.
+
+    At a point of a structure the blow is a force there, so that all of the structure's coordinates get their share.
+    """
+    model = point.model
+    moved = _share_of_blow(model, at) if at in model.points else {at: 1.0}
+    speeds = point.evaluate(coordinate_speeds(model))
+    return {
+        f"{one.name}.v": np.asarray(speed, dtype=float) + moved[one.name] * change
+        for one, speed in zip(model.coordinates, speeds, strict=True)
+        if one.name in moved
+    }
+
+
+def _share_of_blow(model: Model, at: str) -> dict[str, float]:
+    """Change of velocity of each coordinate for a blow that changes that of a point by one; inertias are equal."""
+    row = {name: float(share) for name, share in model.points[at].items()}
+    size = sum(share**2 for share in row.values())
+    return {name: share / size for name, share in row.items()}
+
+
+def _felt_mass(point: OperatingPoint, model: Model, at: str) -> Array:
+    """Mass (kg) that a blow at a point of a structure meets."""
+    size = sum(float(share) ** 2 for share in model.points[at].values())
+    inertia = point.evaluate(_inertias(model))[_place(model, next(iter(model.points[at])))]
+    return np.asarray(inertia, dtype=float) / size
 
 
 def _place(model: Model, at: str) -> int:

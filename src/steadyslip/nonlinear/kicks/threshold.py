@@ -469,7 +469,7 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
     up = amount >= (rig.drive.velocity if kick == "velocity" else 0)
     at = getattr(step, "on", None)
     if at is None and kick in ("force", "normal-force"):
-        places = list(rig.bodies if kick == "force" else rig.contacts)
+        places = list(rig.ends() if kick == "force" else rig.contacts)
         at = places[0] if len(places) == 1 else None
     found = threshold(rig, kick, at=at, direction=1 if up else -1, precision=precision, branch=branch)
     kicked = Kicked(rig, kick, found.direction, "before", {}, branch, None, at)

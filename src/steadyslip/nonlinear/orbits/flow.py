@@ -29,6 +29,7 @@ from steadyslip.motion.observe import observe
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.motion.status import BLOWN_UP, LOST, WORDS, ending_contact
 from steadyslip.nonlinear.continuation import Failure
+from steadyslip.nonlinear.inner_coordinates import refuse_many_inner
 from steadyslip.protocol.segments import Segments
 
 DONE = WORDS.index("done")
@@ -145,6 +146,7 @@ class FlowRunner:
     def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None, contact: int = 0) -> None:
         if jobs.point.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
+        refuse_many_inner(jobs.point.model, "cycles")
         self.reduction, self.size, self.contact = jobs.reduction, len(jobs.reduction.state), contact
         method = automatic_method(self.reduction)
         self.stiff = method != "tsit5"

@@ -100,3 +100,13 @@ def test_numbers_of_many_zeros_are_powers_of_ten():
     assert "<msup><mn>10</mn><mn>-24</mn></msup>" in math(x**2 + tiny)
     assert latex(x**2 + tiny) == "x^{2} + 10^{-24}"
     assert latex(x / 100) == sp.latex(x / 100)
+
+
+def test_brackets_are_as_high_as_a_letter_or_the_fraction_that_they_hold():
+    """Browsers made those of a(b + c(d + e)) higher with each, and twice as high as a fraction's larger half."""
+    a, b, c, d = sp.symbols("a b c d")
+    flat, divided = math(a * (b + c * (a + d))), math(a * (b / c + d * (a + b)))
+    assert flat.count('<mo stretchy="false">(</mo>') == flat.count('<mo stretchy="false">)</mo>') == 2
+    assert "symmetric" not in flat
+    assert [divided.count(f'<mo {kind}="false">(</mo>') for kind in ("symmetric", "stretchy")] == [1, 1]
+    assert "<mo>(" not in flat + divided

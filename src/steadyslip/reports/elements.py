@@ -65,6 +65,7 @@ STYLE = """
   white-space: pre-wrap; overflow-wrap: anywhere; }
 .steadyslip-told sub { line-height: 0; }
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
+@media screen and (max-width: 600px) { .steadyslip-told .formula math { font-size: 14px; } }
 @media print { .steadyslip-told .formula math { font-size: 12px; } }
 .steadyslip-told .narrow { display: none; }
 @media screen and (max-width: 600px) {
@@ -207,7 +208,25 @@ def _presented(expression: Any) -> str:
     text: str = _Printer().doprint(expression)
     for entity, character in _ENTITIES.items():
         text = text.replace(entity, character)
+    text = _with_low_brackets(text)
     return re.sub(r"(?<=<mo>\u2062</mo>)(?=<mrow><mi>[a-z]{3,}</mi>)", '<mspace width=".2em"/>', text)
+
+
+def _with_low_brackets(text: str) -> str:
+    """MathML with brackets as high as a letter, and those around a fraction as high as that.
+
+    Browsers make them twice as high as the larger half of what they hold, and one more size with each bracket within.
+    """
+    opened: list[int] = []
+    kinds: dict[int, str] = {}
+    for found in re.finditer(r"<mo>([()])</mo>", text):
+        if found[1] == "(":
+            opened.append(found.start())
+        elif opened:
+            begin = opened.pop()
+            holds_fraction = "<mfrac" in text[begin : found.start()]
+            kinds[begin] = kinds[found.start()] = ' symmetric="false"' if holds_fraction else ' stretchy="false"'
+    return re.sub(r"<mo>(?=[()]</mo>)", lambda found: f"<mo{kinds.get(found.start(), '')}>", text)
 
 
 class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types

@@ -12,7 +12,7 @@ from rigs_of_theory import CONTACTS, plain_guide, rate_state, rig
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
 from steadyslip.nonlinear.kicks.spans import constant_inputs
-from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_module
+from steadyslip.nonlinear.orbits import flow as flow_module, follow as follow_module, tracer as tracer_module
 from steadyslip.nonlinear.orbits.at_value import own_motion
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_data, cycle_near
@@ -311,3 +311,26 @@ def test_ctrl_c_while_the_rig_itself_is_simulated_keeps_the_rest(damped, monkeyp
     monkeypatch.setattr("steadyslip.nonlinear.orbits.at_value.motion_from", stop)
     beyond = replace(damped, rig=damped.rig.with_values({"stiffness": 1.2 * damped.onset.value}))
     assert "motion from beside steady sliding was interrupted" in str(beyond)
+
+
+def test_repeated_cycles_take_no_more_than_a_branch_may(monkeypatch):
+    """One long cycle among stiff bristles took five times as many steps as all of its branch, and minutes."""
+    a_rig = unit_rig("slip", 0.5, 0.4, damping=1e-3)
+    found = list(ss.cycles(a_rig, most_points=6, doublings=0).cycles)
+    made = []
+
+    def flow(*given):
+        made.append(Flow(*given))
+        return made[-1]
+
+    onset = ss.hopf(a_rig)
+    tracer = Tracer(Flow(a_rig, "slider.stiffness"), onset, (-np.inf, np.inf), 10)
+    monkeypatch.setattr(follow_module, "is_open", lambda cycle: True)
+    monkeypatch.setattr(follow_module, "Flow", flow)
+    follow_module._repeated(tracer, list(found))
+    whole = made[-1].steps
+    monkeypatch.setattr(tracer_module, "MOST_STEPS", whole // 10)
+    assert len(follow_module._repeated(tracer, list(found))[0]) == len(found)
+    assert whole // 10 <= made[-1].steps < whole // 3
+    with pytest.raises(Failure, match="too many steps"):
+        made[-1].run(made[-1].setting(0.4), made[-1].steady(0.4)[None] + 0.1, np.array([1e-3]))

@@ -5,6 +5,7 @@ Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -161,7 +162,7 @@ class FlowRunner:
             self.reduction.model, Choice(method), jobs.eliminate, jobs.targets.pushes, jobs.targets.presses
         )
         self.sensitive = _with_sensitivities(self.reduction, method)
-        self.steps, self._usual = 0, MOST_STEPS
+        self.steps, self._usual, self.last_step = 0, MOST_STEPS, math.inf
         self.slack = HARDLY_HEARD if self.costly else 1.0
         self.far_more = FAR_MORE
         self.rounding = 0.0
@@ -299,6 +300,8 @@ class FlowRunner:
         self, setting: FlowSetting, settings: Array, initial: Array, times: Array, machine: Runner | None = None
     ) -> Array:
         """Integrate the system with sensitivities, or that of a plain `machine`; final values, or FlowFailure."""
+        if self.steps >= self.last_step:
+            raise FlowFailure("too many steps")
         constants = (setting.plain if machine else setting.varied)[0]
         tables = (constants, np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
         call = Call(machine or self.sensitive, tables, len(times), np.empty(0))

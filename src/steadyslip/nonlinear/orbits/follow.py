@@ -158,6 +158,7 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
         finer = Tracer(
             Flow(flow.rig, flow.name, flow.branch, rtol, tracer.onset.contact), tracer.onset, tracer.limits, tracer.most
         )
+        finer.flow.last_step = finer.last_step  # one long cycle may take more than the whole branch did
         for i in failing:
             if finer.is_spent:
                 break

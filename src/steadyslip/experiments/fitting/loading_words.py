@@ -21,6 +21,7 @@ _RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a tho
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
 CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
 WAVY = 4.0  # times its noise from sample to sample by which a displacement wanders, from which waves are told
+MOST_FAULTS = 10  # slips and glitches of a sensor beyond which waves are told; the most of real records had 5
 LISTED = 4  # changes listed in a warning
 
 
@@ -106,17 +107,23 @@ def _waves(fit: FitNumbers) -> list[str]:
         if load is None or moved is None or load.curve is not None or any(one.pieces for one in load.changes):
             continue
         times = load.strays / displacement_noise(record.time, moved)
-        if times < WAVY or whiteness([moved - load.integral(record.time)]).p >= STRUCTURE:
+        many, wavy = load.slips + load.glitches > MOST_FAULTS, times >= WAVY
+        wavy = wavy and whiteness([moved - load.integral(record.time)]).p < STRUCTURE
+        if not (many or wavy):
             continue
         if yielding(record.time, moved, record.friction, load) is not None:  # told already
             continue
         late = ", the lag of a servo" if any(one.lag for one in load.changes) else ""
+        size = format_quantity(load.strays, "m", 2)
+        seen = (
+            f"wanders about straight lines by {size}, {times:.0f} times its noise from sample to sample"
+            if wavy
+            else f"seems to have {load.slips} slips and {load.glitches} glitches, more than a sensor has"
+        )
         found.append(
-            f"{record.source}: the displacement wanders about straight lines by "
-            f"{format_quantity(load.strays, 'm', 2)}, {times:.0f} times its noise from sample to sample: a wavy "
-            f"sensor, or a load point that does not keep its rate; rates{late} and times of changes found in it may be "
-            "off by more than their errors; give the rates that were commanded as a protocol, or, if the load point "
-            "moves so, drive = 'smoothed'"
+            f"{record.source}: the displacement {seen}: a wavy sensor, or a load point that does not keep its rate; "
+            f"rates{late} and times of changes found in it may be off by more than their errors; give the "
+            "rates that were commanded as a protocol, or, if the load point moves so, drive = 'smoothed'"
         )
     return found
 

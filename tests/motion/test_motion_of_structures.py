@@ -133,7 +133,7 @@ def by_hand(numbers, push, times):
     return found.y[:size], found.y[size : 2 * size], rows
 
 
-@pytest.mark.parametrize(("seed", "size", "contacts"), [(1, 4, 1), (2, 9, 2), (5, 6, 2)])
+@pytest.mark.parametrize(("seed", "size", "contacts"), [(1, 4, 1), (2, 6, 2), (3, 9, 2), (4, 4, 1)])
 def test_random_structures_move_as_equations_typed_by_hand(seed, size, contacts):
     """Of full dampings, gyroscopic matrices, compliant contacts; the push is a tenth of the direct effect."""
     machine, numbers = random_structure(np.random.default_rng(seed), size, contacts)

@@ -76,3 +76,23 @@ def test_cells_of_wide_tables_have_the_names_of_their_columns():
     assert html.count("data-head") == 2, "none before an empty cell"
     assert '<td class=n data-head="then">2\u00a0m</td>' in html
     assert "data-head" not in table([("a", "1 m")], ("name", "now"))
+
+
+def test_large_figures_scroll_on_a_telephone_and_keep_their_letters(tmp_path):
+    """A figure 7 inches wide was shrunk to half of that; figures of one column fit as they are."""
+    run = ss.simulate(ss.read_rig("examples/stick-slip.toml"), until="20 s")
+    ss.report(run, explorer=False).save(tmp_path / "a.html")
+    sizes = """[...document.querySelectorAll("figure")].filter(one => one.querySelector(".large"))
+        .map(one => [one.clientWidth, one.scrollWidth])"""
+    with driver() as play:
+        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 390, "height": 740})
+        page.goto((tmp_path / "a.html").as_uri())
+        narrow, all_of_it = page.evaluate(sizes), page.evaluate("document.documentElement.scrollWidth")
+        page.set_viewport_size({"width": 1024, "height": 740})
+        broad = page.evaluate(sizes)
+        browser.close()
+    assert narrow
+    assert all(shown <= 390 and whole == 580 for shown, whole in narrow)
+    assert all_of_it <= 390
+    assert all(shown == whole for shown, whole in broad)

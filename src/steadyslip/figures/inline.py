@@ -18,6 +18,7 @@ from steadyslip.figures.style import JOURNAL
 
 MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
 _LEAST = 640.0  # pixels across a figure, so that one column is sharp on a screen of two per CSS pixel (by trial)
+_LARGE = 6.5  # inches across from which letters are too small on a telephone, where such figures scroll instead
 _SVG_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "steadyslip",
@@ -51,18 +52,19 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
             found = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
             if width is not None:
                 found.set_size_inches(width, found.get_size_inches()[1] * width / found.get_size_inches()[0])
+            large = ' class="large"' if found.get_figwidth() >= _LARGE else ""
             text = io.StringIO()
             found.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
             svg = text.getvalue()
             if len(svg) <= MAX_SVG_LENGTH:
-                return _page_svg(svg[svg.index("<svg") :], words)
+                return _page_svg(svg[svg.index("<svg") :], words).replace("<svg", f"<svg{large}", 1)
             data = _png_base64(found)
         except (NotAvailable, ValueError):
             return ""
         finally:
             for number in set(plt.get_fignums()) - known:
                 plt.close(number)
-    return f'<img alt="{html.escape(words)}" src="data:image/png;base64,{data}">'
+    return f'<img{large} alt="{html.escape(words)}" src="data:image/png;base64,{data}">'
 
 
 def _png_base64(found: Any) -> str:

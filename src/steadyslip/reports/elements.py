@@ -71,6 +71,8 @@ STYLE = """
 @media screen and (max-width: 600px) {
   .steadyslip-told .broad { display: none; }
   .steadyslip-told .narrow { display: block; }
+  .steadyslip-told figure:not(.pair > figure):has(> :is(svg, img)) { overflow-x: auto; }
+  .steadyslip-told figure:not(.pair > figure) > :is(svg, img).large { max-width: none; width: 580px !important; }
   .steadyslip-told table { font-size: 13px; }
   .steadyslip-told.steadyslip-told :is(th, td) { padding-right: 8px; }
   .steadyslip-told .stacks thead { position: absolute; clip-path: inset(50%); }

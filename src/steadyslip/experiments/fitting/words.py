@@ -326,16 +326,15 @@ def drive_line(fit: FitNumbers) -> str:
     if any(course.curve is not None for course in loads):
         return "a smooth curve through the measured displacement"
     count = sum(len(course.changes) for course in loads)
-    free = sum(one.parameter.startswith("step.") for one in fit.space.unknowns)
+    free = [one.parameter for one in fit.space.unknowns if one.parameter.startswith("step.")]
+    what_of = "times and durations" if any(name.endswith(".duration") for name in free) else "times"
     of_each = [[channel for channel, _, _ in loading.changes] for loading in plan.loading if plan.pressed]
     pressed = {what: sum(own.count(channel) for own in of_each)
                for channel, what in (("stress", "normal stress"), ("pore", "pore pressure"))}  # fmt: skip
     text = f"commanded loading found in the record, {count} change{'' if count == 1 else 's'} of rate"
     text += "".join(f" and {number} of {what}" for what, number in pressed.items() if number)
     text += (
-        f", {free} of {'its' if count + sum(pressed.values()) == 1 else 'their'} times and durations fitted"
-        if free
-        else ""
+        f", {len(free)} of {'its' if count + sum(pressed.values()) == 1 else 'their'} {what_of} fitted" if free else ""
     )
     text += "".join(_servo(course) for course in loads)
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
@@ -351,7 +350,7 @@ def drive_line(fit: FitNumbers) -> str:
     shares = [
         f"{_symbol(name)} {other[name] / fit.values[name] - 1:+.0%}"
         for name in _steep_names(fit.rig(0))
-        if name in other and fit.values.get(name)
+        if name in other and fit.values.get(name) and fit[name].determined
     ]
     return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
 
@@ -369,7 +368,7 @@ def _servo(course: Course) -> str:
     beyond = overshoot(late.damping)
     over = f", and overshoots by {format_percent(beyond)}" if beyond >= OVERSHOOT else ""
     lag = format_quantity(late.lag, "s")
-    return f"; the servo follows late, in the end {lag} times the change of rate behind the command{over}"
+    return f"; the servo follows late, in the end by {lag}{over}"
 
 
 def _steep_names(rig: Slider) -> tuple[str, ...]:

@@ -101,6 +101,9 @@ def test_the_ellipses_of_a_fit_hold_68_and_95_percent(fit):
     count = len(fit.names)
     panels = ss.figures.corner(fit, Figure(figsize=(9, 9)).subplots(count, count))
     assert panels[-1, 0].get_xlabel() == "a (1)"
+    labels = [panel.get_xlabel().partition(" (")[0] for panel in panels[-1]]
+    assert {"b", r"$d_{\mathrm{c}}$"} <= set(labels), "letters, as in all else"
+    assert not any("_ref" in label for label in labels)
     assert not panels[0, -1].get_visible()
     draws = ss.experiments.normal_draws(fit, 20_000)
     points = np.column_stack([draws["friction.a"], draws["friction.b"]])

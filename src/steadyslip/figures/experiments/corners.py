@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -14,7 +15,9 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.palette import BLACK, BLUE, SKY, VERMILION
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import axis_label, display_unit, is_narrow
+from steadyslip.figures.style import axis_label, display_unit, is_narrow, with_subscripts
+from steadyslip.machine.letters import letter_of
+from steadyslip.machine.rig import Rig
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
@@ -59,7 +62,8 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     panels = panel_grid(ax, len(names), len(names), (size, size))
     if ax is None and is_narrow() and len(names) > MOST_IN_COLUMN:
         panels[0, 0].figure.set_size_inches(TWO_COLUMNS, TWO_COLUMNS)
-    scales = [_Scale(source[name]) for name in names]
+    letters = _letters(source.rig(), names)
+    scales = [_Scale(source[name], letters[name]) for name in names]
     for i, row in enumerate(names):
         for k, column in enumerate(names):
             panel = panels[i, k]
@@ -92,17 +96,23 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     return panels
 
 
+def _letters(rig: Rig, names: Sequence[str]) -> dict[str, str]:
+    """Letters of parameters for axes, by name; short names of those without, or with one that several have."""
+    known = rig.parameters()
+    letters = {name: letter_of(rig, name) for name in names if name in known}
+    own = {name: letter for name, letter in letters.items() if letter and [*letters.values()].count(letter) == 1}
+    return {name: with_subscripts(own[name]) if name in own else axis_name(name) for name in names}
+
+
 class _Scale:
     """Display unit and label of a parameter; times are relative to the best value. Calling it converts SI values."""
 
-    def __init__(self, one: Estimate) -> None:
+    def __init__(self, one: Estimate, name: str) -> None:
         clock = one.unit == "s"
         self.origin = one.value if clock else 0.0
         self.size, unit = display_unit(one.unit, one.error if clock else abs(one.value) or one.error, one.area)
         self.best = (one.value - self.origin) / self.size
-        self.label = axis_label(
-            f"{axis_name(one.name)}\n\u2212 {one.value:.7g} s" if clock else axis_name(one.name), unit
-        )
+        self.label = axis_label(f"{name}\n\u2212 {one.value:.7g} s" if clock else name, unit)
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         return (values - self.origin) / self.size

@@ -23,7 +23,7 @@ from steadyslip.kernels.methods import METHODS, Method
 from steadyslip.kernels.nodes import Value
 from steadyslip.kernels.rosenbrock import Pattern
 from steadyslip.kernels.source import Constants, Formulas
-from steadyslip.model.reduction import TIME, V_LP, Reduction, Unknowns
+from steadyslip.model.reduction import JUMP, TIME, V_LP, Reduction, Unknowns
 
 LEVELS = ("constant", "linear", "harmonic")
 OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
@@ -78,7 +78,7 @@ class Formulation:
         self.counted = self.size - unheard  # number of variables that the error norm averages over
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | self._inputs
         own = (one.variable.w for one in reduction.slidings if one.variable is not None)
-        variables = {*reduction.state, *reduction.continuous, *self._inputs, *own}
+        variables = {*reduction.state, *reduction.continuous, *self._inputs, *own, JUMP}
         self.unknowns = len(reduction.unknowns)
         self.names |= {symbol: f"z{k}" for k, symbol in enumerate(reduction.unknowns)}
         variables.update(reduction.unknowns)
@@ -192,6 +192,9 @@ class Formulation:
         self.restart = Formulas([self._with_constants(e) for e in balances], known) if balances else None
         self.letting_go = self._formulas([self._with_constants(e) for e in reduction.letting_go])
         self.shift = self._formulas([self._with_constants(e) for e in reduction.shifts])
+        drive = reduction.model.steady[reduction.model.inputs["load_velocity"]]
+        sped = [drive, *(e for _, e in reduction.sped)] if reduction.sped else []
+        self.sped = Formulas([self._with_constants(e) for e in sped], known | {JUMP: "jump"})
         self.shares = self._formulas([self._with_constants(e) for i in range(self.contacts) for e in self._shares(i)])
 
     @property

@@ -105,6 +105,8 @@ class Kernel(Formulation):
             record.program.store(self.layout.continuous + i, value)
         moved = record.program.load(Row.LOAD_MOVED) + record.load_advance(record.program.load(Row.TAU))
         record.program.store(Row.LOAD_MOVED, moved)
+        if self.reduction.sped:
+            record.program.store(Row.LOAD_SPEED, point["in0"])
         if self.reduction.letting_go:
             for row, value in zip((Row.PULL, Row.STRETCH), record.evaluated(self.letting_go, point), strict=False):
                 record.program.store(row, value)
@@ -153,7 +155,20 @@ class Kernel(Formulation):
         for i, share in enumerate(self.shift(record.constants)):
             place = self.layout.continuous + i
             program.store(place, program.load(place) - times(program.number, share))
+        if self.reduction.sped:
+            self._speed_up(record)
         return program
+
+    def _speed_up(self, record: Evaluator) -> None:
+        """New velocity variables of bodies on which the drive slides: its velocity jumps, and theirs go on."""
+        program, reduction = record.program, self.reduction
+        values = record.constants | {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}
+        steady, *_ = self.sped(values | {"jump": 0.0})
+        before = select(as_node(program.load(Row.SEGMENT)) > 0.5, program.load(Row.LOAD_SPEED), as_node(steady))
+        jump = record.inputs(program.load(Row.TAU))["in0"] - before
+        _, *after = self.sped(values | {"jump": jump})
+        for (symbol, _), value in zip(reduction.sped, after, strict=True):
+            program.store(self.layout.continuous + reduction.continuous.index(symbol), value)
 
     def _let_go(self, record: Evaluator) -> None:
         """New held force of a drive that is let go or moved: continuous, or as prescribed, from the state before it."""

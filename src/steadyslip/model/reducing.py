@@ -21,6 +21,8 @@ has one (exact through rest and reversal), and v otherwise.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import sympy as sp
 
 from steadyslip.core.errors import InternalError, NotAvailable
@@ -31,7 +33,7 @@ from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model.dead_time import USUAL_ORDER
 from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.kinematics import in_variables, kinematics, solve_jointly, solve_sequentially
-from steadyslip.model.reduction import SPEED, TIME, V_LP, Reduction, Sliding, channels_for, slope_of
+from steadyslip.model.reduction import JUMP, SPEED, TIME, V_LP, Reduction, Sliding, channels_for, slope_of
 
 Replacements = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
@@ -212,10 +214,26 @@ class _Reducer:
             restored=tuple(map(self._in_state, continuous)) if self.eliminated else continuous,
             slidings=tuple(map(self._sliding, range(len(model.contacts)))),
             shifts=tuple(one.speed / self._drive for one in self._independent()),
+            sped=tuple(self._sped(heavy)),
             further=self._further(),
             channels=self.channels,
             letting_go=self._letting_go(),
         )
+
+    def _sped(self, heavy: list[Coordinate]) -> Iterator[tuple[sp.Symbol, sp.Expr]]:
+        """Velocity variables that a jump of the load point's velocity changes, with their values after it."""
+        drive = self.model.inputs["load_velocity"]
+        for i in (self.moving.contact_at(one) for one in heavy):
+            if i is None or (variable := self.moving.variables[i]) is None:
+                continue
+            velocity = self.model.contacts[i].velocity
+            share = derivative(sp.sympify(self.model.definitions.get(velocity, velocity)), drive)
+            if share == 0:
+                continue
+            if variable.kind == "logarithm":  # without the rounding of a tiny slip rate
+                yield variable.w, variable.w + sp.log(1 + share * JUMP * sp.exp(-variable.w) / variable.scale)
+            else:
+                yield variable.w, variable.w_of_v.xreplace({velocity: variable.of_w + share * JUMP})
 
     def _solve(self, heavy: list[Coordinate], light: list[int], eliminate: tuple[int | None, ...]) -> None:
         """Solve for accelerations, velocities of massless contacts and friction stresses, or make them unknowns."""

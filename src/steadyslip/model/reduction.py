@@ -21,6 +21,7 @@ from steadyslip.model.kinematics import VelocityVariable, W, single_variable
 __all__ = ["TIME", "V_LP", "P", "Q", "Reduction", "Sliding", "W"]
 
 
+JUMP = inner_symbol("jump", real=True)  # sudden change of the load point's velocity
 SPEED = "w of v"
 """Name of a contact's velocity variable in the state; laws cannot use it because of the spaces."""
 
@@ -92,6 +93,9 @@ class Reduction(Keeper):
         Contacts, in the order of the Model.
     shifts : tuple of sympy.Expr
         Decrease of each displacement (the first ones of `continuous`) per unit jump of the load point.
+    sped : tuple of (sympy.Symbol, sympy.Expr)
+        Velocity variables of bodies with inertia on which the drive slides, after a jump `JUMP` of the load point's
+        velocity, as functions of `continuous` before it: the bodies keep their own velocities.
     further : dict of str to sympy.Expr
         Further observables: velocity, acceleration and displacement of the coordinates of machines.
     channels : tuple of sympy.Symbol
@@ -117,6 +121,7 @@ class Reduction(Keeper):
     restored: tuple[sp.Expr, ...]
     slidings: tuple[Sliding, ...]
     shifts: tuple[sp.Expr, ...]
+    sped: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
     further: Mapping[str, sp.Expr] = field(default_factory=dict)
     directions: tuple[tuple[sp.Symbol, ...], ...] = ()
     channels: tuple[sp.Symbol, ...] = (V_LP, Q, P)

@@ -74,6 +74,7 @@ def test_a_memory_of_normal_stress_is_held_where_it_has_no_effect(tmp_path):
     assert r"11 MPa$^{*}$ & " in text
     assert " & rms & " in text
     assert "Values in parentheses are not determined" in table.methods
+    assert "Of lines with a star the fit warns" in table.methods
     table.to_csv(tmp_path / "t.csv")
     assert told[0] in next(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))["warnings"]
 

@@ -215,6 +215,7 @@ class StepTable(Displayed):
             if left
             else "",
             "Values in parentheses are not determined by the data." if open_ones else "",
+            "Of lines with a star the fit warns." if any(warnings(line.fit) for line in self.lines) else "",
         ]
         noise = "allowing for correlated residuals" if self.joint.correlated else "for independent residuals"
         alone = f"{len(self.steps)} step{'s were' if len(self.steps) != 1 else ' was'} fitted alone"

@@ -151,6 +151,18 @@ class Course(ReadOnly):
         found = np.interp(time, knots, values)
         return np.asarray(found if self.curve is None else found + self.curve(time))
 
+    def within(self, start: float, end: float) -> Course:
+        """Part of the course between two times (s), in which no change is under way: levels, errors and changes."""
+        met = [change.time + change.lag for change in self.changes]
+        first, last = (int(np.searchsorted(met, moment)) for moment in (start, end))
+        own = slice(first, last + 1)
+        shapes = tuple((levels[own], shares[first:last]) for levels, shares in self.shapes)
+        further = None if self.otherwise is None else self.otherwise.within(start, end)
+        return replace(
+            self, first=float(self.levels[first]), changes=self.changes[first:last], errors=self.errors[own],
+            shapes=shapes, otherwise=further, slips=0, glitches=0, early=0, late=0,
+        )  # fmt: skip
+
     def lowered(self, by: float) -> Course:
         """The same course with all levels less `by`."""
         changes = tuple(replace(one, before=one.before - by, after=one.after - by) for one in self.changes)
@@ -183,6 +195,11 @@ class Loading:
     load: Course | None
     stress: Course | None
     pore: Course | None = None
+
+    def within(self, start: float, end: float) -> Loading:
+        """Loading between two times (s), as found in the whole record."""
+        parts = (None if one is None else one.within(start, end) for one in (self.load, self.stress, self.pore))
+        return Loading(*parts)
 
     @cached_property
     def changes(self) -> tuple[tuple[str, int, Change], ...]:

@@ -217,6 +217,8 @@ class Record(Displayed, Keeper):
     def windows(self, before: Any = None, after: Any = None) -> tuple[Record, ...]:
         """Parts around each velocity step, hold with its reslide, or step of normal stress.
 
+        Rates, stresses and the response of a servo are those found in the whole record.
+
         Parameters
         ----------
         before, after : float or str, optional
@@ -233,7 +235,7 @@ class Record(Displayed, Keeper):
             high = ends[i + 2] if i + 2 == len(ends) - 1 else 0.5 * (moment + ends[i + 2])
             low = low if before is None else max(moment - seconds("before", before), self.time[0])
             high = high if after is None else min(moment + seconds("after", after), self.time[-1])
-            found.append(self.between(low, high))
+            found.append(replace(self.between(low, high), commanded=self.loading.within(low, high)))
         return tuple(found)
 
     def summary(self) -> str:

@@ -26,7 +26,7 @@ import numpy as np
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, rate_state
-from steadyslip.core.errors import SteadyslipError
+from steadyslip.core.errors import SteadyslipError, UnitWarning
 from steadyslip.files.specifications import protocol_from_text, rig_from_text, rig_to_text
 from steadyslip.kernels import runner
 from steadyslip.kernels.build import interpreted
@@ -53,6 +53,7 @@ def judged(question: Callable[[], object], seconds: float = SECONDS) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", UnitWarning)  # numbers without a unit are asked about
             question()
     except SteadyslipError as error:
         text = str(error)

@@ -220,7 +220,7 @@ def test_all_speeds_at_which_an_axis_is_stable_are_told():
 @pytest.mark.parametrize(
     ("path", "told"),
     [
-        ("examples/machines/geared-servo.toml", r"stable speeds +above 3\.587 mm/s\n"),
+        ("examples/machines/geared-servo.toml", r"stable speeds +above 3587 um/s\n"),
         ("examples/machines/feed-axis.toml", r"stable speeds +all \(searched from \S+ rpm to \S+ rpm\)\n"),
     ],
 )

@@ -141,6 +141,7 @@ def test_any_size_of_any_parameter(data):
     "change",
     ["b=1e300", "a=1e-300", "alpha=1e250", "preload=1e-300", "d_c=1e-300", "stiffness=1e305", "velocity=1e-200"],
 )
+@pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")  # numbers without a unit are asked about
 def test_extremes(change):
     judged_rig = ss.read_rig(EXAMPLE, [change])
     judged(ss.rig_to_text(judged_rig))

@@ -197,7 +197,7 @@ def cure(
     slider.stiffness  9 GPa/m now; from 29.07 GPa/m up
     slider.damping    0 Pa s/m now; from 57.53 GPa s/m up
     contact.preload   5 MPa now; up to 1.548 MPa
-    drive.velocity    1 um/s now; not reached from 1 nm/s to 1 mm/s
+    drive.velocity    1 um/s now; not reached from 0.001 um/s to 1000 um/s
     """
     wanted = _share(sure)
     unknown = unknown or (tolerances.unknown if isinstance(tolerances, Tolerances) else {})

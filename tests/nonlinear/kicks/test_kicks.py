@@ -338,7 +338,7 @@ def test_all_kicks_of_a_threshold_share_their_steps(monkeypatch):
     found = ss.threshold(a_rig, precision=1e-4)
     assert (whole.decided, found.decided, found.interrupted) == (True, False, False)
     assert found.bracket[0] < whole.size < found.bracket[1]
-    assert "undecided" in str(found)
+    assert "not decided" in str(found)
 
 
 def lugre_with_mass(static, coulomb, v_stribeck, viscous, stiffness, damping, k, mass, drive):

@@ -13,6 +13,10 @@ import scipy.linalg as la
 import steadyslip as ss
 from steadyslip.machine import Machine, Pull, StructureBody, StructureData, StructurePoint, Surface
 
+ROCK = ss.laws.RateState(
+    a=0.010, b=0.016, d_c=20e-6, mu_ref=0.45, v_ref=0.05, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
+)
+"""Friction of the reed."""
 REED = """
 [bodies.reed]
 kind = "structure"

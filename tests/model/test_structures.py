@@ -18,12 +18,7 @@ from steadyslip.machine import (
     Surface,
     reduced,
 )
-from structures_at_random import compared, random_structure, reed, reed_file, reed_matrices
-
-ROCK = ss.laws.RateState(
-    a=0.010, b=0.016, d_c=20e-6, mu_ref=0.45, v_ref=0.05, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
-)
-
+from structures_at_random import ROCK, compared, random_structure, reed, reed_file, reed_matrices
 
 # --- theory 13 --------------------------------------------------------------------------------------
 

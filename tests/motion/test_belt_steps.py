@@ -79,3 +79,17 @@ def test_a_step_of_the_belt_leaves_the_block_its_velocity(seed):
     size = np.max(np.abs(slip))
     np.testing.assert_allclose(run["c.slip_rate"], slip, atol=1e-5 * size)
     np.testing.assert_allclose(run["block.v"], speed, atol=1e-5 * size)
+
+
+def test_slip_that_a_step_turns_round_needs_a_law_for_it():
+    """ln v knows one way only; the regularised law goes on backwards, which the words say."""
+    own = {"mass": 2.0, "stiffness": 5e3, "damping": 1.0, "a": 0.01, "b": 0.006}
+    back = ss.protocol.VelocityStep(at=START, to=-1e-3)
+    one_way, both_ways = (
+        ss.simulate(ss.rig_from_text(BELT.format(**own, regularised=word)), back, until=2 * START)
+        for word in ("false", "true")
+    )
+    assert one_way.status == "no velocity"
+    assert "take a law that slides both ways (regularised = true)" in " ".join(str(one_way).split())
+    assert both_ways.status == "done"
+    assert both_ways["c.slip_rate"].min() < -9e-4

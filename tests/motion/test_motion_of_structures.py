@@ -19,11 +19,8 @@ from steadyslip.machine import (
 from steadyslip.model.point import operating_point
 from steadyslip.nonlinear.kicks.places import struck
 from steadyslip.reports.sections import motion
-from structures_at_random import random_structure, reed
+from structures_at_random import ROCK, random_structure, reed
 
-ROCK = ss.laws.RateState(
-    a=0.010, b=0.016, d_c=20e-6, mu_ref=0.45, v_ref=0.05, normal_memory=ss.laws.LinkerDieterich(alpha=0.3)
-)
 EXAMPLE = "examples/structures/reed.toml"
 FINE = {"rtol": 1e-10, "times": np.linspace(0, 0.02, 41)}
 

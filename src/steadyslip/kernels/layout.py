@@ -61,11 +61,11 @@ class Row(IntEnum):
     """First unknown of the balances at the start of the last step."""
     H_OLD = 70
     """Size of the last accepted step."""
-    LOAD_SPEED = 73
-    """Velocity of the load point at the end of the last segment, kept where its jump moves velocity variables."""
     PULL, STRETCH = 71, 72
     """Force (less that of steady sliding) of a drive that is let go and moves on, at the end of the last segment, and
     the part of it that the drive's own motion would cause with the load point at rest."""
+    LOAD_SPEED = 73
+    """Velocity of the load point at the end of the last segment, kept where its jump moves velocity variables."""
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1

@@ -39,8 +39,9 @@ REMEDIES = {
     "times), for which more steps are allowed; in Python most_steps raises the limit",
     "stuck": "it may be friction that falls at once when a block without mass speeds up, a normal {stress} that "
     "answers too strongly to acceleration, or a mass near zero; give {mass}, or check the contact law",
-    "no velocity": "if the inputs jump, make the jump smaller; give {mass}, or look for a parameter that is too small "
-    "or too large by orders of magnitude",
+    "no velocity": "if the inputs jump, make the jump smaller; if they turn the slip round, take a law that slides "
+    "both ways (regularised = true); give {mass}, or look for a parameter that is too small or too large by orders of "
+    "magnitude",
     "interrupted": "stopped by the user; run it again for the rest",
     "no steady sliding": "see steadyslip.steady_state",
     "ill-posed": "without mass, friction falls at once when the block speeds up (or the normal {stress} answers too "

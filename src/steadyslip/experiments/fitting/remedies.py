@@ -19,7 +19,7 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.plan import Plan, with_lag
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
-from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, SMALL_FALL, minimise
+from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, minimise
 from steadyslip.experiments.numerics.noise import STRUCTURE, describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
 
@@ -27,6 +27,7 @@ STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass 
 ROUNDS = 2  # changes that are tried on top of each other
 TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3  # of each trial; on made records they end where the default ones do
 MAX_TREND = 2  # orders of a trend that are tried
+SMALL_FALL = 0.1  # of −2 log likelihood of white noise, which a short search leaves to be gained: nobody would see it
 
 NESTED = {"lag", "trend"}
 """Unknowns without effect at 0, so that a fit with them begins at the minimum without."""

@@ -32,7 +32,6 @@ LEAST_PROGRESS = (
 )
 MAX_SSQ = 1e100  # sums of squares above count as infinite; their products would overflow
 DAMPING_FAR, DAMPING_NEAR = 1e-2, 1e-6  # initial damping, relative to the curvature: far from a minimum, and near one
-SMALL_FALL = 0.1  # of −2 log likelihood of white noise, which a short search leaves to be gained: nobody would see it
 MAX_STEP = 2.0  # largest step in any coordinate: a factor exp(2) of a logarithmic parameter
 
 

@@ -160,10 +160,12 @@ def by_hand(
     encoder=0.0,
     delay=0,
     bristles=None,
+    load=0.0,
 ):
     """Places at the samples of a sampled PID; delay in samples.
 
-    Spans of constant force by their formula, or of bristles (stiffness, damping, Stribeck velocity) by SciPy.
+    Spans of constant force by their formula, or of bristles (stiffness, damping, Stribeck velocity) by SciPy. The force
+    presses the contact by its share `load`, besides 1 N.
     """
 
     def banded(e):
@@ -174,16 +176,17 @@ def by_hand(
 
         def moved(_, y):
             rate = y[1] - stiff * abs(y[1]) * y[2] / (sliding + (rest - sliding) * np.exp(-((y[1] / slow) ** 2)))
-            return [y[1], (u - stiff * y[2] - damped * rate - viscous * y[1]) / mass, rate]
+            friction = (1 + load * abs(u)) * (stiff * y[2] + damped * rate + viscous * y[1])
+            return [y[1], (u - friction) / mass, rate]
 
         return solve_ivp(moved, (0, sample), [x, v, z], method="LSODA", rtol=1e-10, atol=1e-14).y[:, -1]
 
     def slid(x, v, z, u):
-        left = sample
-        while left > 0 and not (v == 0 and abs(u) <= rest):
+        left, normal = sample, 1 + load * abs(u)
+        while left > 0 and not (v == 0 and abs(u) <= normal * rest):
             way = np.sign(v) if v else np.sign(u)
-            far = (u - way * sliding) / viscous
-            tau = mass / viscous
+            far = (u - way * normal * sliding) / (normal * viscous)
+            tau = mass / (normal * viscous)
             stop = tau * np.log((v - far) / -far) if v and way * far < 0 else np.inf
             span = min(left, stop)
             x += far * span + (v - far) * tau * -np.expm1(-span / tau)
@@ -214,8 +217,10 @@ SAMPLED = {
     "a dead band": {"dead_band": 0.02},
     "a dead band of the integral": {"dead_band": 0.02, "dead_band_of": "integral"},
     "late": {"delay": 2},
+    "a load": {"load": 0.3},
 }
-"""Options of a sampled controller: lengths in steps of the target, forces in friction at rest, delay in samples."""
+"""Options of a sampled controller: lengths in steps of the target, forces in friction at rest, delay in samples; and of
+the contact: the share of the controller's force that presses it."""
 
 
 def sampled(numbers, more, sample, until, bristles=None, rtol=1e-8):
@@ -223,13 +228,18 @@ def sampled(numbers, more, sample, until, bristles=None, rtol=1e-8):
     step = 2 * numbers["rest"] / numbers["kp"]
     units = dict.fromkeys(("force_limit", "integral_limit"), numbers["rest"])
     units |= {"resolution": step, "dead_band": step, "delay": sample}
+    load = more.get("load", 0.0)
+    more = {key: value for key, value in more.items() if key != "load"}
     given = {key: value if isinstance(value, str) else value * units[key] for key, value in more.items()}
     names = {"force_limit": "force", "integral_limit": "integral_limit", "dead_band": "band", "resolution": "encoder"}
     theirs = by_hand(
         step, until, **numbers, sample=sample, on_measurement="derivative" in more, of_integral="dead_band_of" in more,
-        delay=more.get("delay", 0), bristles=bristles, **{names[key]: given[key] for key in given if key in names},
+        delay=more.get("delay", 0), bristles=bristles, load=load,
+        **{names[key]: given[key] for key in given if key in names},
     )  # fmt: skip
     rig = axis(**numbers, sample_time=sample, **given)
+    if load:
+        rig = replace(rig, contact=ss.laws.Transmitted(preload=1.0, transmitted=load))
     if bristles:
         stiff, damped, slow = bristles
         law = ss.laws.LuGre(

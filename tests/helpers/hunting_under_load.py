@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import steadyslip as ss
 
-KINDS = tuple(itertools.product(("slider", "machine"), ("coulomb", "lugre"), ("continuous", "sampled")))
+KINDS = tuple(itertools.product(("slider", "machine"), ("coulomb", "viscous", "lugre"), ("continuous", "sampled")))
 AHEAD = 1e-9  # of the time scale, between leaving rest and the first look for the next
 
 
@@ -34,6 +34,8 @@ def random_numbers(random, body, law, control):
     if body == "machine":
         found |= {"table": float(random.uniform(0.3, 1.0)), "spring": float(random.uniform(20.0, 60.0)),
                   "damper": float(random.uniform(0.5, 1.5)), "pull": float(random.uniform(-0.3, 0.3))}  # fmt: skip
+    if law == "viscous":
+        found["viscous"] = float(random.uniform(0.1, 0.5))
     if law == "lugre":
         found |= {"stiff": float(10 ** random.uniform(2, 3)), "damped": float(random.uniform(3, 10)),
                   "slow": 1e-2, "viscous": float(random.uniform(0.1, 0.5))}  # fmt: skip
@@ -48,7 +50,7 @@ def rig_of(n):
             bristle_stiffness=n["stiff"], bristle_damping=n["damped"],
         )  # fmt: skip
     else:
-        law = ss.laws.Coulomb(mu_coulomb=n["sliding"], mu_static=n["rest"])
+        law = ss.laws.Coulomb(mu_coulomb=n["sliding"], mu_static=n["rest"], viscous=n["viscous"])
     contact = ss.laws.Transmitted(preload=n["preload"], transmitted=n["forward"], transmitted_back=n["back"])
     more = {"sample_time": n["sample"] or None, "force_limit": n["force"] if np.isfinite(n["force"]) else None}
     gains = {name: n[name] for name in ("kp", "kd", "ki")}
@@ -98,7 +100,7 @@ class Axis:
             bristles = y[1] - n["stiff"] * abs(y[1]) * y[5] / g
             friction = self.normal(y) * (n["stiff"] * y[5] + n["damped"] * bristles + n["viscous"] * y[1])
         else:
-            friction = self.way * n["sliding"] * self.normal(y)
+            friction = (self.way * n["sliding"] + n["viscous"] * y[1]) * self.normal(y)
         moved = 0.0 if self.stuck else (self.pushed(y) - friction) / n["mass"]
         table = (n["pull"] - self.belt(y)) / n["table"] if "table" in n else 0.0
         integral = 0.0 if n["sample"] else self.step - y[0]

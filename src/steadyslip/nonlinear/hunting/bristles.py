@@ -52,15 +52,16 @@ class Bristles:
     """
 
     def __init__(self, plant: Plant, rtol: float, scale: Array) -> None:
-        contacts = [one for one in plant.contacts if one.slow]
+        contacts = [one for one in plant.contacts if one.curved]
         self.scale, self.clock, self._contacts = scale.copy(), np.zeros(Held.SIZE), contacts
         self._out_of = _outputs(plant, contacts)
         self._maps: dict[HeldPiece, tuple[Array, Array]] = {}
         self.clock[[Held.RTOL, Held.SHORTEST, Held.LENGTH]] = rtol, SHORTEST, np.nan
         if contacts:
-            laws = tuple(one.port.friction for one in contacts)
+            laws = tuple(one.port.friction if one.slow else None for one in contacts)
             loaded = tuple(bool(one.loads) for one in contacts)
-            routine = _routine(_Kinds(tuple(map(shape_of, laws)), loaded, laws))
+            shapes = tuple(None if law is None else shape_of(law) for law in laws)
+            routine = _routine(_Kinds(shapes, loaded, laws))
             self.code, self.arrays = routine.code, (routine.constants(contacts), _tableau())
         else:
             layout = make_layout(lanes=1, size=0, kept=0, constants=0, inputs=0)
@@ -68,14 +69,14 @@ class Bristles:
             self.arrays = np.zeros(1), np.zeros((1, 1))
 
     def maps(self, piece: HeldPiece) -> tuple[Array, Array]:
-        """G and H in a mode."""
+        """G and H in a mode; G has no rows where the motion is linear."""
         if piece not in self._maps:
-            self._maps[piece] = _inputs(piece, self._contacts), self._out_of
+            self._maps[piece] = _inputs(piece, [] if piece.linear else self._contacts), self._out_of
         return self._maps[piece]
 
 
 class BristleSteps(Bristles):
-    """Steps of Rodas5P for contacts with memory; the length of a step is kept for the next piece."""
+    """Steps of Rodas5P for curved contacts; the length of a step is kept for the next piece."""
 
     def begin(self, piece: HeldPiece, state: Array) -> None:
         """Choose the first step, unless one has been taken."""
@@ -126,13 +127,17 @@ TOO_SHORT = "the motion of the bristles cannot be followed: steps become too sho
 
 
 def _inputs(piece: HeldPiece, contacts: Sequence[HeldContact]) -> Array:
-    """G, (inputs, width): slip rate, normal stress if a load presses, and memory of each contact in turn."""
+    """G, (inputs, width): slip rate, then normal stress if a load presses and memory, or drag, of each contact."""
     plant, found = piece.plant, []
     place = 2 * plant.size + 4
     for one in contacts:
+        index = plant.contacts.index(one)
         found.append(plant.slip(one))
+        if not one.slow:
+            found.append(piece.drag(index))
+            continue
         if one.loads:
-            found.append(piece.normal(plant.contacts.index(one)))
+            found.append(piece.normal(index))
         for _ in one.port.friction.memory():
             found.append(np.eye(plant.width)[place])
             place += 1
@@ -144,7 +149,7 @@ def _outputs(plant: Plant, contacts: Sequence[HeldContact]) -> Array:
     found, n, place, k = np.zeros((plant.width, plant.memory + len(contacts))), plant.size, 2 * plant.size + 4, 0
     for one in contacts:
         found[n : 2 * n, k] = -one.row / plant.inertia
-        for _ in one.port.friction.memory():
+        for _ in one.port.friction.memory() if one.slow else ():
             k += 1
             found[place, k] = 1.0
             place += 1
@@ -169,7 +174,7 @@ class _Kinds:
 
     shapes: tuple[Any, ...]
     loaded: tuple[bool, ...]
-    laws: tuple[FrictionLaw, ...] = field(compare=False)
+    laws: tuple[FrictionLaw | None, ...] = field(compare=False)
 
 
 @lru_cache(maxsize=64)
@@ -178,13 +183,21 @@ def _routine(kinds: _Kinds) -> _Routine:
 
 
 class _Routine:
-    """Compiled routine of some laws, whatever their numbers; of loaded contacts normal stress is a variable."""
+    """Compiled routine of some laws, whatever their numbers; of loaded contacts normal stress is a variable.
 
-    def __init__(self, laws: Sequence[FrictionLaw], loaded: Sequence[bool]) -> None:
+    Without a law it is the viscous friction of a load: slip rate times drag.
+    """
+
+    def __init__(self, laws: Sequence[FrictionLaw | None], loaded: Sequence[bool]) -> None:
         arguments: list[sp.Symbol] = []
         groups: list[list[sp.Symbol]] = []
         values: list[list[sp.Expr]] = []
         for index, (law, has_load) in enumerate(zip(laws, loaded, strict=True)):
+            if law is None:
+                v, drag = (inner_symbol(f"drag{index}.{k}", real=True) for k in range(2))
+                groups.append([v, drag])
+                values.append([v * drag])
+                continue
             names = _given(law)
             area, sigma, *given = own = [
                 inner_symbol(f"law{index}.{name}", real=True) for name in ("area", "sigma", *names)
@@ -217,6 +230,8 @@ class _Routine:
         """Constants of the routine for contacts with such laws."""
         given: list[Any] = []
         for one in contacts:
+            if not one.slow:
+                continue
             found = parameters(one.port.friction)
             given += [one.port.area, one.normal, *(found[name].value for name in _given(one.port.friction))]
         return np.array([float(value) for value in self._function(*given)] or [0.0])

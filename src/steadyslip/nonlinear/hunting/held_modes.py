@@ -1,6 +1,6 @@
 """Modes of a held rig: which contacts stick or slide, where the controller is limited; each a linear system.
 
-In a mode the motion is Y' = A Y (with the memory of bristles besides) as long as every guard, a row on Y, is not
+In a mode the motion is Y' = A Y (curved contacts besides) as long as every guard, a row on Y, is not
 negative; a guard that becomes so names the switch and its new position.
 """
 
@@ -74,6 +74,12 @@ class HeldPiece:
         self.sampled = plant.limits.sample_time is not None
 
     @cached_property
+    def linear(self) -> bool:
+        """True if the motion is Y' = A Y and nothing else: no bristles, and no slip under a load that makes drag."""
+        contacts = zip(self.plant.contacts, self.mode.contacts, strict=True)
+        return not any(one.slow or (way and one.curved) for one, way in contacts)
+
+    @cached_property
     def banded(self) -> Array:
         """Row of the error that is integrated, without its dead band."""
         band = self.plant.limits.dead_band
@@ -133,6 +139,12 @@ class HeldPiece:
         """Row of the largest friction force at rest of a contact."""
         own = self.plant.row(one=self.plant.contacts[index].rest)
         return sum((load.rest * row for load, row in self.pressing[index]), own)
+
+    def drag(self, index: int) -> Array:
+        """Row of the friction force per slip rate that the loads of a sliding contact make; 0 at rest."""
+        if not self.mode.contacts[index]:
+            return np.zeros(self.plant.width)
+        return sum((load.drag * row for load, row in self.pressing[index]), np.zeros(self.plant.width))
 
     def _coulomb(self, index: int) -> Array:
         own = self.plant.row(one=self.plant.contacts[index].coulomb)

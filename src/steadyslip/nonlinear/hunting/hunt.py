@@ -48,7 +48,7 @@ def hunt(
 
     The motion begins at rest at place 0, where the target is as well, and then moves as the protocol says. Contacts
     with Coulomb friction stick and slide, each piece a linear system that is solved exactly; those with bristles
-    (LuGre) are integrated.
+    (LuGre) are integrated, and viscous friction under a `transmitted` load while it slides.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def hunt(
     until : float or str, optional
         End of the motion (s). Without it, it ends where it rests, or a cycle repeats itself.
     rtol : float
-        Error per step allowed with bristles.
+        Error per step allowed where it is integrated.
     progress : callable, optional
         Called with the time reached and the number of strokes.
 
@@ -189,7 +189,7 @@ def _result(
     period = own[-1].start - own[-1 - count].start if count else np.nan
     hunts: bool | None = False if at_rest else True if count or motion.runs_away else _trend(own)
     rested = max([since, *(one.end for one in strokes if np.isfinite(one.end))])
-    creeps = any(motion.mode.contacts) or not motion.exact
+    creeps = any(motion.mode.contacts) or bool(motion.plant.memory)
     settled = (motion.time if creeps else rested) if at_rest else np.nan
     if at_rest:
         seen = -motion.watched[0:1] @ motion.state

@@ -44,7 +44,7 @@ class Hunt(ReadOnly):
     period : float
         Duration of the cycle (s), with strokes to and fro; NaN if it does not repeat.
     repeats : bool
-        True if the last cycle is that before, to 1e-9 (with bristles to a hundred times `rtol`).
+        True if the last cycle is that before, to 1e-9 (where it is integrated, to a hundred times `rtol`).
     strokes : tuple of Stroke
         Motions between two rests; `begins` and `ends` are errors (target less place).
     time, error, velocity, force : ndarray
@@ -52,7 +52,7 @@ class Hunt(ReadOnly):
     exact : bool
         True if every piece is solved exactly.
     rtol : float
-        Error per step allowed with bristles.
+        Error per step allowed where it is integrated.
     settled_at : float
         Time from which on it rests (s); NaN if it does not.
     unit, force_unit : str
@@ -170,11 +170,9 @@ class Hunt(ReadOnly):
         accuracy = "exact pieces" if self.exact else f"rtol {self.rtol:g}"
         lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")
         if self.stopped:
-            way = (
-                "a larger sample_time"
-                if self.exact
-                else "a larger sample_time or rtol, or law = 'coulomb' with mu_static,"
-            )
+            way = "a larger sample_time" if self.exact else "a larger sample_time or rtol"
+            if any(one.friction.memory() for one in self.rig.mechanism().contacts):
+                way += ", or law = 'coulomb' with mu_static,"
             lines.append(f"stopped there   the work was used up; {way} takes less")
         return "\n".join(lines)
 

@@ -86,7 +86,7 @@ class CompiledMotion:
         """
         clock, bristles = self.clock, self.bristles
         guards, _ = piece.guards
-        if not (self.period or self.plant.memory or piece in self.passages):
+        if piece.linear and not (self.period or piece in self.passages):
             self._add(piece, watched, 1.0 / piece.fastest)
         clock[Held.EVERY] = self._every(piece)
         clock[Held.ROWS], clock[Held.MOST_STEPS] = 0, clock[Held.STEPS] + AT_ONCE
@@ -107,7 +107,7 @@ class CompiledMotion:
         """Nodes of a step from one kept value to the next: a force that stays needs only its ends."""
         if self.clock[Held.RESTS]:
             return NODES - 1
-        if self.plant.memory or not self.period:
+        if not (piece.linear and self.period):
             return (NODES - 1) // 4
         turned = piece.fastest * self.period
         return (NODES - 1) // (1 if turned <= FEW else 2 if turned <= 2 * FEW else 4)

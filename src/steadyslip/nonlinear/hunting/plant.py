@@ -6,6 +6,7 @@ target and its velocity, the force of a sampled controller, the memory of the co
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -35,8 +36,9 @@ class Load:
         Share of the controller's force.
     forward, back : float
         Shares of T > 0 and of T < 0.
-    rest, coulomb : float
-        Friction force at rest and in sliding per normal stress; 0 for a law with memory.
+    rest, coulomb, drag : float
+        Friction force at rest, and in sliding its constant part and that per slip rate, all per normal stress; 0 for a
+        law with memory.
     """
 
     places: Array
@@ -46,6 +48,7 @@ class Load:
     back: float
     rest: float = 0.0
     coulomb: float = 0.0
+    drag: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +82,11 @@ class HeldContact:
     normal: float
     slow: float = 0.0
     loads: tuple[Load, ...] = ()
+
+    @property
+    def curved(self) -> bool:
+        """True if its friction is no linear function of the state: of bristles, or of a slip rate times a load."""
+        return bool(self.slow) or any(load.drag for load in self.loads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +168,10 @@ def plant_of(rig: Slider | Machine) -> Plant:
     """
     mechanism = rig.mechanism()
     names = [one.name for one in mechanism.coordinates]
-    return replace(free_plant(rig), contacts=_merged([_contact(mechanism, one, names) for one in mechanism.contacts]))
+    contacts = _merged([_contact(mechanism, one, names) for one in mechanism.contacts])
+    plant = replace(free_plant(rig), contacts=contacts)
+    _check_forces_at_rest(plant)
+    return plant
 
 
 def free_plant(rig: Slider | Machine) -> Plant:
@@ -239,13 +250,7 @@ def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldC
     rest, coulomb, drag = (
         float(port.area * value) for value in (law.rest_strength(1), sliding.subs(v, 0), sliding.diff(v))
     )
-    if loads and drag:
-        raise NotAvailable(
-            f"{label}friction.viscous: with contact law = 'transmitted' its force is a product of speed and load, of "
-            "which hunting has no exact motion; write it in a second contact of the body, of law 'constant', or take "
-            "law = 'lugre'"
-        )
-    loads = tuple(replace(one, rest=rest, coulomb=coulomb) for one in loads)
+    loads = tuple(replace(one, rest=rest, coulomb=coulomb, drag=drag) for one in loads)
     return HeldContact(row, belt, sigma * rest, sigma * coulomb, sigma * drag, port, sigma, loads=loads)
 
 
@@ -293,11 +298,24 @@ def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
                     other.row, other.belt, other.rest + abs(ratio) * one.rest, other.coulomb + abs(ratio) * one.coulomb,
                     other.drag + ratio**2 * one.drag, other.port, other.normal,
                     loads=other.loads + tuple(
-                        replace(load, rest=abs(ratio) * load.rest, coulomb=abs(ratio) * load.coulomb)
-                        for load in one.loads
+                        replace(
+                            load, rest=abs(ratio) * load.rest, coulomb=abs(ratio) * load.coulomb,
+                            drag=ratio**2 * load.drag,
+                        ) for load in one.loads
                     ),
                 )  # fmt: skip
                 break
         else:
             found.append(one)
     return tuple(found)
+
+
+def _check_forces_at_rest(plant: Plant) -> None:
+    """Refuse contacts at rest that would have to balance friction which is no linear function of the state."""
+    for one, other in itertools.permutations(plant.contacts, 2):
+        if not one.slow and other.curved and one.row @ (other.row / plant.inertia):
+            at_rest, moves = (f"contacts.{contact.port.name}" for contact in (one, other))
+            raise NotAvailable(
+                f"{at_rest}.friction: at rest it would balance the friction of {moves}, bent by the motion, and "
+                "hunting has no such balance; write law = 'lugre' in both"
+            )

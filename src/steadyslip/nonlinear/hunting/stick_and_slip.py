@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.kernels.layout import Control, Held
-from steadyslip.nonlinear.hunting.bristles import Bristles, BristleSteps
+from steadyslip.nonlinear.hunting.bristles import BristleSteps
 from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece, Switch
 from steadyslip.nonlinear.hunting.in_mode import CompiledMotion
 from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
@@ -101,14 +101,12 @@ class Motion:
         self.pieces: dict[tuple[HeldMode, float], HeldPiece] = {}
         self.acceleration = 0.0
         self.changes = len(segments.end[0])
-        self.exact = not plant.memory
+        self.exact = not any(one.curved for one in plant.contacts)
         self.still = STILL if self.exact else max(STILL, STILL_ERROR * rtol)
-        self.stepper: ExactSteps | BristleSteps = (
-            ExactSteps() if self.exact else BristleSteps(plant, rtol, natural_sizes(plant, self.largest_load))
-        )
+        self._exact_steps = ExactSteps()
+        self._bristle_steps = BristleSteps(plant, rtol, natural_sizes(plant, self.largest_load))
         self.sampled = plant.limits.sample_time is not None
-        own = self.stepper if isinstance(self.stepper, BristleSteps) else Bristles(plant, rtol, self.state)
-        self.core = CompiledMotion(plant, own)
+        self.core = CompiledMotion(plant, self._bristle_steps)
         self.fresh: frozenset[tuple[str, int]] = frozenset()
         self.at_once = 0
         self.watched = np.array([plant.error(), plant.row(None, plant.places[0]), plant.row()])
@@ -143,7 +141,8 @@ class Motion:
 
     def _to(self, end: float) -> Iterator[Stroke | None]:
         """Go on to the end, or in the compiled core until the mode may change, and by a step or to a sample then."""
-        if self.sampled or not self.exact or (self._piece().fastest > 0 and not self.fresh):
+        piece = self._piece()
+        if self.sampled or not piece.linear or (piece.fastest > 0 and not self.fresh):
             end = self._follow(end)
             yield None
         while self.time < end:
@@ -157,8 +156,8 @@ class Motion:
         last = strokes[-1] if strokes else Stroke(0.0, 0.0)
         rests = self.sampled and not any(self.mode.contacts)
         since = last.end if np.isfinite(last.end) else 0.0
-        if isinstance(self.stepper, BristleSteps):
-            self.stepper.begin(self._piece(), self.state)
+        if not self._piece().linear:
+            self._bristle_steps.begin(self._piece(), self.state)
         clock[[Held.TIME, Held.END, Held.RESTS, Held.SINCE]] = self.time, end, rests, since
         clock[[Held.LOWEST, Held.HIGHEST, Held.FASTEST]] = last.lowest, last.highest, last.fastest
         clock[[Held.STILL, Held.PACE, Held.FAR]] = self.still, self._pace, self._far
@@ -181,15 +180,19 @@ class Motion:
             self.pieces[key] = HeldPiece(self.plant, *key, LEAST_LOAD * self.largest_load)
         return self.pieces[key]
 
+    @property
+    def _stepper(self) -> ExactSteps | BristleSteps:
+        return self._exact_steps if self._piece().linear else self._bristle_steps
+
     def _step(self, end: float) -> Stroke | None:
         """Take one step, at most to a switch or the `end`; the stroke that it completes, or None."""
-        piece = self._piece()
-        length, coefficients = self.stepper.step(piece, self.state, end - self.time)
+        piece, stepper = self._piece(), self._stepper
+        length, coefficients = stepper.step(piece, self.state, end - self.time)
         self.steps += 1
         rows, switches = piece.guards
         guards = rows @ coefficients.T
         fresh = np.array([(one.name, one.number) in self.fresh for one in switches], dtype=bool)
-        noise = self.stepper.noise(piece, rows, coefficients, length) if fresh.any() else np.zeros((len(rows), 3))
+        noise = stepper.noise(piece, rows, coefficients, length) if fresh.any() else np.zeros((len(rows), 3))
         begun = [
             one.name == "contact" and bool(self.mode.contacts[one.number]) and not self.plant.contacts[one.number].slow
             for one in switches
@@ -208,7 +211,7 @@ class Motion:
             if self.time + 1e-15 * abs(end) >= end:
                 self.time = end
             return None
-        self.state = self.stepper.until(piece, self.state, coefficients, length, share)
+        self.state = stepper.until(piece, self.state, coefficients, length, share)
         self.at_once += 1
         if self.at_once > AT_ONCE:
             raise NotAvailable("the contacts switch between rest and sliding without time passing; not decided")
@@ -321,16 +324,16 @@ class Motion:
         largest.
         """
         n = self.plant.size
-        if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and not self.exact):
+        if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and self.plant.memory):
             return False
         if self.sampled and not (self.core.constant and not any(self.mode.contacts)):
             return False
         pace = self.still * self._pace
         if np.any(np.abs(self.state[n : 2 * n]) > pace):
             return False
-        rates = self.stepper.rate(self._piece(), self.state)
-        moves = any(self.mode.contacts) or not self.exact  # a bristle can bend at any force, so that none is stuck
-        if moves and np.any(np.abs(rates[n : 2 * n]) > pace * self.stepper.fastest(self._piece(), self.state)):
+        rates = self._stepper.rate(self._piece(), self.state)
+        moves = any(self.mode.contacts) or bool(self.plant.memory)  # bristles bend at any force
+        if moves and np.any(np.abs(rates[n : 2 * n]) > pace * self._stepper.fastest(self._piece(), self.state)):
             return False
         if self.sampled:
             return True
@@ -364,16 +367,18 @@ def _reach(segments: Segments) -> float:
 
 
 def natural_sizes(plant: Plant, pull: float) -> Array:
-    """Least sizes of the variables, from which errors of contacts with memory are counted.
+    """Least sizes of the variables, from which errors of curved contacts are counted; without any they do not matter.
 
     `pull` is the size of the loads (N, or Pa) that may press contacts besides their preload.
     """
     found = np.full(plant.width, 1.0)
     n = plant.size
-    slow = [one for one in plant.contacts if one.slow]
     friction, speed = 0.0, 0.0
     place = 2 * n + 4
-    for one in slow:
+    for one in plant.contacts:
+        if not one.slow:
+            friction = max(friction, friction_at_rest(one, pull))
+            continue
         law, normal = one.port.friction, largest_normal(one, pull)
         memory = [float(value) for value in law.steady_memory(one.slow, normal)]
         found[place : place + len(memory)] = np.abs(memory)
@@ -381,8 +386,10 @@ def natural_sizes(plant: Plant, pull: float) -> Array:
         friction = max(friction, float(one.port.area * law.steady_strength(one.slow, normal)))
         speed = max(speed, one.slow)
     stiff = plant.gains[0][0] + float(np.max(np.diag(plant.stiffness)))
-    friction = friction or stiff * float(np.max(found[2 * n + 4 : place]))  # nothing presses: as bristles bend at most
-    found[:n] = found[2 * n + 1] = friction / stiff if stiff else 1.0
+    if not friction:  # nothing presses: as bristles bend at most
+        friction = (stiff or 1.0) * float(np.max(found[2 * n + 4 : place], initial=0.0)) or 1.0
+    found[:n] = found[2 * n + 1] = far = friction / stiff if stiff else 1.0
+    speed = speed or float(np.sqrt(friction * far / plant.inertia.max()))  # gained over that way
     found[n : 2 * n] = found[2 * n + 2] = speed
     found[2 * n] = friction / plant.integral if plant.integral else 1.0
     found[2 * n + 3] = friction

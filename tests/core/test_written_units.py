@@ -3,6 +3,7 @@
 import dataclasses
 import pickle
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from javascript import Script
 from steadyslip.core.dimensions import unit
 from steadyslip.core.format import digits_apart, format_quantity, own_units
 from steadyslip.core.written import display_units
+from steadyslip.reports.brief import _results_table
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 AXIS = """
 [friction]
 law = "lugre"
@@ -166,3 +169,59 @@ def test_close_values_are_told_apart():
         many = digits_apart(value, other)
         assert format_quantity(value, "m", many) != format_quantity(other, "m", many)
     assert digits_apart(1.0, 1.0) == digits_apart(0.0, 1.0) == 4
+
+
+FAMILIES = {
+    "forces": ({}, "N", "N/µm"),
+    "stresses": ({'"12 N/um"': '"0.6 GPa/m"', '"240 kg"': '"12 t/m^2"', '"5 N s/mm"': '"250 kPa s/m"',
+                  '"400 N/um at 3.2 kN"': '"125000 1/m"', 'preload = "3.2 kN"': 'preload = "0.16 MPa"'}, "Pa", "MPa/m"),
+    "both": ({'preload = "3.2 kN"': 'preload = "0.16 MPa"'}, "Pa", "N/µm"),
+    "numbers": ({'"12 N/um"': "12e6", '"240 kg"': "240", '"5 N s/mm"': "5e3", '"400 N/um at 3.2 kN"': '"125000 1/m"',
+                 'preload = "3.2 kN"': "preload = 3200"}, "N", "MN/m"),
+}  # fmt: skip
+"""The axis as its author may write it: changes of the text, then units in which stress and stiffness are told."""
+
+
+def test_an_area_given_later_makes_forces():
+    """Of a file in stresses without one, as the documents say."""
+    stresses = ss.read_rig(EXAMPLES / "inclined-spring.toml")
+    assert "normal stress 16.67 MPa" in str(ss.steady_state(stresses))
+    assert "normal force 166.7 kN" in str(ss.steady_state(dataclasses.replace(stresses, area=0.01)))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_file_is_told_in_the_forces_or_stresses_that_it_is_written_in(family, tmp_path):
+    """Each quantity in its own; a file in MPa with an area was told in forces, in texts, figures, maps and pages."""
+    changes, pressed, stiff = FAMILIES[family]
+    text = AXIS
+    for one, other in changes.items():
+        assert one in text
+        text = text.replace(one, other)
+    rig = ss.rig_from_text(text)
+    word = {"N": "force", "Pa": "stress"}[pressed]
+    told, plain_stiff = str(ss.analyze(rig)), stiff.replace("µ", "u")
+    assert re.search(rf"normal {word} [\d.]+ k{pressed} \(", told)
+    assert re.search(rf"critical stiffness [\d.]+ {plain_stiff}\b", told)
+    assert re.search(rf"contact.preload +[\d.]+ k{pressed} ", told)
+    assert re.search(rf"normal {word} +[\d.]+ k{pressed} to", str(ss.simulate(rig, until=0.1)))
+    assert re.search(rf"normal {word} [\d.]+ k{pressed}, shear {word}", str(ss.steady_state(rig)))
+    assert str(ss.boundary(rig, "stiffness")[0]).split()[3] == f"{plain_stiff}:"
+    chart = ss.figures.stability_chart(rig, "preload", "stiffness")
+    assert (f"(k{pressed})" in chart.get_xlabel(), f"({stiff})" in chart.get_ylabel()) == (True, True)
+    found = ss.run_map(ss.Map(rig, {"stiffness": [0.5e9, 0.8e9]}), tmp_path / "map.zarr")
+    assert plain_stiff in str(found)
+    assert str(ss.open_map(tmp_path / "map.zarr")) == str(found)
+    page = ss.explore(rig).html
+    area = '"area":null' if pressed == "Pa" else '"area":0.02'
+    assert area in page
+
+
+def test_rates_and_frequencies_are_told_in_their_own_units():
+    """With Kv in 1/min a mode was told at 331.7 1/min, and in a file with rpm the frequency of an edge in rpm."""
+    with display_units(["1/min", "rpm"]):
+        assert format_quantity(5.0, "Hz") == "5 Hz"
+        assert format_quantity(20.0, "1/s") == "1200 1/min"
+    edge = ss.boundary(ss.rig_from_text(AXIS), "stiffness")[0]
+    with display_units(["1/min", "rpm"]):
+        table = _results_table([edge], 1.0)
+    assert f"{edge.angular_frequency:.4g} rad/s" in re.sub("<[^>]+>", "", table).replace("\xa0", " ")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from steadyslip.core.dimensions import Dimension, unit
+from steadyslip.core.written import display_names
 
 AREA = Dimension(length=2)
 TOTALS = ("N", "N/m", "N s/m", "N/m/s", "kg", "N s")
@@ -31,12 +33,43 @@ def total_unit(unit_name: str) -> str:
 def outside(unit_name: str, area: float | None) -> tuple[float, str]:
     """Factor and unit that turn an inside value into one for users: the total of the contact if there is an area (m²).
 
-    Reading, printing, drawing and tables all use this function.
+    Reading and tables use this function; printing and drawing as well, of the area that `told_area` leaves.
 
     >>> outside("Pa/m", 0.01), outside("Pa/m", None), outside("m/s", 0.01)
     ((0.01, 'N/m'), (1.0, 'Pa/m'), (1.0, 'm/s'))
     """
     return (area, total_unit(unit_name)) if area is not None and is_per_area(unit_name) else (1.0, unit_name)
+
+
+def told_area(unit_name: str, area: float | None) -> float | None:
+    """The area (m²), or None if the file of the context has an area but writes such quantities as stresses.
+
+    It does where it has this per-area unit and not the total's, such as MPa and no N; where it has neither, as in most
+    of its other quantities. What reads, and what computers read, does not ask. An area that is not from the file, but
+    was given to the rig later, makes forces of all.
+
+    >>> from steadyslip.core.written import display_units
+    >>> with display_units(["MPa", "N/um", "cm^2"]):
+    ...     told_area("Pa", 0.01), told_area("Pa/m", 0.01)
+    (None, 0.01)
+    """
+    if area is None or not is_per_area(unit_name):
+        return area
+    own = unit(unit_name)[1]
+    stresses, forces = _families(display_names())
+    if AREA not in stresses:
+        return area
+    if (own in stresses) != (own.times(AREA) in forces):
+        return area if own not in stresses else None
+    return area if forces or stresses == {AREA} else None
+
+
+@lru_cache(maxsize=256)
+def _families(names: frozenset[str]) -> tuple[frozenset[Dimension], frozenset[Dimension]]:
+    """Dimensions of the quantities per area and areas, and of the totals, among units."""
+    found = {unit(name)[1] for name in names}
+    forces = {unit(name)[1] for name in TOTALS}
+    return frozenset(one for one in found if one == AREA or one.times(AREA) in forces), frozenset(found & forces)
 
 
 def totals(values: Mapping[str, float | None], units: Mapping[str, str], area: float | None) -> dict[str, Any]:
@@ -64,5 +97,5 @@ def _times(value: float | None, factor: float) -> float | None:
 
 
 def stress_name(name: str, area: float | None) -> str:
-    """A name with "stress" replaced by "force" if the rig has an area, since its totals are forces."""
-    return name if area is None else name.replace("stress", "force")
+    """A name with "stress" replaced by "force" if the rig has an area, and is told in forces."""
+    return name if told_area("Pa", area) is None else name.replace("stress", "force")

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
-from steadyslip.core.areas import outside
+from steadyslip.core.areas import outside, told_area
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
 from steadyslip.core.written import display_load, display_names
 from steadyslip.units import day, hour, year
@@ -48,6 +48,16 @@ def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
         for kind, several in found.items()
         if kind == _SPEED or kind.angle or any(map(_is_own, several))
     }
+
+
+def units_for(si_unit: str, names: frozenset[str]) -> tuple[str, ...]:
+    """Units of a context in which a quantity of an SI unit is told; frequencies not in those of rates, such as of Kv.
+
+    >>> units_for("1/s", frozenset({"1/min"})), units_for("Hz", frozenset({"1/min"}))
+    (('1/min',), ())
+    """
+    found = own_units(names).get(unit(si_unit)[1], ())
+    return tuple(name for name in found if "Hz" in name) if si_unit == "Hz" else found
 
 
 def _is_own(name: str) -> bool:
@@ -107,11 +117,11 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     >>> format_quantity(8.72093e9, "Pa/m", area=0.01)
     '87.21 MN/m'
     """
-    factor, si_unit = outside(si_unit, area)
+    factor, si_unit = outside(si_unit, told_area(si_unit, area))
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
-    names = _at_one_load(own_units(display_names()).get(unit(si_unit)[1], ()), display_load())
+    names = _at_one_load(units_for(si_unit, display_names()), display_load())
     own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
     longest = _LONGEST if own is not None and _is_own(own) else _LONG
@@ -157,7 +167,7 @@ def format_with_error(value: float, error: float, si_unit: str, area: float | No
     >>> format_with_error(7e-17, 350.0, "s/m"), format_with_error(1.2e-9, 3.5e-5, "m")
     ('0 ± 350 s/m', '0 ± 35 um')
     """
-    scale, si_unit = outside(si_unit, area)
+    scale, si_unit = outside(si_unit, told_area(si_unit, area))
     value, error = value * scale, error * scale
     if abs(value) < HIDDEN * error < math.inf:
         return f"0 ± {format_quantity(error, si_unit, 2)}"
@@ -172,7 +182,7 @@ def format_range(low: float, high: float, si_unit: str, area: float | None = Non
     >>> format_range(8.52e-6, 1.195e-5, "m"), format_range(0.599974, 0.600023, "1")
     ('8.52 to 11.95 um', '0.599974 to 0.600023')
     """
-    factor, si_unit = outside(si_unit, area)
+    factor, si_unit = outside(si_unit, told_area(si_unit, area))
     low, high = low * factor, high * factor
     if math.isfinite(low) and math.isfinite(high) and low != high:
         digits = max(digits, min(2 + math.floor(math.log10(max(abs(low), abs(high)) / abs(high - low))), MOST_DIGITS))

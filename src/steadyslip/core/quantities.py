@@ -236,15 +236,18 @@ _EXAMPLES = {
 
 
 def units_in(values: Any) -> set[str]:
-    """Units of the quantities among texts, also inside lists and tables."""
-    found, left = set(), [values]
+    """Units of the quantities among texts, also inside lists and tables; beside them that of an area without one."""
+    found, areas, left = set(), set(), [values]
     while left:
         one = left.pop()
         if isinstance(one, (dict, list, tuple, set)):
             left += one.values() if isinstance(one, dict) else one
+            if isinstance(one, dict) and isinstance(one.get("area"), (int, float)):
+                areas.add("m^2")  # so that an area is known to be of this file
         elif isinstance(one, str) and len(one) <= MOST_TEXT and (match := _NUMBER.match(one.strip())):
             found.add(one.strip()[match.end() :].strip())
-    return {name for name in found if name and _is_unit(name)}
+    found = {name for name in found if name and _is_unit(name)}
+    return found | areas if found else found
 
 
 def _is_unit(name: str) -> bool:

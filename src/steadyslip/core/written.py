@@ -42,6 +42,22 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
         _names.reset(before)
 
 
+@contextmanager
+def si_units() -> Iterator[None]:
+    """Context in which the user's units do not count: of rates and frequencies, which are no speeds or gains.
+
+    >>> from steadyslip.core.format import format_quantity
+    >>> with display_units(["rpm"]), si_units():
+    ...     format_quantity(110.9, "rad/s")
+    '110.9 rad/s'
+    """
+    before = _names.set(frozenset())
+    try:
+        yield
+    finally:
+        _names.reset(before)
+
+
 def display_load() -> float | None:
     """Load of the contact of which quantities are told, N; None if it is not known."""
     return _load.get()

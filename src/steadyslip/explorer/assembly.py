@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from steadyslip.core.areas import outside
+from steadyslip.core.areas import outside, told_area
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.format import own_units
+from steadyslip.core.format import units_for
 from steadyslip.core.palette import DARK, FORCED, LIGHT
 from steadyslip.core.records import Address
 from steadyslip.core.version import version
-from steadyslip.core.written import display_names
+from steadyslip.core.written import display_names, in_written_units
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.minify import (
@@ -192,6 +192,7 @@ def _read_web(name: str) -> str:
     return files("steadyslip.explorer.web").joinpath(name).read_text(encoding="utf-8")
 
 
+@in_written_units
 def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any], text: str) -> dict[str, Any]:
     """Data of the page of a rig: parameters, rig file, sentences, checks."""
     names = list(_variable_parameters(rig, facts))
@@ -203,7 +204,8 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "title": title,
         "version": version(),
         "branch": branch,
-        "area": rig.area,
+        "area": told_area("Pa", rig.area),
+        "stiffnessArea": told_area("Pa/m", rig.area),
         "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],
         "facts": {key: value for key, value in facts.items() if key != "parameters"},  # the page has them from `places`
         "places": places,
@@ -240,9 +242,8 @@ def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
 
     Those of friction per load, which a page tells of single parameters only, are left out.
     """
-    own = own_units(display_names().union(rig.written_in))
     told = {outside(one.role.unit, rig.area_of(name))[1] for name, one in rig.parameters().items()}
-    units = {si: own.get(unit(si)[1], ()) for si in sorted(told | _TOLD_BESIDES) if si != "1"}
+    units = {si: units_for(si, display_names()) for si in sorted(told | _TOLD_BESIDES) if si != "1"}
     return {
         si: [(name, unit(name)[0]) for name in names]
         for si, names in units.items()

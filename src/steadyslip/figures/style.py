@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
-from steadyslip.core.areas import outside, stress_name
+from steadyslip.core.areas import outside, stress_name, told_area
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
@@ -235,7 +235,7 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     ((1000000000.0, 'GPa/m'), 'deg')
     """
     name = format_quantity(typical, si_unit, area=area).partition(" ")[2]
-    factor = (unit(name)[0] if name else 1.0) / outside(si_unit, area)[0]
+    factor = (unit(name)[0] if name else 1.0) / outside(si_unit, told_area(si_unit, area))[0]
     return factor, typeset(name)
 
 

@@ -19,6 +19,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord, parameters
+from steadyslip.core.written import si_units
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.machine.machine import Machine
@@ -57,6 +58,7 @@ _BY_UNIT = {
     "N/m": "stiffness",
     "m/N": "receptance deviation",
 }
+_RATES = frozenset(f"{_BY_UNIT['rad/s']} {_BY_UNIT['1/s']}".split())
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
 RESULT_UNIT = frozenset("value error low high amount absolute values lowest highest".split())  # noqa: SIM905 -- a list of words
 DIMENSIONLESS = frozenset(
@@ -233,7 +235,7 @@ def _shown_attributes(result: Any) -> Iterator[tuple[str, Any]]:
 def _attribute_rows(result: Any) -> Iterator[tuple[str, Any]]:
     area = getattr(result, "area", None) or getattr(getattr(result, "rig", None), "area", None)
     for name, value in _shown_attributes(result):
-        cell = _cell(value, unit_of(result, name), area)
+        cell = _named_cell(result, name, value, area)
         if cell:
             yield name.replace("_", " "), cell
 
@@ -248,6 +250,15 @@ def unit_of(result: Any, name: str) -> str:
     if isinstance(own, str) and name in RESULT_UNIT | _BY_TYPE.get(type(result).__name__, set()):
         return own
     return UNITS.get(name, "1")
+
+
+def _named_cell(result: Any, name: str, value: Any, area: float | None) -> Any:
+    """`_cell` of an attribute of a result; growth rates and angular frequencies are no speeds of turning or gains."""
+    unit = unit_of(result, name)
+    if name in _RATES:
+        with si_units():
+            return _cell(value, unit, area)
+    return _cell(value, unit, area)
 
 
 def _cell(value: Any, unit: str, area: float | None) -> Any:
@@ -323,4 +334,4 @@ def _short_cell(result: Any, name: str, area: float | None) -> Any:
     """Cell of a table of results: numbers, text and bool; empty for anything else."""
     value = getattr(result, name, None)
     own = getattr(result, "area", None) or area
-    return _cell(value, unit_of(result, name), own) if isinstance(value, bool | int | float | str) else ""
+    return _named_cell(result, name, value, own) if isinstance(value, bool | int | float | str) else ""

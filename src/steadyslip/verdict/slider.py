@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.areas import stress_name
+from steadyslip.core.areas import stress_name, told_area
 from steadyslip.core.checks import Check
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
@@ -72,11 +72,11 @@ def checked_stiffness_numbers(rig: Slider, point: OperatingPoint) -> tuple[dict[
 
 def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
     """Rows (label, text) on steady sliding, and on what T, the force that presses the contact, contains."""
-    force = "force" if analysis.rig.area is not None else "stress"
+    normal, shear = (stress_name(f"{one} stress", analysis.rig.area) for one in ("normal", "shear"))
     steady = analysis.steady
     text = (
-        f"normal {force} {_stress(analysis, steady.normal_stress)}, "
-        f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}"
+        f"{normal} {_stress(analysis, steady.normal_stress)}, "
+        f"{shear} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}"
     )
     return [("steady sliding", text), *_pull(analysis.rig)]
 
@@ -92,12 +92,13 @@ def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def _stress(analysis: Findings, value: float) -> str:
+    """Stress as it is told; of a rig with an area as force and stress, in the order in which its file has them."""
     area = analysis.rig.area
-    return (
-        format_quantity(value, "Pa")
-        if area is None
-        else f"{format_quantity(value * area, 'N')} ({format_quantity(value, 'Pa')})"
-    )
+    stress = format_quantity(value, "Pa")
+    if area is None:
+        return stress
+    force = format_quantity(value * area, "N")
+    return f"{stress} ({force})" if told_area("Pa", area) is None else f"{force} ({stress})"
 
 
 def _pull(rig: Slider) -> list[tuple[str, str]]:

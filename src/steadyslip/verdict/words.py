@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
-from steadyslip.core.format import digits_apart, format_quantity, format_range
+from steadyslip.core.format import digits_apart, format_growth, format_quantity, format_range
 from steadyslip.core.written import of_load
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.machine.letters import said
@@ -65,7 +65,7 @@ def eigenvalue_row(s: complex) -> tuple[str, str, str]:
     kind = "grows" if s.real > 0 else "decays" if s.real < 0 else "stays"
     time = format_quantity(math.log(2) / abs(s.real), "s") if s.real else ""
     period = format_quantity(2 * math.pi / abs(s.imag), "s") if s.imag else NO_PERIOD
-    return format_quantity(s.real, "1/s"), period, PACE[kind].format(time=time)
+    return format_growth(s.real), period, PACE[kind].format(time=time)
 
 
 STABLE_MEANS = "Stable means: small disturbances die out. A large enough kick may still start {what}."

@@ -7,7 +7,6 @@ import { NEW } from "./rig.js";
 
 /** Text of a stress, or of a force for rigs with an area. */
 export function quantity(value, unit, area, many = 4) {
-  if (area !== null && unit === "Pa/m") return shown(value * area, "N/m", many);
   return area !== null && unit === "Pa" ? shown(value * area, "N", many) : shown(value, unit, many);
 }
 
@@ -15,7 +14,7 @@ export function quantity(value, unit, area, many = 4) {
 export const named = (text, unit) => (unit[0] === "N" ? text.replace(/stress(es)?/g, (_, many) => (many ? "forces" : "force")) : text);
 
 /** Parameter data with which a stiffness along the slide is shown: in the unit of the user's file if it has one. @param {any} data */
-export function asStiffness({ parameters, stiffness, area }) {
+export function asStiffness({ parameters, stiffness, stiffnessArea: area }) {
   const unit = area === null ? "Pa/m" : "N/m", given = parameters.find((one) => one.name === stiffness);
   return { unit, factor: area ?? 1, own: given?.unit === unit ? given.own : NEW };
 }

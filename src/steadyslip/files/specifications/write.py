@@ -8,7 +8,6 @@ from os import PathLike
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import own_units
 from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Named, key_of
 from steadyslip.core.roles import Entry
@@ -106,8 +105,8 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
 
 def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     """Text of `rig_to_text` for stored results, with the units in which the rig is told."""
-    units = sorted(name for names in own_units(frozenset(rig.written_in)).values() for name in names)
-    return (f"{TOLD_IN}{'; '.join(units)}\n" if units else "") + rig_to_text(rig, protocol)
+    units = "; ".join(sorted(rig.written_in))
+    return (f"{TOLD_IN}{units}\n" if units else "") + rig_to_text(rig, protocol)
 
 
 def settings_to_text(section: Section, settings: FrozenRecord) -> str:

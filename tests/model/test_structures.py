@@ -231,14 +231,126 @@ def test_modes_are_read_from_a_table(tmp_path):
     assert abs(ss.eigenvalues(machine)[0] - (12.4673358145 + 4565.039870161j)) < 1e-9 * 4565
 
 
+# Node 1 of the reed is clamped; directions 1, 2 and 6 of each node are x, y and the rotation.
+NAMES = [(node, way) for node in range(1, 22) for way in (1, 2, 6)]
+TO_MM = np.tile([1e3, 1e3, 1.0], 20)  # size in mm and rad of coordinates of 1 m and 1 rad
+NAMED = 'x = "21.1"\ny = "21.2"'
+
+
+def in_tonnes(matrix):
+    """A matrix in N, mm, t and s: energies are in mJ there, and displacements in mm."""
+    return 1e3 * matrix / np.outer(TO_MM, TO_MM)
+
+
+def lines(matrix, labels, form, upper=False):
+    """Entries of one triangle as text."""
+    rows, columns = np.nonzero(np.triu(matrix) if upper else np.tril(matrix))
+    return "".join(form.format(*labels[i], *labels[j], float(matrix[i, j])) for i, j in zip(rows, columns, strict=True))
+
+
+def clamped(matrix, held):
+    """The reed's matrix with the node that is clamped."""
+    found = np.zeros((63, 63))
+    found[3:, 3:] = matrix
+    found[range(3), range(3)] = held
+    return found
+
+
+def test_matrices_of_abaqus_calculix_and_nastran_are_the_reed(tmp_path):
+    """Written as the programs do: held degrees of freedom, one triangle, mm and tonnes, nodes in any order."""
+    mass, damping, stiffness = (in_tonnes(one) for one in reed_matrices())
+    form = "{:d},{:d}, {:d},{:d}, {:.16e}\n"
+    for word, one, held in (("MASS", mass, 1.0), ("STIF", stiffness, 1e36), ("DMPV", damping, 0.0)):
+        text = lines(clamped(one, held), NAMES, form).splitlines(keepends=True)
+        (tmp_path / f"Job-1_{word}2.mtx").write_text("".join(reversed(text)))
+    for ending, one in ((".mas", mass), (".sti", stiffness)):
+        (tmp_path / f"reed{ending}").write_text(
+            lines(one, [(i + 1,) for i in range(60)], "{:d} {:d} {:.16e}\n", upper=True)
+        )
+    (tmp_path / "reed.dof").write_text("".join(f"{node}.{way}\n" for node, way in NAMES[3:]))
+    text = ""
+    for name, one in (("KAAX", stiffness), ("MAAX", mass), ("BAAX", damping)):
+        text += f"DMIG    {name}    0       6       2       0\n"
+        for column, (node, way) in enumerate(NAMES[3:]):
+            text += f"DMIG*   {name:16s}{node:16d}{way:16d}\n"
+            rows = (row for row in range(column + 1) if one[row, column])
+            for row in rows:
+                entry = f"{one[row, column]:16.9E}".replace("E", "D")
+                text += f"*       {NAMES[3 + row][0]:16d}{NAMES[3 + row][1]:16d}{entry}\n"
+    (tmp_path / "reed.pch").write_text(text)
+    op4 = pytest.importorskip("pyyeti.nastran").op4
+    op4.write(str(tmp_path / "reed.op4"), {"kaa": stiffness, "maa": mass, "baa": damping})
+    right = ss.eigenvalues(reed())[:6]
+    without = ss.eigenvalues(reed(body=StructureBody(
+        matrices=StructureData(reed_matrices()[0], 0 * mass, reed_matrices()[2], 0 * mass),
+        points={"tip": StructurePoint(x=58, y=59, angle=np.radians(60))})))[:6]  # fmt: skip
+    for name, place, roots, rtol in (
+        ("Job-1_*2.mtx", NAMED, right, 1e-9), ("reed.sti", NAMED, without, 1e-9), ("reed.pch", NAMED, right, 1e-6),
+    ):  # fmt: skip
+        machine = ss.read_rig(reed_file(tmp_path, f'matrices = "{name}"\nunits = "mm t s"', "tip", place))
+        np.testing.assert_allclose(ss.eigenvalues(machine)[:6], roots, rtol=rtol, err_msg=name)
+        assert 'units = "mm t s"' in ss.rig_to_text(machine)
+    body = ss.read_rig(reed_file(tmp_path, 'matrices = "reed.op4"', "tip", PLACE)).bodies["reed"]
+    np.testing.assert_allclose(body.matrices.stiffness, stiffness, rtol=1e-12)  # no names, so no rotations: as it is
+
+
+def test_massless_degrees_of_freedom_follow_the_others(tmp_path):
+    """A spring in two halves with nothing between them is one of half the stiffness."""
+    form = "{:d},{:d}, {:d},{:d}, {:.16e}\n"
+    labels, stiffness = [(1, 1), (2, 1), (3, 1)], np.array([[9e4, -8e4, 0], [-8e4, 16e4, -8e4], [0, -8e4, 8e4]])
+    (tmp_path / "a_STIF1.mtx").write_text(lines(stiffness, labels, form))
+    (tmp_path / "a_MASS1.mtx").write_text(lines(np.diag([2.0, 0.0, 3.0]), labels, form))
+    found = ss.read_rig(reed_file(tmp_path, 'matrices = "a_*1.mtx"', "tip", 'x = "3.1"\ny = "1.1"')).bodies["reed"]
+    assert found.matrices.freedoms == ("1.1", "3.1")
+    np.testing.assert_allclose(found.matrices.stiffness, [[5e4, -4e4], [-4e4, 4e4]], rtol=1e-14)
+    with pytest.raises(ss.RigFileError, match=r"of node 3: 3\.1 \(held and massless"):
+        ss.read_rig(reed_file(tmp_path, 'matrices = "a_*1.mtx"', "tip", 'x = "3.2"'))
+    loose = lines(stiffness * np.array([[1, 0, 1], [0, 0, 0], [1, 0, 1]]), labels, form)
+    (tmp_path / "a_STIF1.mtx").write_text(loose + "2,1, 2,1, 0.0\n")
+    with pytest.raises(ss.RigFileError, match=r"nothing moves 2\.1"):
+        ss.read_rig(reed_file(tmp_path, 'matrices = "a_*1.mtx"', "tip", 'x = "3.1"'))
+
+
+def test_reduced_matrices_keep_the_names_of_degrees_of_freedom(tmp_path):
+    mass, damping, stiffness = reed_matrices()
+    names = tuple(f"{node}.{way}" for node, way in NAMES[3:])
+    whole = StructureData(mass, damping, stiffness, 0 * mass, freedoms=names)
+    small, _ = reduced(whole, ("21.1", "21.2"), 3)
+    same, _ = reduced(whole, (58, 59), 3)
+    np.testing.assert_array_equal(small.stiffness, same.stiffness)
+    assert small.freedoms == ("21.1", "21.2", "mode 1", "mode 2", "mode 3")
+    np.savez(tmp_path / "small.npz", M=small.mass, C=small.damping, K=small.stiffness, freedoms=small.freedoms)
+    again = ss.read_rig(written(tmp_path, "small.npz", NAMED)).bodies["reed"].matrices
+    assert again == small
+
+
+def test_damping_of_modes_is_the_ratio_of_each():
+    mass, damping, stiffness = reed_matrices()
+    data = StructureData(mass, 0 * damping, stiffness, 0 * mass)
+    tip = {"tip": StructurePoint(x=58, y=59, angle=np.radians(60))}
+    body = StructureBody(matrices=data, points=tip, modal_damping=0.02)
+    roots = np.linalg.eigvals(np.block([
+        [np.zeros((60, 60)), np.eye(60)],
+        [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, body.damping_matrix())]]))  # fmt: skip
+    np.testing.assert_allclose(-roots.real / np.abs(roots), 0.02, rtol=1e-5)
+    edge = ss.boundary(reed(body=body), "bodies.reed.modal_damping", (1e-5, 0.5))[0]
+    beside = ss.growth_rate(reed(body=body), {"bodies.reed.modal_damping": edge.value * np.array([0.99, 1.01])})
+    assert beside[0] > 0 > beside[1]
+
+
 @pytest.mark.parametrize(("name", "content", "said"), [
     ("missing.npz", None, "no such file"), ("reed.txt", b"1", "allowed: .npz, .mat, .mtx"),
+    ("a-*.mtx", b"1,1, 1,1\n", "allowed: 'node, direction"), ("a-*.mtx", b"1,1, -3,1, 2.0\n", "Lagrange multipliers"),
+    ("a-*.mtx", b"1,1,1,1,x\n", "no text of matrix entries"), ("reed.pch", b"nonsense", "Nastran"),
+    ("reed.op4", b"nonsense", "Nastran"), ("reed.sti", b"1 1 2.0\n", "no such file"),
     ("reed.npz", b"nonsense", "numpy.savez"), ("reed.mat", b"nonsense" * 40, "MATLAB"),
-    ("reed-*.mtx", b"nonsense", "Matrix Market"), ("reed.mtx", b"", "one file holds one matrix"),
+    ("reed-*.mtx", b"%%MatrixMarket", "Matrix Market"), ("reed.mtx", b"", "one file holds one matrix"),
+    ("b-*.mtx", None, "b-M.mtx or b-MASS.mtx"),
 ])  # fmt: skip
 def test_files_that_hold_no_matrices_are_refused(tmp_path, name, content, said):
     if content is not None:
-        (tmp_path / name.replace("*", "M")).write_bytes(content)
+        for letter in "MK":
+            (tmp_path / name.replace("*", letter)).write_bytes(content)
     with pytest.raises(ss.RigFileError, match=said) as error:
         ss.read_rig(written(tmp_path, name))
     assert "bodies.reed.matrices" in str(error.value)
@@ -257,7 +369,8 @@ def test_matrices_that_make_no_structure_are_refused(change, said):
 
 
 @pytest.mark.parametrize(("place", "said"), [
-    ("x = 61", "allowed: 1 to 60"), ("x = 0", "got 0"), ("", "give the degree of freedom"), ("z = 3", "unknown"),
+    ("x = 61", "allowed: 1 to 60"), ("x = 0", "got 0"), ('x = "1.1"', "does not name degrees of freedom"),
+    ("", "give the degree of freedom"), ("z = 3", "unknown"),
 ])  # fmt: skip
 def test_points_that_do_not_exist_are_refused(tmp_path, place, said):
     mass, damping, stiffness = reed_matrices()

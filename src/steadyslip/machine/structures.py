@@ -7,17 +7,20 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.domains import line, real
+from steadyslip.core.dimensions import unit
+from steadyslip.core.domains import line, nonnegative, real
 from steadyslip.core.entries import Whole
-from steadyslip.core.errors import ParameterError, Problem, repr_short
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short
 from steadyslip.core.names import Members
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
+from steadyslip.core.quantities import parse
 from steadyslip.core.records import FrozenRecord, members, parameter, setting
 from steadyslip.core.roles import Entry, Schema, fault
 from steadyslip.machine.bodies import Body
@@ -28,6 +31,8 @@ MOST_FREEDOM = 3000
 _FREE = 1e-10  # stiffness of a mode relative to the largest that counts as none; files of 11 digits
 _GOOD_TO = 0.5  # of the frequency of the last mode of a reduction, up to which it is meant to be good: usual practice
 _ONE = "give exactly one of matrices, modes and response"
+_UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
+_LISTED = 12  # degrees of freedom that a message lists: a line or two
 _SYMMETRIC = 1e-8  # relative asymmetry of an inertia matrix that is taken for rounding of a file
 
 
@@ -44,6 +49,8 @@ class StructureData(Displayed):
         Gyroscopic matrix, per unit of the body's `spin`.
     points : mapping of str to (ndarray, ndarray or None)
         Rows of displacements of points that the data themselves name: along x, and along y.
+    freedoms : tuple of str
+        Names of the degrees of freedom, n, in files of finite-element programs node and direction: ``105.1``; or none.
     source : str
         Name of the file; empty if made in Python.
     """
@@ -54,6 +61,7 @@ class StructureData(Displayed):
     gyroscopic: Array
     points: Mapping[str, tuple[Array | None, Array | None]] = field(default_factory=dict)
     source: str = ""
+    freedoms: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         named = {"mass": self.mass, "damping": self.damping, "stiffness": self.stiffness, "gyroscopic": self.gyroscopic}
@@ -74,6 +82,9 @@ class StructureData(Displayed):
                 problems.append(Problem(name, "has entries that are no finite numbers"))
         if not problems and size > MOST_FREEDOM:
             problems.append(Problem("mass", f"has {size} degrees of freedom; allowed: up to {MOST_FREEDOM}; reduce it"))
+        if self.freedoms and len(set(self.freedoms)) != size:
+            count = len(set(self.freedoms))
+            problems.append(Problem("freedoms", f"names {count} degrees of freedom; allowed: {size}, one for each row"))
         if not problems:
             problems += self._inertia_problems()
         if problems:
@@ -105,6 +116,7 @@ class StructureData(Displayed):
         found = hashlib.sha256()
         for one in (self.mass, self.damping, self.stiffness, self.gyroscopic):
             found.update(one.tobytes())
+        found.update("\n".join(self.freedoms).encode())
         for name, rows in self.points.items():
             found.update(name.encode())
             for row in rows:
@@ -116,6 +128,41 @@ class StructureData(Displayed):
 
     def __hash__(self) -> int:
         return hash(self.digest)
+
+    def row(self, place: int | str) -> int:
+        """Row of a degree of freedom, from 0.
+
+        Raises
+        ------
+        ParameterError
+            If there is none of this number, counted from 1, or name.
+        """
+        if isinstance(place, str):
+            if place in self.freedoms:
+                return self.freedoms.index(place)
+            if not self.freedoms:
+                raise fault(f"got {place!r}; allowed: 1 to {self.size}, as the file does not name degrees of freedom")
+            raise fault(self._unknown(place))
+        if not 1 <= place <= self.size:
+            raise fault(f"got {place}; allowed: 1 to {self.size}, the structure's degrees of freedom")
+        return place - 1
+
+    def _unknown(self, place: str) -> str:
+        node = place.partition(".")[0]
+        same = [one for one in self.freedoms if one.partition(".")[0] == node]
+        few = self.freedoms if len(self.freedoms) <= _LISTED else (*self.freedoms[:_LISTED], "...")
+        known = f"of node {node}: {', '.join(same)}" if same else ", ".join(few)
+        return (
+            f"got {place!r}; allowed: node and direction as in the file, {known} (held and massless ones are left out)"
+        )
+
+    @cached_property
+    def modal_damping(self) -> Array:
+        """Damping matrix (n, n) that gives each mode of inertia and symmetric stiffness a damping ratio of 1, N s/m."""
+        squares, shapes = self._own_modes
+        carried = self.mass @ shapes
+        found: Array = (carried * (2 * np.sqrt(np.maximum(squares, 0.0)))) @ carried.T
+        return found
 
     def __repr__(self) -> str:
         return f"StructureData({self.source or 'matrices'}, {self.size} degrees of freedom)"
@@ -173,14 +220,81 @@ class OfStructure(Entry):
         return json.dumps(value.source)
 
 
+@dataclass(frozen=True)
+class FileUnits(Entry):
+    """Field type: units of length, of mass or force, and of time, which finite-element programs leave to users."""
+
+    doc: str
+
+    def checked(self, value: Any) -> str:
+        unit_sizes(value)
+        return str(value)
+
+    def allowed(self) -> str:
+        return _UNITS
+
+    def schema(self) -> Schema:
+        return {"type": "string", "minLength": 1, "description": self.doc}
+
+
+def unit_sizes(units: Any) -> tuple[float, float, float]:
+    """Units of length, mass and time in m, kg and s, from text such as ``"mm t s"`` or ``"mm N s"``.
+
+    Raises
+    ------
+    ParameterError
+        Naming no field, if it is no such text.
+
+    Examples
+    --------
+    >>> from steadyslip.machine.structures import unit_sizes
+    >>> unit_sizes("mm N s")
+    (0.001, 1000.0, 1.0)
+    """
+    words = units.replace(",", " ").split() if isinstance(units, str) else ()
+    if len(words) != 3:
+        raise fault(f"got {repr_short(units)}; allowed: {_UNITS}")
+    try:
+        length, time = parse(f"1 {words[0]}", "m"), parse(f"1 {words[2]}", "s")
+        force = unit(words[1])[1] == unit("N")[1]
+        inertia = parse(f"1 {words[1]}", "N") * time**2 / length if force else parse(f"1 {words[1]}", "kg")
+    except QuantityError as error:
+        raise fault(f"got {units!r}: {error}; allowed: {_UNITS}") from error
+    return length, inertia, time
+
+
+@dataclass(frozen=True)
+class Freedom(Entry):
+    """Field type: a degree of freedom of matrices, by its number from 1 or by its name."""
+
+    doc: str
+
+    def checked(self, value: Any) -> int | str:
+        if isinstance(value, bool) or not (isinstance(value, (str, Integral))):
+            raise self.refused(value)
+        if not isinstance(value, str) and int(value) < 1:
+            raise self.refused(value)
+        return value if isinstance(value, str) else int(value)
+
+    def allowed(self) -> str:
+        return 'a whole number >= 1, or a name that the file has, such as "105.1"'
+
+    def schema(self) -> Schema:
+        return {"anyOf": [{"type": "integer", "minimum": 1}, {"type": "string"}], "description": self.doc}
+
+
 class StructurePoint(FrozenRecord):
     """A point of a structure where links and contacts act, with the constant force there.
 
     `x` and `y` are degrees of freedom of the matrices; a structure given by modes names its points in the file.
     """
 
-    x: int | None = setting(Whole("degree of freedom along x, counted from 1", 1), default=None)
-    y: int | None = setting(Whole("degree of freedom along y, counted from 1", 1), default=None)
+    x: int | str | None = setting(
+        Freedom('degree of freedom along x, from 1, or node and direction, "105.1"'), default=None
+    )
+    y: int | str | None = setting(
+        Freedom('degree of freedom along y, from 1, or node and direction, "105.2"'), default=None
+    )
     angle: float = parameter(
         "rad",
         line,
@@ -203,7 +317,11 @@ class StructureBody(Body, name="structure"):
     """
 
     matrices: StructureData | None = setting(
-        OfStructure("file of matrices: .npz, .mat, or .mtx for each of M, K, C, G"), default=None
+        OfStructure("file of matrices: .npz, .mat, .mtx for each of M, K, C, G, .sti, .op4, .pch"), default=None
+    )
+    units: str | None = setting(
+        FileUnits('units of the matrices: length, mass or force, time, as in "mm t s"; SI units if missing'),
+        default=None,
     )
     modes: StructureData | None = setting(
         OfStructure("file of modes: frequencies, damping ratios, shapes at named points"), default=None
@@ -214,6 +332,9 @@ class StructureBody(Body, name="structure"):
     averages: int = setting(Whole("averages behind the coherence of each measured response", 1), default=1)
     spin: float | None = parameter(
         "rad/s", real, "speed of rotation, by which the gyroscopic matrix is multiplied; 1 unless given", default=None
+    )
+    modal_damping: float | None = parameter(
+        "1", nonnegative, "damping ratio of each mode of the structure alone, beside its damping matrix", default=None
     )
     points: Any = members(StructurePoint, "points, by name", default=Members())
     is_structure: ClassVar[bool] = True
@@ -231,12 +352,11 @@ class StructureBody(Body, name="structure"):
                 hint = f"; the file names {found}" if found else ""
                 yield Problem(f"points.{name}.x", f"missing; give the degree of freedom along x, y or both{hint}")
             for axis in ("x", "y"):
-                place = getattr(point, axis)
-                if place is not None and place > self.data.size:
-                    yield Problem(
-                        f"points.{name}.{axis}",
-                        f"got {place}; allowed: 1 to {self.data.size}, the structure's degrees of freedom",
-                    )
+                try:
+                    if (place := getattr(point, axis)) is not None:
+                        self.data.row(place)
+                except ParameterError as error:
+                    yield Problem(f"points.{name}.{axis}", error.problems[0].message)
 
     @property
     def data(self) -> StructureData:
@@ -259,7 +379,8 @@ class StructureBody(Body, name="structure"):
             return self.data.points[name]
         point = self.points[name]
         unit = np.eye(self.data.size)
-        return tuple(None if place is None else unit[place - 1] for place in (point.x, point.y))  # type: ignore[return-value]
+        x, y = (None if place is None else unit[self.data.row(place)] for place in (point.x, point.y))
+        return x, y
 
     def moves_away(self, name: str) -> bool:
         """True if a point has a displacement away from the surface."""
@@ -284,23 +405,24 @@ class StructureBody(Body, name="structure"):
         return found
 
     def damping_matrix(self) -> Array:
-        """Damping, and the gyroscopic matrix at the speed of rotation."""
-        return self.data.damping + (1.0 if self.spin is None else float(self.spin)) * self.data.gyroscopic
+        """Damping with that of modes, and the gyroscopic matrix at the speed of rotation."""
+        found = self.data.damping + (1.0 if self.spin is None else float(self.spin)) * self.data.gyroscopic
+        return found + float(self.modal_damping) * self.data.modal_damping if self.modal_damping else found
 
 
-_KEPT = Tested("numbers of degrees of freedom, counted from 1", lambda value: isinstance(value, (tuple, list)))
+_KEPT = Tested("degrees of freedom, numbers from 1 or names", lambda value: isinstance(value, (tuple, list)))
 
 
 @checked(kept=_KEPT, modes=Whole("number of modes", 0))
-def reduced(structure: StructureData, kept: Sequence[int], modes: int) -> tuple[StructureData, float]:
+def reduced(structure: StructureData, kept: Sequence[int | str], modes: int) -> tuple[StructureData, float]:
     """Smaller matrices of a structure by the reduction of Craig and Bampton, and their error.
 
     Parameters
     ----------
     structure : StructureData
         Its points that a file of modes names are kept.
-    kept : sequence of int
-        Degrees of freedom, counted from 1, that stay as they are: those of links, contacts and forces.
+    kept : sequence of int or str
+        Degrees of freedom, counted from 1 or by name, that stay as they are: those of links, contacts and forces.
     modes : int
         Modes of the rest, with the degrees of freedom `kept` held, that are added; the lowest.
 
@@ -326,10 +448,14 @@ def reduced(structure: StructureData, kept: Sequence[int], modes: int) -> tuple[
     >>> small.size, error < 0.1
     (3, True)
     """
-    size = structure.size
-    inside = np.array(kept, dtype=np.int64) - 1
-    problems = [Problem("kept", f"has {one}; allowed: 1 to {size}") for one in kept if not 1 <= one <= size]
-    if len(set(kept)) < len(kept):
+    size, problems, rows = structure.size, [], []
+    for one in kept:
+        try:
+            rows.append(structure.row(one))
+        except ParameterError as error:
+            problems.append(Problem("kept", error.problems[0].message))
+    inside = np.array(rows, dtype=np.int64)
+    if len(set(rows)) < len(rows):
         problems.append(Problem("kept", "names a degree of freedom twice"))
     if not problems and modes > size - len(kept):
         problems.append(
@@ -353,7 +479,9 @@ def reduced(structure: StructureData, kept: Sequence[int], modes: int) -> tuple[
         basis.T @ one @ basis for one in (structure.mass, structure.damping, structure.stiffness, structure.gyroscopic)
     )
     points = {name: (_along(x, basis), _along(y, basis)) for name, (x, y) in structure.points.items()}
-    small = StructureData(mass, damping, held, turning, points)
+    names = tuple(structure.freedoms[row] for row in rows) if structure.freedoms else ()
+    names += tuple(f"mode {i + 1}" for i in range(modes)) if names else ()
+    small = StructureData(mass, damping, held, turning, points, freedoms=names)
     return small, _frequency_error(structure, small, _GOOD_TO**2 * float(squares[-1]) if modes else 0.0)
 
 

@@ -158,12 +158,13 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
 
 
 def in_matrices(rig: Rig) -> tuple[str, ...]:
-    """Parameters of structures that stay numbers of the Model: directions of points, and speeds of rotation."""
+    """Parameters of structures that stay numbers of the Model: directions of points, spin, damping of modes."""
     found = []
     for body, one in rig.bodies.items():
         if one.is_structure:
             inside = (f"bodies.{body}.points.{point}.angle" for point in one.points)
-            found += [f"bodies.{body}.spin"] * (one.spin is not None) + [*inside]
+            own = (f"bodies.{body}.{name}" for name in ("spin", "modal_damping") if getattr(one, name) is not None)
+            found += [*own, *inside]
     return tuple(found)
 
 

@@ -11,7 +11,7 @@ from steadyslip.files.inputs import UnreadableFile
 from steadyslip.files.structures.matrices import read_matrices
 from steadyslip.files.structures.modal_table import read_modes
 from steadyslip.files.structures.responses import read_response
-from steadyslip.machine.structures import StructureBody, Unread
+from steadyslip.machine.structures import StructureBody, Unread, unit_sizes
 
 _READERS: dict[str, Callable[..., Any]] = {"matrices": read_matrices, "modes": read_modes, "response": read_response}
 
@@ -33,12 +33,14 @@ def _loaded(body: Any, folder: Path) -> Any:
         return body
     found = {key: value for key, value in body.items() if key != "kind"} | {"motion": StructureBody.name}
     for key, read in _READERS.items():
-        more = (found.get("averages", 1),) if key == "response" else ()
+        more: tuple[Any, ...] = (found.get("averages", 1),) if key == "response" else ()
         if isinstance(path := found.get(key), str):
             try:
+                if key == "matrices" and "units" in found:
+                    more = (unit_sizes(found["units"]),)
                 found[key] = read(path, folder, *more)
             except UnreadableFile as error:
                 found[key] = Unread(str(error))
             except ParameterError as error:
-                found[key] = Unread(f"{path!r}: " + "; ".join(f"{p.name} {p.message}" for p in error.problems))
+                found[key] = Unread(f"{path!r}: " + "; ".join(f"{p.name} {p.message}".strip() for p in error.problems))
     return found

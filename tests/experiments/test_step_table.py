@@ -33,7 +33,10 @@ def test_every_step_is_fitted_alone_and_all_together(joint, table, tmp_path):
     ]  # fmt: skip
     assert table.joint is joint
     assert not table.left_out
-    alone = ss.fit(joint.plan.rig, joint.plan.records[0].windows()[0], fixed=["alpha"], calibrated=4e10)
+    until = table.steps[0].plan.records[0].time[-1]
+    assert 119 < until < 120.2  # until the next step
+    part = joint.plan.records[0].windows(after=until - table.lines[0].step.time)[0]
+    alone = ss.fit(joint.plan.rig, part, fixed=["alpha"], calibrated=4e10)
     assert table.steps[0].values == alone.values
     table.to_csv(tmp_path / "t.csv")
     rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
@@ -67,16 +70,74 @@ def test_a_memory_of_normal_stress_is_held_where_it_has_no_effect(tmp_path):
     assert driven.fit.plan.rig.value("friction.normal_memory.alpha") == fit["alpha"].value
     assert driven.estimates()["k_c"].determined
     assert "changes of normal stress alone" not in " ".join(table.to_dict()["lines"][1]["warnings"])
-    told = table.to_dict()["lines"][0]["warnings"]
+    assert " & rms & " in table.latex_text()
+
+
+def _short(noise=4e-4):
+    """A record whose last step is followed by too little slip for b and d_c."""
+    protocol = ss.Protocol(
+        pieces=(ss.protocol.VelocityStep(at=60.13, to=5e-6), ss.protocol.VelocityStep(at=90.21, to=1e-6)), until=94.0
+    )
+    return lab.record(lab.rig(), protocol, seed=5, noise=noise, count=1200)
+
+
+def test_warnings_are_notes_below_the_printed_table(tmp_path):
+    """They were comments of the file, so that a reader of the paper saw stars alone."""
+    table = ss.experiments.step_table(ss.fit(ss.lab_rig(), _short()))
+    told = table.to_dict()["lines"][1]["warnings"]
+    assert table.notes == told
     assert told
     text = table.latex_text()
-    assert f"11 MPa: {told[0]}" in text.replace(r"$^{*}$", "")
-    assert r"11 MPa$^{*}$ & " in text
-    assert " & rms & " in text
+    numbers = ",".join(str(k) for k in range(1, 1 + len(told)))
+    assert f"velocity step$^{{{numbers}}}$ & " in text
+    _, below = text.split(r"\end{tabular}")
+    assert below.count("$^{") == len(told)
+    assert "tell them only together" in below
+    assert "%" not in below.replace(r"\%", "")
     assert "Values in parentheses are not determined" in table.methods
-    assert "Of lines with a star the fit warns" in table.methods
+    assert "Notes to the table say of what these fits warn" in table.methods
     table.to_csv(tmp_path / "t.csv")
-    assert told[0] in next(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))["warnings"]
+    rows = [*csv.DictReader((tmp_path / "t.csv").read_text().splitlines())]
+    assert told[0] in rows[1]["warnings"]
+
+
+def test_a_later_step_begins_as_the_step_before_left_it(tmp_path):
+    """With a free beginning of its own, and its end halfway to the next step, hardly a slow step had b and d_c."""
+    pieces = tuple(
+        ss.protocol.VelocityStep(at=at, to=to) for at, to in ((30.13, 1e-5), (42.2, 1e-6), (72.17, 1e-5), (84.1, 1e-6))
+    )
+    rig = lab.rig()
+    record = lab.record(rig, ss.Protocol(pieces=pieces, until=114.0), seed=2, count=2300)
+    fit = ss.fit(ss.lab_rig(), record, ["a", "b", "d_c", "stiffness"])
+    table = ss.experiments.step_table(fit, starts=24)
+    for line in table.lines[:-1]:
+        for name in ("friction.a", "friction.b", "friction.d_c", "slider.stiffness"):
+            one = line.fit[name]
+            assert one.determined
+            assert abs(one.value - rig.value(name)) < 3.5 * one.error
+    before, after = (line.fit for line in table.lines[1:3])
+    begun = after.plan.beginning(0)
+    where = int(np.argmin(np.abs(before.plan.records[0].time - after.plan.records[0].time[0])))
+    part = before.comparison.parts[0]
+    states = part.states(before.space.values(before.coordinates[None]))
+    assert states["friction"][0] == pytest.approx(before.model, abs=1e-7)
+    rate = after.plan.loading[0].load.first
+    own = before.rig(0).with_values({"drive.velocity": rate})
+    assert begun.values["friction"] == pytest.approx(
+        states["friction"][0, where] - ss.steady_state(own).friction, abs=1e-7
+    )
+    assert begun.values["Theta"] == pytest.approx(
+        states["Theta"][0, where] + np.log(rate / own.value("v_ref")), abs=1e-6
+    )
+    assert "as the step before left friction" in " ".join(str(after).split())
+    assert "Later steps begin with friction and state as the step before left them" in table.methods
+    after.save(tmp_path / "step.nc")
+    again = ss.load_fit(tmp_path / "step.nc")
+    assert again.plan.beginnings == after.plan.beginnings
+    assert again.values == after.values
+    assert np.array_equal(
+        again.comparison.model(again.coordinates[None])[0], after.comparison.model(after.coordinates[None])[0]
+    )
 
 
 def test_latex_and_methods(joint, table, tmp_path):

@@ -110,7 +110,10 @@ def fit(
                     write_fit(found, comparison, path, draws)
         except KeyboardInterrupt:
             stopped = True
-    table = step_table(found) if (steps or listed) and not stopped else None
+    table = None
+    if (steps or listed) and not stopped:
+        options = {} if plan is None else plan.options
+        table = step_table(found, **{name: options[name] for name in ("starts", "effort") if name in options})
     if table is not None:
         for path in listed:
             write_table(table, path)

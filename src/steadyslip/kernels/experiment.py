@@ -160,6 +160,8 @@ class ExperimentProgram:
     method : str
     settled : bool
         True if motions begin with steady sliding.
+    observed : str or None
+        Name of the memory variable that is observed instead of friction.
     """
 
     reduction: Reduction
@@ -167,13 +169,16 @@ class ExperimentProgram:
     method: str
     settled: bool = True
     plain: bool = False
+    observed: str | None = None
 
     @cached_property
     def kernel(self) -> LockstepKernel:
-        friction = self.reduction.outputs["tau"] / self._measured_stress
+        seen = self.reduction.outputs["tau"] / self._measured_stress
+        if self.observed is not None:
+            seen = next(item.symbol for item in self.reduction.model.memory if item.name == self.observed)
         extended = with_directions(self.reduction, self.directions)
         choice = Choice(self.method, level="linear", lanes=1 if self.plain else LANES, dense=False)
-        return LockstepKernel(extended, choice, friction)
+        return LockstepKernel(extended, choice, seen)
 
     @property
     def _measured_stress(self) -> sp.Expr:
@@ -261,10 +266,12 @@ class ExperimentProgram:
 
 
 @question
-def experiment_program(model: Model, directions: int, method: str, settled: bool = True) -> ExperimentProgram:
+def experiment_program(
+    model: Model, directions: int, method: str, settled: bool = True, observed: str | None = None
+) -> ExperimentProgram:
     """Kernel for a model (cached)."""
     own = model.contact.name
     presses = () if model.contact.outside is None else (own, own + PORES)
     return ExperimentProgram(
-        reduce_model(model, None, presses=presses), directions, method, settled, plain=interpreting()
+        reduce_model(model, None, presses=presses), directions, method, settled, plain=interpreting(), observed=observed
     )

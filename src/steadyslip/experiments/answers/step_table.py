@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike
 from typing import Any
 
@@ -14,10 +14,14 @@ from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
+from steadyslip.experiments.fitting.beginning import Beginning
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fit import search_fit
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
+from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.words import warnings
 from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
@@ -36,6 +40,11 @@ DRIVEN = {
     "smoothed": "a smooth curve through the measured displacement",
 }
 """What drives the model, by `drive` of a fit, where it is not found in the record."""
+TYPESET = {one: f"\\{one}" for one in "_%&#$"} | {
+    "±": r"$\pm$", "−": "$-$", "×": r"$\times$", "²": "$^2$", "<": "$<$", ">": "$>$",
+    "α": r"$\alpha$", "μ": r"$\mu$", "σ": r"$\sigma$", "Σ": r"$\Sigma$", "Θ": r"$\Theta$", "τ": r"$\tau$",
+}  # fmt: skip
+"""Characters that LaTeX takes for something else or does not have."""
 GREEK = ("alpha", "beta", "gamma", "eta", "mu", "psi", "sigma", "tau", "theta")
 
 
@@ -144,7 +153,7 @@ class StepTable(Displayed):
     def latex_text(self) -> str:
         r"""Table as LaTeX: a ``tabular``, with the sentences for the methods section as a comment above it.
 
-        Values in parentheses are not determined. Lines with warnings are marked by stars, and these are comments too.
+        Values in parentheses are not determined. Numbers at steps are those of the notes below, of what the fits warn.
         """
         names = self._estimated()
         about = {name: si for name, si in ABOUT.items() if name != "samples"}
@@ -153,19 +162,26 @@ class StepTable(Displayed):
             f"${_letter(name, self.joint.plan.rig)}$" + (f" ({_unit(si)})" if si != "1" else "")
             for name, si in names.items()
         ]
-        rows, comments = [], [f"% {self.methods}"]
+        rows, notes = [], self.notes
         for line in self.lines:
             own, here = line.estimates(), line.about()
             cells = [_cell(here[name], _shown(si, name)) for name, si in about.items()]
-            told = warnings(line.fit)
-            cells[1] += "$^{*}$" if told else ""
-            comments += [f"% * {here['record']}, {here['step']}: {text}" for text in told]
+            told = ",".join(str(1 + notes.index(text)) for text in warnings(line.fit))
+            cells[1] += f"$^{{{told}}}$" if told else ""
             cells += [_with_error(own.get(name)) for name in names]
             rows.append(" & ".join(cells) + r" \\")
-        body = [*comments, rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
+        body = [f"% {self.methods}", rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
                 " & ".join(heads) + r" \\", r"\hline", *rows[:-1], r"\hline", rows[-1], r"\hline",
                 r"\end{tabular}"]  # fmt: skip
+        if notes:
+            below = [rf"$^{{{k}}}$ {_escaped(text)}." for k, text in enumerate(notes, start=1)]
+            body += [r"\par\smallskip\noindent{\footnotesize", *below, r"\par}"]
         return "\n".join(body) + "\n"
+
+    @property
+    def notes(self) -> list[str]:
+        """What the fits of any lines warn of, each once."""
+        return list(dict.fromkeys(text for line in self.lines for text in warnings(line.fit)))
 
     def to_latex(self, path: str | PathLike[str]) -> None:
         """Write the table as LaTeX.
@@ -204,6 +220,9 @@ class StepTable(Displayed):
             "A constant was added to friction." if plan.offset else "",
             "Friction was free to come later or earlier than the loading." if plan.lag else "",
             "How far records begin from steady sliding was fitted." if plan.initial == "free" else "",
+            "Later steps begin with friction and state as the step before left them, with its errors."
+            if any(one.plan.beginnings for one in self.steps)
+            else "",
             f"Outliers weighed less ({plan.loss} loss)." if plan.loss != "linear" else "",
             "Samples were weighted." if plan.weights is not None else "",
         ]
@@ -215,7 +234,7 @@ class StepTable(Displayed):
             if left
             else "",
             "Values in parentheses are not determined by the data." if open_ones else "",
-            "Of lines with a star the fit warns." if any(warnings(line.fit) for line in self.lines) else "",
+            "Notes to the table say of what these fits warn." if self.notes else "",
         ]
         noise = "allowing for correlated residuals" if self.joint.correlated else "for independent residuals"
         alone = f"{len(self.steps)} step{'s were' if len(self.steps) != 1 else ' was'} fitted alone"
@@ -237,13 +256,20 @@ class StepTable(Displayed):
 
 
 @checked()
-def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
+def step_table(
+    fit: Fit, *, starts: int = STARTS, effort: float = 1.0, progress: Progress | None = None
+) -> StepTable:  # fmt: skip
     """Fit every step of a fit's records alone, with the rig and options of the fit.
+
+    The part of a step goes from halfway since the step before to the next step. Later steps begin with friction and
+    state as the step before left them, with its errors (as all together did, where it does not determine everything).
 
     Parameters
     ----------
     fit : Fit
         To all records together; its line is the last.
+    starts, effort
+        As for `fit`, of each step.
     progress : callable, optional
         As for `fit`.
 
@@ -267,17 +293,22 @@ def step_table(fit: Fit, *, progress: Progress | None = None) -> StepTable:
     names = ("trend", "trend_axis", "offset", "lag", "initial", "loss", "width", "calibrated")
     options = {name: getattr(plan, name) for name in names}
     options |= {"fixed": [name for name in level if name not in plan.free], "errors": "auto"}
+    options |= {"starts": starts, "effort": effort}
     options |= {"protocol": plan.protocol} if plan.drive == "protocol" else {"drive": plan.drive}
     lines, left_out = [], []
     for i, record in enumerate(plan.records):
+        before = None
         for step, part in _parts(record):
             weights = None if plan.weights is None else plan.weights[i][np.isin(record.time, part.time)]
-            later = part.time[0] > record.time[0]  # then friction may still change since the step before
-            begin = {"initial": "free"} if later else {}
             rig, free = (plan.rig, plan.free) if part.stress_changes else _without_memory(fit, i)
             try:
-                alone = search_fit(rig, part, free, weights=weights, progress=progress, **options | begin)
+                own = options | {"weights": weights}
+                if part.time[0] > record.time[0]:  # then friction may still change since the step before
+                    own |= _begun(before or (fit, i), make_plan(rig, part, free, **own))
+                alone = search_fit(rig, part, free, progress=progress, **own)
+                before = (alone, 0) if all(one.determined for one in alone.estimates) else None
             except SteadyslipError as error:
+                before = None
                 left_out.append(f"{record.source}: {step} could not be fitted alone: {error}")
                 continue
             lines.append(_fitted_step(record, step, alone))
@@ -299,9 +330,46 @@ def _without_memory(fit: Fit, record: int) -> tuple[Slider, tuple[str, ...]]:
 
 
 def _parts(record: Record) -> Iterator[tuple[LoadStep, Record]]:
-    """Steps of a record, each with the part of the record around it."""
+    """Steps of a record, each with the part from halfway since the change before until the next step."""
+    changes = [step.time for step in record.steps]
     steps = [step for step in record.steps if step.kind != "reslide"]
-    return zip(steps, record.windows(), strict=True) if steps else iter(())
+    ends = [*(_beginning_of(record, step) for step in steps[1:]), np.inf]
+    for step, end in zip(steps, ends[: len(steps)], strict=True):
+        before = [moment for moment in changes if moment < step.time]
+        begin = 0.5 * (before[-1] + step.time) if before else float(record.time[0])
+        last = float(record.time[record.time < end][-1])
+        loading = record.loading.within(begin, last)
+        yield step, replace(record.between(begin, last), commanded=loading)
+
+
+def _beginning_of(record: Record, step: LoadStep) -> float:
+    """Earliest time (s) at which a step may begin."""
+    return min((one.earliest for _, _, one in record.loading.changes if one.time == step.time), default=step.time)
+
+
+def _begun(before: tuple[Fit, int], plan: Plan) -> dict[str, Any]:
+    """Option of a fit that tells how its record begins: as a fit of what came before, of its record i, leaves it."""
+    fit, i = before
+    if plan.rests(0) or not (fit.plan.follows and fit.search.converged):
+        return {"initial": "free"}
+    errors = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)
+    variances, axes = np.linalg.eigh(errors)
+    ends = fit.coordinates + np.vstack([np.zeros(len(axes)), (np.sqrt(np.maximum(variances, 0.0)) * axes).T])
+    values = fit.space.values(np.clip(ends, *fit.bounds))
+    source, target = fit.comparison.parts[i], plan.comparison().parts[0]
+    given = {one.parameter: values[:, k] for k, one in enumerate(fit.space.unknowns) if one.record in (None, i)}
+    own = np.empty((len(values), len(plan.space())))
+    for k, one in enumerate(plan.space().unknowns):  # times of changes do not matter to what was before
+        own[:, k] = given[one.parameter] if one.parameter in plan.free else 0.5 * (one.low + one.high)
+    at = int(np.argmin(np.abs(source.record.time - target.record.time[0])))
+    steady = target.states(own)
+    away = np.column_stack([whole[:, at] - steady[name][:, 0] for name, whole in source.states(values).items()])
+    if not np.all(np.isfinite(away)):
+        return {"initial": "free"}
+    spread = np.linalg.svd(away[1:] - away[0], full_matrices=False)  # as many directions as there are differences
+    directions = (spread.S[:, None] * spread.Vh).tolist()
+    known = Beginning(dict(zip(steady, away[0].tolist(), strict=True)), tuple(map(tuple, directions)))
+    return {"initial": "steady", "beginnings": (known,)}
 
 
 def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
@@ -350,8 +418,13 @@ def _cell(value: Any, shown: str) -> str:
     if value is None:
         return "--"
     if isinstance(value, str):
-        return "".join(f"\\{one}" if one in "_%&#$" else one for one in value)
+        return _escaped(value)
     return format_quantity(value / unit(shown)[0], "1")
+
+
+def _escaped(text: str) -> str:
+    """Text in LaTeX."""
+    return "".join(TYPESET.get(one, one) for one in text)
 
 
 def _with_error(one: Estimate | None) -> str:

@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.estimates import combinations, prior_informa
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
-from steadyslip.experiments.fitting.valleys import along_valleys
+from steadyslip.experiments.fitting.valleys import along_open, along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
 from steadyslip.experiments.numerics.noise import Noise, describe, white
 
@@ -26,22 +26,25 @@ F = TypeVar("F", bound=Fitted)
 def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Array]:
     """Changes (n,) of the weighted model by one standard deviation of each thing uncertain in the commanded loading.
 
-    These are levels of velocity and normal stress, the course of a load point, its servo; none where the loading is
-    not found in the records, or the model cannot follow it.
+    These are levels of velocity and normal stress, the course of a load point, its servo, and known beginnings; none
+    where the loading is not found in the records, or the model cannot follow it.
     """
     if not plan.follows:
         return
     predicted: Array | None = None
     values = comparison.space.values(z[None])[0]
-    for loading, part, where in zip(plan.loading, comparison.parts, comparison.slices, strict=True):
+    for k, (loading, part, where) in enumerate(zip(plan.loading, comparison.parts, comparison.slices, strict=True)):
         loads = () if loading.load is None else tuple(raised(loading.load))
+        models = []
         if loads and loading.load is not None:
-            models = part.driven_by(values, [loading.load, *loads])
-            for model in models[1:]:
-                own = np.zeros(comparison.size)
-                own[where] = (model - models[0]) * part.weights
-                if np.all(np.isfinite(own)):
-                    yield own
+            models.append(part.driven_by(values, [loading.load, *loads]))
+        if plan.beginnings:
+            models.append(part.begun_from(values, plan.beginning(k).ends()))
+        for model in (one - first for first, *others in models for one in others):
+            own = np.zeros(comparison.size)
+            own[where] = model * part.weights
+            if np.all(np.isfinite(own)):
+                yield own
     for i, loading in enumerate(plan.loading):
         for moved in shifted(loading, plan.pressed):
             if predicted is None:
@@ -124,4 +127,9 @@ def fit_with_errors(
     if search.converged:
         covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
         undetermined += opened
+        if undetermined:
+            names = [one.name for one in comparison.space.unknowns]
+            held = names.index(next(iter(undetermined[0].weights)))
+            variance = max(noise.inflation * float(noise.covariance[0]) for noise in noises)
+            covariance = along_open(plan, comparison, z, bounds, covariance, held, variance)
     return made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, version()).with_memories()

@@ -47,6 +47,8 @@ class RecordPart:
         Indices among the unknowns of the rig's parameters, free times, initial state and trend coefficients.
     trend : ndarray (terms, n)
         Factors of the trend coefficients.
+    known_begin : tuple of float
+        Initial differences from steady sliding, in order of `Forward.unsettled`, where they are known.
     """
 
     record: Record
@@ -60,6 +62,13 @@ class RecordPart:
     begin_indices: tuple[int, ...]
     trend_indices: tuple[int, ...]
     trend: Array
+    known_begin: tuple[float, ...] = ()
+
+    def begin(self, values: Array) -> Array:
+        """Initial differences from steady sliding (m, k) at values (m, p) of the unknowns: known, or free."""
+        if self.known_begin:
+            return np.tile(self.known_begin, (len(values), 1))
+        return np.asarray(values[:, list(self.begin_indices)])
 
     def table(self, values: Array, sensitive: bool = True) -> InputTable:
         first = len(self.rig_indices)
@@ -69,8 +78,26 @@ class RecordPart:
     @cached_property
     def without_derivatives(self) -> Forward:
         """The model without derivatives, which runs several times as fast."""
+        return self._observing(None)
+
+    def _observing(self, memory: str | None) -> Forward:
         own = self.forward
-        return Forward(own.rig, own.names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort)
+        return Forward(
+            own.rig, own.names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort, observed=memory
+        )
+
+    def states(self, values: Array) -> dict[str, Array]:
+        """Friction without a trend, and each memory of it, (m, n) at values (m, p) of the unknowns."""
+        own, table, begin = values[:, list(self.rig_indices)], self.table(values, sensitive=False), self.begin(values)
+        memories = [item.name for item in self.forward.model.memory if item.unit == "1"]
+        models = {"friction": self.without_derivatives} | {name: self._observing(name) for name in memories}
+        return {name: forward.run(table, own, own, begin)[:, 0] for name, forward in models.items()}
+
+    def begun_from(self, values: Array, begins: Array) -> Array:
+        """Friction (m, n), without a trend, at values (p,) of the unknowns from other beginnings (m, k)."""
+        many = np.tile(values, (len(begins), 1))
+        own = many[:, list(self.rig_indices)]
+        return np.asarray(self.without_derivatives.run(self.table(many, sensitive=False), own, own, begins)[:, 0])
 
     def driven_by(self, values: Array, loads: Sequence[Course]) -> Array:
         """Friction (loads, n), without a trend, at values (p,) of the unknowns for other load points of the same times.
@@ -85,7 +112,7 @@ class RecordPart:
         rates = [next(level for level in one.levels.tolist() if level > 0) if one.first == 0 else one.first
                  for one in loads]  # fmt: skip
         given = np.column_stack([np.tile(values[list(self.rig_indices)], (len(loads), 1)), rates])
-        begin = np.tile(values[list(self.begin_indices)], (len(loads), 1))
+        begin = np.tile(self.begin(values[None]), (len(loads), 1))
         table = self.inputs.table_of(values[list(self.time_indices)], loads)
         return np.asarray(forward.run(table, given, given, begin)[:, 0])
 
@@ -176,7 +203,7 @@ class Comparison(DataComparison):
         for part, where in zip(self.parts, self.slices, strict=True):
             places = list(part.rig_indices)
             begin = list(part.begin_indices)
-            found = part.forward.run(part.table(values), values[:, places], slopes[:, places], values[:, begin])
+            found = part.forward.run(part.table(values), values[:, places], slopes[:, places], part.begin(values))
             predicted[:, where] = found[:, 0]
             jacobian[:, places, where] = found[:, 1 : 1 + len(places)]
             for k, place in enumerate((*part.time_indices, *begin), start=1 + len(places)):
@@ -192,8 +219,8 @@ class Comparison(DataComparison):
         total = np.zeros(len(coordinates))
         for part in self.parts:
             own = values[:, list(part.rig_indices)]
-            begin = values[:, list(part.begin_indices)]
-            predicted = part.without_derivatives.run(part.table(values, sensitive=False), own, own, begin)[:, 0]
+            table = part.table(values, sensitive=False)
+            predicted = part.without_derivatives.run(table, own, own, part.begin(values))[:, 0]
             predicted += values[:, list(part.trend_indices)] @ part.trend
             r = (part.data - predicted) * part.weights
             if self.loss != "linear":

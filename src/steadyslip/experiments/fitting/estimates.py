@@ -104,8 +104,10 @@ class Combination:
     def __str__(self) -> str:
         if len(self.weights) == 1:
             return f"{next(iter(self.weights))} is not determined by these data"
-        signs = ", ".join(f"{name} {'up' if w > 0 else 'down'}" for name, w in self.weights.items())
-        return f"only together: {signs} leaves the fit as good as it is; fix one of them"
+        sides = [[name for name, w in self.weights.items() if (w > 0) is up] for up in (True, False)]
+        moved = " with ".join(f"{', '.join(names)} {way}" for names, way in zip(sides, ("up", "down"), strict=True)
+                              if names)  # fmt: skip
+        return f"{moved} fits as well: these data tell them only together; fix one of them"
 
 
 def combinations(information: Array, spread: Array, space: Space) -> tuple[Array, tuple[Combination, ...]]:

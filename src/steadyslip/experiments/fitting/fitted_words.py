@@ -12,6 +12,7 @@ from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.residuals import residual_checks
+from steadyslip.experiments.fitting.search import MIN_ARRIVED
 from steadyslip.experiments.numerics.noise import STRUCTURE
 
 WIDTH = 100  # characters of a line of text
@@ -23,6 +24,11 @@ def quality(fit: Fitted) -> list[str]:
     search = fit.search
     independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
     reached = f"{search.arrived} of {search.starts} starts lead here"
+    enough = min(MIN_ARRIVED, search.starts)
+    reached += (
+        f", {enough} are enough" if search.arrived >= enough
+        else f", fewer than {enough}: there may be a better one, look with more (starts)"
+    )  # fmt: skip
     if search.others:
         reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
     return [

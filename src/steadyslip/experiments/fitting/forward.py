@@ -107,16 +107,20 @@ class Forward:
     shifts : int
         Number of free times of the input table.
     unsettled : sequence of str
-        Initial values, of `ExperimentProgram.unsettled`, that are free; their directions come last.
+        Initial values, of `ExperimentProgram.unsettled`, that are given; their directions come last.
+    begins_free : bool
+        True if these are free, so that they have directions.
     sensitive : bool
         True to compute derivatives.
+    observed : str, optional
+        Name of the memory variable that is observed instead of friction.
     effort : Effort, optional
         Limits on the integration.
     """
 
     def __init__(
         self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, unsettled: Sequence[str] = (),
-        sensitive: bool = True, effort: Effort | None = None,
+        sensitive: bool = True, effort: Effort | None = None, begins_free: bool = True, observed: str | None = None,
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.unsettled = rig, tuple(names), rtol, shifts, tuple(unsettled)
         self.effort = effort or Effort()
@@ -124,9 +128,11 @@ class Forward:
         self._base = _point_of(rig, self.names)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
-        self.directions = len(names) + shifts + len(unsettled) if sensitive else 0
+        self.begin_directions = self.unsettled if begins_free else ()
+        self.directions = len(names) + shifts + len(self.begin_directions) if sensitive else 0
         self.size = next((n for n in (0, *SIZES) if n >= self.directions), SIZES[-1])
-        self.program = experiment_program(self.model, self.size, automatic_method(reduction), not unsettled)
+        method = automatic_method(reduction)
+        self.program = experiment_program(self.model, self.size, method, not unsettled, observed)
 
     def values(self, parameters: Array) -> OperatingPoint:
         """Operating points for values of the free parameters, (jobs, names)."""
@@ -144,7 +150,7 @@ class Forward:
         found = np.zeros((-(-self.directions // max(self.size, 1)) * self.size, len(order) + len(begins)))
         if not self.directions:
             return found
-        for i, name in enumerate(self.unsettled, start=self.directions - len(self.unsettled)):
+        for i, name in enumerate(self.begin_directions, start=self.directions - len(self.begin_directions)):
             found[i, begins[name]] = 1.0
         for i, name in enumerate(self.names):
             if name in order:

@@ -11,6 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.records import parameters
+from steadyslip.experiments.fitting.beginning import Beginning
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.comparison import (
     Comparison,
@@ -56,8 +57,8 @@ class Plan:
     drive : str
         Loading of the model: ``commanded`` (found in the record), its displacement ``smoothed`` or as ``measured``, or
         the ``protocol``.
-        protocol : Protocol or None
-            Protocol with times on the records' clock.
+    protocol : Protocol or None
+        Protocol with times on the records' clock.
     trend : int
         Order of a polynomial that is added to friction.
     trend_axis : str
@@ -71,16 +72,18 @@ class Plan:
     loss : str
     width : float or None
         Residual from which outliers have less weight.
-        weights : tuple of ndarray or None
-            One array (n,) for each record; equal weights if None.
+    weights : tuple of ndarray or None
+        One array (n,) for each record; equal weights if None.
         calibrated : float or None
             Stiffness of the machine, Pa/m, to which the fitted one is compared.
         rtol : float
             Relative error allowed per step of the model.
         sharp : tuple of Sharp
             Sudden changes of each record, if the loading is as measured.
-        loading : tuple of Loading
-            Commanded loading found in the columns of each record.
+    loading : tuple of Loading
+        Commanded loading found in the columns of each record.
+    beginnings : tuple of Beginning
+        How far each record begins from steady sliding, where that is known; empty otherwise.
     """
 
     rig: Slider
@@ -101,6 +104,7 @@ class Plan:
     rtol: float = 1e-8
     sharp: tuple[Sharp, ...] = field(default=(), repr=False)
     loading: tuple[Loading, ...] = field(default=(), repr=False)
+    beginnings: tuple[Beginning, ...] = ()
 
     @property
     def follows(self) -> bool:
@@ -127,16 +131,20 @@ class Plan:
             else:
                 found += jump_unknowns(label, self.sharp[i])
             if self.initial == "free" and not self.rests(i):
-                found += initial_unknowns(label, self._natural_sizes)
+                found += initial_unknowns(label, self.initial_sizes)
             found += trend_unknowns(i if several else None, self.trend, self.offset)
         return Space(tuple(found))
+
+    def beginning(self, i: int) -> Beginning:
+        """What is known of how record `i` begins, for the memories that the law has; nothing if it is not given."""
+        return self.beginnings[i].of(self.initial_sizes) if self.beginnings else Beginning({})
 
     def rests(self, i: int) -> bool:
         """True if record `i` begins at rest; a hold of free duration then precedes it."""
         return self.follows and resting_rate(self.loading[i]) is not None
 
     @cached_property
-    def _natural_sizes(self) -> dict[str, float]:
+    def initial_sizes(self) -> dict[str, float]:
         """Natural sizes of the initial differences from steady sliding: 0.01 of friction, an e-fold of each state."""
         point = operating_point(self.rig, {})
         program = experiment_program(point.model, 0, "tsit5", settled=False)
@@ -168,7 +176,8 @@ class Plan:
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
         begins = [space.unknowns[place].parameter.partition(".")[2] for place in places["initial"]]
-        forward = Forward(rig, names, self.rtol, len(times), begins, effort=effort)
+        known = self.beginning(i).values
+        forward = Forward(rig, names, self.rtol, len(times), begins or [*known], effort=effort, begins_free=not known)
         inputs: Any
         moved: Array | None = None
         if self.follows:
@@ -188,7 +197,7 @@ class Plan:
         return RecordPart(
             record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
             tuple(places["initial"]), tuple(places["trend"]),
-            trend_rows(record, self.trend, self.offset, self.trend_axis, moved),
+            trend_rows(record, self.trend, self.offset, self.trend_axis, moved), tuple(known.values()),
         )  # fmt: skip
 
     def driven(self, record: Record, i: int) -> tuple[Slider, Array | None]:

@@ -17,6 +17,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.records import Address, parameters
 from steadyslip.core.roles import Placeholder
+from steadyslip.experiments.fitting.beginning import Beginning
 from steadyslip.experiments.fitting.input_tables import MIN_RATE_STEP
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import FitSettings, faults
@@ -37,9 +38,9 @@ NEVER_FREE = ("drive.velocity", "slider.area")
 
 def make_plan(
     rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
-    separate: Sequence[str] = (), protocol: Any = None, **options: Any,
+    separate: Sequence[str] = (), protocol: Any = None, beginnings: tuple[Beginning, ...] = (), **options: Any,
 ) -> Plan:  # fmt: skip
-    """Make a plan from the arguments of `steadyslip.fit`.
+    """Make a plan from the arguments of `steadyslip.fit`, and the `beginnings` of records where these are known.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def make_plan(
     if plan_protocol is not None:
         options["drive"] = "protocol"
         rig = _driven_as_recorded(rig, many)
-    plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
+    plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, beginnings=beginnings, **options)
     check_records(plan)
     plan = with_loading(plan)
     check_changes(plan)

@@ -11,8 +11,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.core.results import read_only
+from steadyslip.experiments.fitting.beginning import Beginning
 from steadyslip.experiments.fitting.estimates import Combination
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.numbers import FitNumbers
@@ -42,6 +44,7 @@ _CURVE = ([float], float, float, float, int, [float], [float])  # the ends of it
 _NUMBERS = len(fields(Change)) - 1  # of a change in files, without its pieces; 8 before there were lags
 _COURSE = (float, [[float]], [float], [_CURVE], float, int, int, int, int, [[float]])  # servos or shapes last
 _COLUMNS = (*ROLES, "worth")
+KNOWN = "known"  # `initial` of a fit whose records begin as a fit of what came before left them
 RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
     "unidentified": [{"weights": {str: float}, "deviation": float}],
@@ -146,10 +149,14 @@ def to_dataset(fit: FitNumbers) -> Any:
             if (column := getattr(record, name)) is not None:
                 about = {"units": ROLES[name]} if name in ROLES else {}
                 variables[f"{name}_{i}"] = (dim, np.asarray(column), about)
+        if fit.plan.beginnings:
+            about = {"long_name": "differences from steady sliding, then changes by one standard deviation"}
+            variables[f"beginning_{i}"] = ((f"direction_{i}", f"memory_{i}"), fit.plan.beginning(i - 1).rows(), about)
         if fit.plan.weights is not None:
             variables[f"weight_{i}"] = (dim, fit.plan.weights[i - 1], {})
     options = {name: getattr(fit.plan, name) for name in _OPTIONS}
     options["weighted"] = fit.plan.weights is not None
+    options["initial"] = KNOWN if fit.plan.beginnings else fit.plan.initial
     options["columns"] = [[n for n in _COLUMNS if getattr(r, n) is not None] for r in fit.plan.records]
     attributes = result_attributes(fit) | {
         "rig": stored_text(fit.plan.rig, fit.plan.protocol),
@@ -199,13 +206,18 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")
     if not 0 < len(described) == len(noises) == len(present) == len(loading):
         raise table.fault(f"it has {len(described)} records, {len(present)} sets of columns and {len(noises)} noises")
-    found = table.columns(_columns(present, weighted))
+    known = stored["options"]["initial"] == KNOWN
+    stored["options"] |= {"initial": "steady"} if known else {}
+    found = table.columns(_columns(present, weighted, known))
     records = tuple(
         _record(table, found, i, (source, notes, integrated), _loading_from_json(table, own))
         for i, ((source, notes, integrated), own) in enumerate(zip(described, loading, strict=True), start=1)
     )
     weights = [found[f"weight_{i}"] for i in range(1, len(records) + 1)] if weighted else None
     plan = _plan(table, records, stored["options"], weights)
+    if known:
+        plan = replace(plan, beginnings=tuple(_beginning(table, plan, found[f"beginning_{i + 1}"])
+                                              for i in range(len(records))))  # fmt: skip
     fit = result_of(table, found, stored, made, plan)
     refits = stored["refits"]
     stored_results = {  # results that the file holds, so that nothing is computed again
@@ -217,7 +229,15 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     return fit
 
 
-def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
+def _beginning(table: ExpectedTable, plan: Plan, rows: Array) -> Beginning:
+    """Beginning from its `Beginning.rows`."""
+    if rows.shape[1] != len(plan.initial_sizes):
+        raise table.fault(f"a record begins with {rows.shape[1]} differences, its law has {len(plan.initial_sizes)}")
+    first, *spread = rows.tolist()
+    return Beginning(dict(zip(plan.initial_sizes, first, strict=True)), tuple(map(tuple, spread)))
+
+
+def _columns(present: list[list[str]], weighted: bool, known: bool) -> dict[str, ColumnRule]:
     """Columns that the file of a fit must have, given those of its records."""
     found = result_columns([f"sample_{i}" for i in range(1, len(present) + 1)])
     for i, names in enumerate(present, start=1):
@@ -225,6 +245,8 @@ def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
         found |= {f"{name}_{i}": ColumnRule(samples, ROLES.get(name, "")) for name in names}
         if weighted:
             found[f"weight_{i}"] = ColumnRule(samples)
+        if known:
+            found[f"beginning_{i}"] = ColumnRule((f"direction_{i}", f"memory_{i}"))
     return found
 
 

@@ -28,6 +28,7 @@ from steadyslip.experiments.numerics.least_squares import minimise
 
 DEPENDENT = 1e-3  # least eigenvalue of JᵀJ, scaled to a diagonal of 1, of a usual step: .004, of open directions 3e-4
 LEAST_DEVIATION = 0.05  # e-folds or natural sizes: models are linear over less
+OPEN_DISTANCES = (1.0, 2.0, 4.0)  # the same along a direction that is open, in e-folds or natural sizes
 REACH = 1.96  # standard deviations: 95 %
 DISTANCES = (2.0, 4.0, 8.0)  # standard deviations at which the others are fitted again, on both sides
 LEAST_STRETCH = 1.1  # of an error: shorter ones are within what these fits are good for
@@ -79,6 +80,33 @@ def along_valleys(
     return wider, (combination(np.copysign(reached, valley.axis), deviation, comparison.space, lost),)
 
 
+def along_open(
+    plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], covariance: Array, held: int,
+    variance: float,
+) -> Array:  # fmt: skip
+    """Covariance (p, p) without errors of what changes along an open direction, in which the model is not linear.
+
+    Parameters
+    ----------
+    plan, comparison, z, bounds, covariance
+        As of `along_valleys`.
+    held : int
+        The parameter that changes most along the direction.
+    variance : float
+        Of the noise, by which the sum of squares rises one standard deviation from the minimum.
+    """
+    axis = np.zeros(len(z))
+    axis[held] = 1.0
+    reached = _reached(plan, comparison, z, bounds, _Valley(held, axis, np.zeros(len(z))), variance, OPEN_DISTANCES)
+    own = np.diag(covariance)
+    times = np.array([is_time(one) for one in comparison.space.unknowns])
+    lost = np.isfinite(own) & ~times & (reached**2 > OPEN_SHARE * own) & (reached > LEAST_CHANGE)
+    found = covariance.copy()
+    found[lost, :] = found[:, lost] = 0.0
+    found[lost, lost] = np.inf
+    return found
+
+
 def _valley(comparison: DataComparison, information: Array, covariance: Array) -> _Valley | None:
     """The nearly dependent parameter among those that have an error; None if there is none."""
     known = np.flatnonzero(np.isfinite(np.diag(covariance)) & (np.diag(information) > 0))
@@ -107,14 +135,15 @@ def _unit_of_rise(information: Array, covariance: Array, i: int) -> float:
 
 
 def _reached(
-    plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float
-) -> Array:
+    plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float,
+    distances: tuple[float, ...] = DISTANCES,
+) -> Array:  # fmt: skip
     """Standard deviations (p,) that the ends of the valley stand for, on the side where each parameter goes further."""
-    away = np.array([side * own for side in (-1.0, 1.0) for own in DISTANCES])
+    away = np.array([side * own for side in (-1.0, 1.0) for own in distances])
     begin = np.clip(z + away[:, None] * valley.axis, *bounds)
     held = np.zeros_like(begin, dtype=bool)
     held[:, valley.held] = True
-    count = len(DISTANCES)
+    count = len(distances)
     few = condensed(plan, comparison, np.stack([z, begin[0], begin[count]]))
     least = float(np.sum(few.residuals(z[None])[0] ** 2))
     ends = minimise(lambda x, _: few.residuals(x), begin, *bounds, held=held, most=MOST_ITERATIONS, tolerance=TOLERANCE)

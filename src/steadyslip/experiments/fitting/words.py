@@ -121,9 +121,13 @@ def _ends_off_model(fit: FitNumbers) -> list[str]:
         few = {END_SAMPLES, max(END_SAMPLES, len(own) // 200)}
         begins, ends = (max((float(np.mean(side[:n])) for n in few), key=abs) for side in (own, own[::-1]))
         if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > MAX_END_OFFSET * fit.rms:
+            if fit.plan.beginnings:
+                begun, cure = "as the step before left it", "fit this part alone (between), its beginning"
+            else:
+                begun, cure = "with steady sliding", "where the record does not, let its beginning be"
             found.append(
-                f"{record.source}: friction begins {begins:+.2g} beside the model, which begins with steady sliding; "
-                "where the record does not, let its beginning be free (initial = 'free'), or cut it off (between)"
+                f"{record.source}: friction begins {begins:+.2g} beside the model, which begins {begun}; {cure} free "
+                "(initial = 'free'), or cut it off (between)"
             )
         if abs(ends) > MAX_END_OFFSET * fit.rms:
             found.append(
@@ -341,6 +345,8 @@ def drive_line(fit: FitNumbers) -> str:
         text += "; at rest at first, how long is fitted (start.hold)"
     if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):
         text += "; not steady at first, how far is fitted (initial)"
+    if plan.beginnings:
+        text += "; at first as the step before left friction"
     slips, glitches = sum(c.slips for c in loads), sum(c.glitches for c in loads)
     if slips or glitches:
         text += f"; {slips} slips and {glitches} glitches of the sensor left out"

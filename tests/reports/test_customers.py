@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import steadyslip as ss
+from data_sheets import SHEETS
 from read_pages import words
 from rigs_of_theory import CONTACTS, LAWS, rig
 from steadyslip.core.errors import NotAvailable
@@ -139,6 +140,17 @@ def test_what_may_be_adjusted_bounds_what_is_recommended():
     text = words("".join(recommendation(found, Order((), {"drive.kp": gain, "contact.preload": preload}))))
     assert re.search(r"No single change is enough. Change .* from .* to .* and .* with both it is stable", text)
     assert "go beyond them as far as you can" in text
+
+
+def test_a_recommendation_knows_all_windows_of_a_parameter():
+    """Only the nearest edge was looked at: of an angle that of lock-up, of a speed one beyond what is allowed."""
+    found = ss.analyze(ss.read_rig("examples/inclined-spring.toml"))
+    assert "angle ψ −45 deg −4.785 deg above −11.49 deg yes" in words("".join(recommendation(found)))
+    brake = ss.analyze(ss.rig_from_text(SHEETS["brake"]))
+    for limits, told in (({}, "3.899 km/h above 3.249 km/h"), ({"high": "3 km/h"}, "0.1005 km/h below 0.1256 km/h")):
+        within = {end: brake.rig.read("drive.velocity", value) for end, value in limits.items()}
+        order = Order((), {"drive.velocity": ss.verdict.Adjustment(**within)})
+        assert told in words("".join(recommendation(brake, order)))
 
 
 def test_tolerances_are_kept_for_the_document_of_a_verdict_within_them():

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_percent
 from steadyslip.files.specifications.tolerance_tables import Adjustment
-from steadyslip.linear.boundary import Margin
+from steadyslip.linear.boundary import Boundary, Margin
+from steadyslip.linear.nearness import doublings
 from steadyslip.linear.status import stability
 from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why
@@ -82,15 +84,15 @@ def recommendation(
     if not found:
         yield from _cured(analysis, {}, adjustable, "stable", "stable at")
         return
-    close = [one for one in found if adjustable or not _is_far(one.value, one.edge.value if one.edge else None)]
-    rows = [found[one] for one in close or found][:_ROWS]
+    close = [one for one, row in found.items() if adjustable or not _is_far(one.value, row.edge)]
+    rows = [found[one].cells for one in close or found][:_ROWS]
     name, now, to, *_ = rows[0]
     yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
     sequence = "Changes that make it stable: first of settings, then of parts, last of the speed, which is the task."
     yield table(rows, head, caption=sequence)
-    if close and (far := [row[0] for one, row in found.items() if one not in close]):
+    if close and (far := [row.cells[0] for one, row in found.items() if one not in close]):
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
 
 
@@ -159,7 +161,7 @@ def _cured(
     """
     rig: Any = analysis.rig
     present = {name: one for name, one in default_adjust(rig).items() if rig.parameters()[name].value}
-    named = next((one for one in analysis.margins if one.edge is not None and _cures(one)), None)
+    named = next((one for one in analysis.margins if _curing(one)), None)
     if named is not None and named.value and "friction." not in named.parameter:
         present.setdefault(named.parameter, Adjustment())
     try:
@@ -218,16 +220,17 @@ def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Mar
     what costs least by `steadyslip.verdict.change_costs`. They are of what is named in `adjustable`;
     else of all that the rig has but friction, and of that if there is nothing else.
     """
-    edged = [one for one in analysis.margins if one.edge is not None and (analysis.stable or _cures(one))]
+    edged = [one for one in analysis.margins if (one.edge if analysis.stable else _curing(one))]
     chosen = [one for one in edged if one.parameter in adjustable]
     present = [one for one in edged if one.value]  # from zero it is no change, but a part to be added
     found = chosen or [one for one in present if "friction." not in one.parameter] or present
     return found if analysis.stable or chosen else sorted(found, key=_in_order)
 
 
-def _in_order(margin: Margin) -> tuple[bool, float]:
-    """Sort key of a change: far ones last; then by what such a change costs."""
-    return _is_far(margin.value, margin.edge.value if margin.edge else None), unit_cost(margin.parameter)
+def _in_order(margin: Margin) -> tuple[bool, float, bool]:
+    """Sort key of a change: far ones last; then by what it costs; then those beside which no edge is nearer."""
+    begins = _curing(margin)[0]
+    return _is_far(margin.value, begins.value), unit_cost(margin.parameter), begins is not margin.edge
 
 
 def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:
@@ -267,32 +270,44 @@ def _side(analysis: Analysis, margin: Margin) -> str:
     return f"{said(analysis.rig, margin.parameter)}, now {now}: keep it {side} {end}"
 
 
-def _cures(margin: Margin) -> bool:
-    edge = margin.edge
-    if edge is None or not edge.value:
-        return False
-    return not margin.remote and edge.stable == ("above" if edge.value > margin.value else "below")
+def _curing(margin: Margin) -> list[Boundary]:
+    """Edges at which windows of stable values begin as seen from the rig's own value, the nearest window first."""
+    begins = [
+        edge
+        for edge in margin.edges
+        if edge.value
+        and not margin.is_remote(edge)
+        and edge.stable == ("above" if edge.value > margin.value else "below")
+    ]
+    return sorted(begins, key=lambda edge: float(doublings(margin.value, edge.value, margin.unit)))
 
 
-def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> tuple[str, str, str, str, str] | None:
-    """Row of a change: name, value, recommended value, edge, whether it is stable there; None if not, or too far."""
-    if margin.edge is None:
-        return None
+class _Change(NamedTuple):
+    """Row of a table: name, value, recommended value, edge, that it is stable there; and the edge as a number."""
+
+    cells: tuple[str, str, str, str, str]
+    edge: float
+
+
+def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Change | None:
+    """Change into the nearest window of stable values that is wide enough and allowed; None if there is none."""
     rig: Any = analysis.rig
-    edge = margin.edge.value
-    away = math.copysign(BEYOND_EDGE * abs(edge - margin.value if margin.unit == "rad" else edge), edge - margin.value)
     low, high = (None, None) if within is None else (within.low, within.high)
-    if (low is not None and edge + away < low) or (high is not None and edge + away > high):
-        return None
-    try:
-        holds = stability(rig.with_values({margin.parameter: edge + away})) == "stable"
-    except (ParameterError, NotAvailable):
-        holds = False
-    if not holds:
-        return None
-    word = "above" if edge > margin.value else "below"
-    words = [_value(analysis, margin, value) for value in (margin.value, edge + away, edge)]
-    return said(rig, margin.parameter), words[0], words[1], f"{word} {words[2]}", "yes"
+    for edge in (one.value for one in _curing(margin)):
+        away = BEYOND_EDGE * abs(edge - margin.value if margin.unit == "rad" else edge)
+        rises = edge > margin.value
+        to = edge + away if rises else edge - away
+        nearer = low if rises else high  # the end of what is allowed that may ask for more than the margin
+        if nearer is not None:
+            to = max(to, nearer) if rises else min(to, nearer)
+        if (low is not None and to < low) or (high is not None and to > high):
+            continue
+        with suppress(ParameterError, NotAvailable):
+            if stability(rig.with_values({margin.parameter: to})) == "stable":
+                now, then, end = (_value(analysis, margin, value) for value in (margin.value, to, edge))
+                word = "above" if rises else "below"
+                return _Change((said(rig, margin.parameter), now, then, f"{word} {end}", "yes"), edge)
+    return None
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:

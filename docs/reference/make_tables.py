@@ -41,8 +41,8 @@ table `[protocol]` may say what is done to the rig in an experiment. A whole one
 
 - A number without quotes is in the SI unit of the table below. Text such as `"9 GPa/m"` or `"-45 deg"` carries its
   unit and is checked for the right dimension; anything that can be written so may be.
-  Verdicts, figures and texts in Python are in the units of the file, and in those that `--set` brings; with an `area`, each
-  quantity is told as force or as stress, whichever it is in the file. Copies by `with_values` or `dataclasses.replace`
+  Verdicts, figures and texts in Python are in the units of the file, and in those that `--set` brings; with an `area`
+  each is told as force or as stress, whichever it is in the file. Copies by `with_values` or `dataclasses.replace`
   keep them. A torque may be in `Nm`, a gear ratio `"1/360"`.
 - Everything is per unit contact area. With `area` in `[slider]`, a quantity that has two units below is the total for
   the whole contact, in the second one; text may then be in either.

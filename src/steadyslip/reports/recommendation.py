@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_percent
 from steadyslip.files.specifications.tolerance_tables import Adjustment
-from steadyslip.linear.boundary import Boundary, Margin
+from steadyslip.linear.boundary import Margin
 from steadyslip.linear.nearness import doublings
+from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import stability
 from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why

@@ -147,7 +147,7 @@ def test_a_recommendation_knows_all_windows_of_a_parameter():
     found = ss.analyze(ss.read_rig("examples/inclined-spring.toml"))
     assert "angle ψ −45 deg −4.785 deg above −11.49 deg yes" in words("".join(recommendation(found)))
     brake = ss.analyze(ss.rig_from_text(SHEETS["brake"]))
-    for limits, told in (({}, "3.899 km/h above 3.249 km/h"), ({"high": "3 km/h"}, "0.1005 km/h below 0.1256 km/h")):
+    for limits, told in (({}, "1.083 m/s above 902.5 mm/s"), ({"high": "3 km/h"}, "27.91 mm/s below 34.89 mm/s")):
         within = {end: brake.rig.read("drive.velocity", value) for end, value in limits.items()}
         order = Order((), {"drive.velocity": ss.verdict.Adjustment(**within)})
         assert told in words("".join(recommendation(brake, order)))

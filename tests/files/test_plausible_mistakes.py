@@ -225,15 +225,18 @@ def test_a_number_without_its_unit_is_asked_about_once(text, right, wrong, answe
         ss.rig_from_text(text)
 
 
-def test_the_step_of_an_encoder_elsewhere_than_the_motor_is_asked_about():
-    text = MACHINE.replace('velocity = "0.05 rpm"', 'velocity = 0\nsample_time = "1 ms"\nresolution = "5 arcsec"')
-    with pytest.warns(
-        UnitWarning, match="drive.resolution = 5 arcsec is a step of motor, .* an encoder at table, write"
-    ):
-        ss.rig_from_text(text)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        ss.rig_from_text(text.replace('measured = "table"', "#"))
+def test_the_step_of_an_encoder_is_that_of_the_measured_body():
+    text = MACHINE.replace('velocity = "0.05 rpm"', 'velocity = 0\nsample_time = "1 ms"\nresolution = "1 um"')
+    rig = ss.rig_from_text(text)
+    assert rig.drive.resolution == 1e-6
+    assert rig.mechanism().limits.resolution == pytest.approx(1e-6 * 2 * np.pi / 10e-3)
+    assert ss.rig_from_text(ss.rig_to_text(rig)) == rig
+    assert "resolution = 1e-06  # m\n" in ss.rig_to_text(rig)
+    assert rig.with_values({"drive.resolution": "5 um"}).drive.resolution == 5e-6
+    with pytest.raises(ss.ParameterError, match=r"drive.resolution: '5 arcsec' .* expected a quantity in m, for"):
+        ss.rig_from_text(text.replace("1 um", "5 arcsec"))
+    motor = text.replace('measured = "table"', "#").replace("1 um", "5 arcsec")
+    assert ss.rig_from_text(motor).mechanism().limits.resolution == pytest.approx(5 * np.pi / 180 / 3600)
 
 
 @pytest.mark.parametrize("key", ["mu_static = 0.16", 'bristle_stiffness = "20 N/um at 125 N"', "viscous = 0"])

@@ -192,7 +192,9 @@ class Control(IntEnum):
     INTEGRAL, MOST_INTEGRAL, MOST_FORCE = 7, 8, 9
     COUNT, AIM, LATE, CONSTANT = 10, 11, 12, 13
     """Samples so far, last target, forces that wait; flag: the last sample changed neither integral nor force."""
-    SIZE = 14
+    ROUNDED = 14
+    """Number of loops, from the first on, whose place is that of the encoder."""
+    SIZE = 15
 
 
 class Turn(IntEnum):

@@ -6,12 +6,23 @@ At a velocity other than 0 a controller follows a ramp and is linear, so the fie
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from steadyslip.core.domains import nonnegative, positive, speed
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, option, parameter
+from steadyslip.core.roles import Parameter
 from steadyslip.machine.mechanism import Limits
+
+AS_MEASURED = ("drive.dead_band", "drive.resolution")
+"""Parameters of a controller that are of the body which it measures, in m or rad, whatever the drive acts on."""
+
+
+def as_measured(role: Parameter, turns: bool) -> Parameter:
+    """Role of one of `AS_MEASURED`, of a body that turns or slides."""
+    unit = "rad" if turns else "m"
+    return role if role.unit == unit else replace(role, unit=unit, instance=None)
 
 
 def dead_time() -> Any:
@@ -34,13 +45,13 @@ def windup(unit: str) -> Any:
 
 def band(unit: str) -> Any:
     """Declare the dead band."""
-    doc = "at velocity 0: error up to which there is none; beyond it, counted from its end"
+    doc = "at velocity 0: error of the measured body up to which there is none; beyond it, counted from its end"
     return parameter(unit, positive, doc, default=None)
 
 
 def encoder(unit: str) -> Any:
     """Declare the step of the encoder."""
-    doc = "at velocity 0: step of the encoder, to which places are rounded; needs a sample_time"
+    doc = "at velocity 0: step of the encoder of the measured body, to which its place is rounded; needs a sample_time"
     return parameter(unit, positive, doc, default=None, instance="0.1 arcsec" if unit == "rad" else "0.1 um")
 
 

@@ -17,6 +17,7 @@ from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.ends import body_of, floating_body, unknown_body, unreferenced_bodies
+from steadyslip.machine.holding import AS_MEASURED, as_measured
 from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
@@ -98,6 +99,13 @@ class Machine(Rig):
             return super().feed()
         pace = 1.0 if self.holds else float(self.drive.velocity)
         return float(self._speeds()[0][self.fed]) / pace, bool(self._turns(self.fed))
+
+    def seen(self) -> tuple[float, bool]:
+        driven = self.drive.driven()
+        if driven is None:
+            return super().seen()
+        measured, speeds = self.drive.watched()[0], self._speeds()[0]
+        return abs(float(speeds[measured] / speeds[driven])), bool(self._turns(measured))
 
     def told(self, name: str, value: float) -> tuple[float, str]:
         if name != "drive.velocity" or self.fed is None:
@@ -374,7 +382,13 @@ class Machine(Rig):
 
     def declared(self) -> dict[str, Address]:
         """Collect the parameters; laws of contacts without an area have units of force."""
-        return {name: self._in_forces(one) for name, one in super().declared().items()}
+        return {name: self._as_measured(self._in_forces(one)) for name, one in super().declared().items()}
+
+    def _as_measured(self, one: Address) -> Address:
+        """Parameter of a controller in the unit of the body that it measures, of which its encoder and band are."""
+        if one.name not in AS_MEASURED or self.drive.driven() is None:
+            return one
+        return replace(one, role=as_measured(one.role, bool(self._turns(self.drive.watched()[0]))))
 
     def _in_forces(self, one: Address) -> Address:
         if not one.name.startswith("contacts.") or self.area_of(one.name) or not is_per_area(one.role.unit):
@@ -416,6 +430,8 @@ class Machine(Rig):
             if (row := self.row(end, axis))
         }
         velocity, limits = self.drive.velocity, self.drive.limits()
+        if limits is not None and (limits.resolution or limits.dead_band):
+            limits = limits.over(self.seen()[0])
         return Mechanism(
             tuple(coordinates),
             (*elements, *controls),

@@ -8,7 +8,7 @@ the velocity of the drive. Displacements are relative to steady sliding.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from steadyslip.laws.contact import ContactLaw
@@ -93,6 +93,8 @@ class Limits:
         Time between samples; the force is constant between.
     resolution : float or None
         Step of the encoder.
+
+    Those with a length are in the unit of the drive, as the places of the controller.
     """
 
     on_measurement: bool = False
@@ -102,6 +104,11 @@ class Limits:
     of_integral: bool = False
     sample_time: float | None = None
     resolution: float | None = None
+
+    def over(self, ratio: float) -> Limits:
+        """The same with lengths over a ratio."""
+        band, step = (None if one is None else one / ratio for one in (self.dead_band, self.resolution))
+        return replace(self, dead_band=band, resolution=step)
 
 
 @dataclass(frozen=True)

@@ -188,6 +188,10 @@ class Rig(FrozenRecord, Keeper):
         that body turns."""
         return 1.0, bool(self.drive.turns)
 
+    def seen(self) -> tuple[float, bool]:
+        """Motion of the body that a controller measures for one of the drive, and whether that body turns."""
+        return 1.0, bool(self.drive.turns)
+
     def gain_name(self) -> str | None:
         """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
         return None

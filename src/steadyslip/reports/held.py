@@ -85,7 +85,7 @@ def _cures(result: Hunt) -> Iterator[str]:
     """HTML of the changes that were tried, the best first, and of what each leaves."""
     unit, own, limits = result.unit, _reach(result), result.rig.drive.limits()
     asked = limits.dead_band if limits else None
-    allowed = own if asked is None else float(asked)
+    allowed = own if asked is None else float(asked) * _told_over_measured(result)
     until = LONGER * float(result.time[-1])
     found = [Tried(what, hunt(rig, result.protocol, until=until), least) for what, rig, least in _changed(result)]
     found.sort(key=lambda one: (one.verdict(allowed) != "ends it", one.reach))
@@ -109,6 +109,11 @@ def _cures(result: Hunt) -> Iterator[str]:
     ]
     words = f"Changes, each alone and simulated. A cure leaves the axis at rest within {limit} of the target."
     yield table(rows, ("change", "then", "off the target by up to", "worth"), caption=words)
+
+
+def _told_over_measured(result: Hunt) -> float:
+    """Motion of the body that an answer tells of for one of the body that the controller measures."""
+    return result.rig.feed()[0] / result.rig.seen()[0]
 
 
 def _reach(result: Hunt) -> float:
@@ -135,7 +140,8 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
     band = BAND * _reach(result)
     with suppress(ParameterError, NotAvailable, TypeError):  # a drive without these keys
         words = f"a dead band of {format_quantity(band, result.unit)} of the integral ({BAND:g} amplitudes)"
-        yield words, replace(rig, drive=replace(rig.drive, dead_band=band, dead_band_of="integral")), band
+        measured = band / _told_over_measured(result)
+        yield words, replace(rig, drive=replace(rig.drive, dead_band=measured, dead_band_of="integral")), band
     gains = {name: STIFFER * one.value for name, one in known.items() if _is_gain(rig, name) and one.value}
     if gains:
         names = ", ".join(said(rig, name) for name in gains)

@@ -112,3 +112,36 @@ def test_work_in_the_core_is_bounded_and_said(bristles, monkeypatch):
     assert found.sentence.startswith("NOT DECIDED by ")
     less = " or rtol, or law = 'coulomb' with mu_static," if bristles else ""
     assert f"the work was used up; a larger sample_time{less} takes less" in str(found)
+
+
+def held(text, **values):
+    """The machine at velocity 0 under a proportional controller, with these keys in its drive."""
+    head, _, _ = text.partition("[drive]")
+    keys = "".join(f"{key} = {value}\n" for key, value in values.items())
+    return ss.rig_from_text(f"{head}[drive]\nvelocity = 0\nsample_time = '1 ms'\n{keys}")
+
+
+@pytest.mark.parametrize("measured", ["table", "motor"])
+def test_a_controller_sees_multiples_of_the_step_at_the_body_that_it_measures(measured):
+    """1 um of the table are .036 degrees of the motor: forces of a proportional gain are in steps of either."""
+    rig = held(
+        RINGING, control="'rotary-pd'", body="'motor'", measured=f"'{measured}'", kp="'5 N m/rad'",
+        kd="'0.2 N m s/rad'", resolution="'1 um'" if measured == "table" else "'0.036 deg'",
+    )  # fmt: skip
+    rig = replace(rig, drive=replace(rig.drive, kd=0.0))
+    found = ss.hunt(rig, ss.protocol.DisplacementStep(at=0, by=2.0), until=0.2)
+    step = np.deg2rad(0.036)
+    seen = (2.0 - found.force / 5.0) / step
+    assert np.ptp(seen) > 100
+    assert np.abs(seen - np.round(seen)).max() < 1e-6
+    assert ("encoder         1 um of table, 0.036 deg of motor\n" in str(found)) == (measured == "table")
+
+
+def test_a_speed_that_is_measured_elsewhere_is_not_rounded():
+    """A scale of a step that the table never makes: the speed of the motor is still felt."""
+    rig = held(RINGING, control="'rotary-p-pi'", body="'motor'", measured="'table'", kv="'30 1/s'",
+               kp="'0.2 N m s/rad'", tn="'20 ms'", resolution="'1 m'")  # fmt: skip
+    found = ss.hunt(rig, ss.protocol.DisplacementStep(at=0, by=2.0), until=0.05)
+    forces = found.force[np.flatnonzero(np.diff(found.force))]
+    assert len(forces) > 20
+    assert np.abs(np.diff(forces, 2)[2:]).max() > 1e-3  # an integral of an error that stays grows evenly

@@ -13,7 +13,6 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.quantities import parse, units_in
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
-from steadyslip.machine.servo import MachineDrive
 
 SPEEDS = ("m/s", "rad/s")
 STIFFNESSES = ("N/m", "Pa/m")
@@ -80,7 +79,7 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
     by_programs = all(unit(name)[0] == 1.0 for name in written)
     large = {} if by_programs else dict(_large(rig, read))
     typed = () if by_programs else (*_soft(rig, read), *large.values(), *_light(rig, read), *_pliable(rig, read))
-    for text in (*_questions(rig, read), *typed, *_elsewhere(rig, read), *_doubts(rig, large)):
+    for text in (*_questions(rig, read), *typed, *_doubts(rig, large)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -182,18 +181,6 @@ def _mass_on(rig: Rig, name: str) -> float:
         mass, area = f"bodies.{rig.contacts[name.split('.')[1]].body}.mass", 1.0
     address = rig.parameters().get(mass)
     return (address.value or 0.0) * area if address else 0.0
-
-
-def _elsewhere(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Question about the step of an encoder that measures another body than the one at which it is read."""
-    drive, (raw, _) = rig.drive, read.get("drive.resolution", (None, ""))
-    if raw is None or not isinstance(drive, MachineDrive) or drive.watched()[0] == drive.driven():
-        return
-    body, at = drive.watched()[0], drive.driven()
-    yield (
-        f"drive.resolution = {raw} is a step of {at}, on which the drive acts; if it is that of an encoder at {body}, "
-        f"write by how much {at} moves meanwhile"
-    )
 
 
 def _is_of_forces(rig: Rig, name: str) -> bool:

@@ -39,6 +39,7 @@ from steadyslip.files.specifications.layout import (
     Section,
     is_machine,
     machine_sections,
+    own_fields,
     sections,
     selector,
 )
@@ -46,6 +47,7 @@ from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import NotToml, Table, key_lines, line_of, tables_of
 from steadyslip.files.structures.named_files import with_structures
 from steadyslip.machine.ends import unknown_ends
+from steadyslip.machine.holding import AS_MEASURED, as_measured
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -407,6 +409,7 @@ class _ContentsReader(TableReader):
         if driven is not None and law is not None and driven.turns != law.turns:
             self.problems.append(wrong_control(control, table["body"], driven.turns))
             return None
+        table = self._as_measured(table, law, bodies or {})
         given = table.get("velocity")
         if feed is not None and given is not None:
             role = Parameter("rad/s" if feed.turns else "m/s", speed, f"velocity of {table['velocity_of']!r}")
@@ -422,6 +425,18 @@ class _ContentsReader(TableReader):
             hint = f"; for that of another body write velocity_of = {json.dumps(others[0])}" if others else ""
             self.problem("drive.velocity", f"got {given!r}, but {where!r} {does}{hint}")
         return self.record(MachineDrive, table, "drive.")
+
+    def _as_measured(self, table: Table, law: Any, bodies: Mapping[str, Any]) -> Table:
+        """Table of a drive in which what is of the measured body is read in its unit, if that is not the drive's."""
+        measured = bodies.get(named) if isinstance(named := table.get("measured"), str) else None
+        if law is None or measured is None or measured.turns == law.turns:
+            return table
+        read = {}
+        for item, role in own_fields(law):
+            if f"drive.{item.name}" in AS_MEASURED and table.get(item.name) is not None and isinstance(role, Parameter):
+                value = self._value(as_measured(role, measured.turns), table[item.name], f"drive.{item.name}")
+                read[item.name] = 1.0 if value is None else value
+        return table | read
 
     def _slider(self) -> Slider | None:
         before = len(self.problems)

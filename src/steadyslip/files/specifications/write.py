@@ -9,7 +9,7 @@ from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
-from steadyslip.core.records import FrozenRecord, Named, key_of
+from steadyslip.core.records import Address, FrozenRecord, Named, key_of
 from steadyslip.core.roles import Entry
 from steadyslip.files.output import write_text
 from steadyslip.files.specifications.layout import (
@@ -97,7 +97,8 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
             key, default = selector(section.family)
             word = _law_name(record, section.name)
             first = [] if word == default else [f'{key} = "{word}"']
-        blocks.append(_table(f"[{section.name}]", record, first, section.name, area))
+        own = rig.parameters() if isinstance(rig, Machine) and section.name == "drive" else {}
+        blocks.append(_table(f"[{section.name}]", record, first, section.name, area, own))
     if protocol is not None:
         blocks.append(_table(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, rig.protocol_area))
     return "\n".join(blocks)
@@ -121,7 +122,11 @@ def _law_name(record: FrozenRecord, where: str) -> str:
     return record.name
 
 
-def _table(header: str, record: FrozenRecord, first: list[str], path: str, area: float | None) -> str:
+def _table(
+    header: str, record: FrozenRecord, first: list[str], path: str, area: float | None,
+    own: Mapping[str, Address] | None = None,
+) -> str:  # fmt: skip
+    """TOML text of a record; `own` are parameters in the units that they have in this rig."""
     lines = [header, *first]
     if record.in_totals:
         area = getattr(record, "area", None) or 1.0  # without one, in forces
@@ -131,7 +136,8 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
         if value is None or value == item.default:
             continue
         if isinstance(role, Entry):
-            lines.append(f"{key} = {role.written(value, area)}")
+            known = (own or {}).get(f"{path}.{key}")
+            lines.append(f"{key} = {(role if known is None else known.role).written(value, area)}")
         elif isinstance(role, Named):
             below.append(_named(role, value, f"{path}.{key}"))
         elif role.keyed:

@@ -45,7 +45,7 @@ def wanted_force(Y: Array, control: Array, loops: Array) -> float:
         place, before = 0.0, loops[loop, 2]
         for i in range(size):
             place += loops[loop, 3 + i] * Y[i]
-        if control[Control.RESOLUTION] > 0.0:
+        if control[Control.RESOLUTION] > 0.0 and loop < control[Control.ROUNDED]:
             place = rounded_to(place, control[Control.RESOLUTION])
         moved = before - place
         if control[Control.ON_MEASUREMENT] == 0.0:

@@ -128,6 +128,16 @@ class Hunt(ReadOnly):
         return unstable_by_itself(self.rig)
 
     @property
+    def _encoder(self) -> str:
+        """Step of an encoder elsewhere than where the drive acts, and by how much that moves; empty for others."""
+        drive, ratio = self.rig.drive, self.rig.seen()[0]
+        step = getattr(drive, "resolution", None)
+        if not step or ratio == 1.0:
+            return ""
+        at, acts = format_quantity(*self.rig.told("drive.resolution", step)), "rad" if drive.turns else "m"
+        return f"{at} of {drive.watched()[0]}, {format_quantity(step / ratio, acts)} of {drive.driven()}"
+
+    @property
     def _so_far(self) -> str:
         """What an axis has done by the end of its motion that neither rests nor hunts by then."""
         own, now = self._swings, abs(float(self.error[-1])) if len(self.error) else 0.0
@@ -167,6 +177,8 @@ class Hunt(ReadOnly):
             ends = (self.force.min(), self.force.max())
             low, high = (format_quantity(float(force), self.force_unit, area=self.rig.area) for force in ends)
             lines.append(f"controller      {low} to {high}")
+        if told := self._encoder:
+            lines.append(f"encoder         {told}")
         accuracy = "exact pieces" if self.exact else f"rtol {self.rtol:g}"
         lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")
         if self.stopped:

@@ -44,6 +44,7 @@ class CompiledMotion:
             Control.OF_INTEGRAL: limits.of_integral, Control.INTEGRAL: plant.integral,
             Control.MOST_INTEGRAL: math.inf if limits.integral is None else limits.integral,
             Control.MOST_FORCE: math.inf if limits.force is None else limits.force,
+            Control.ROUNDED: sum(np.array_equal(place, plant.places[0]) for place in plant.places),
         }  # fmt: skip
         self.control[list(settings)] = [float(value) for value in settings.values()]
         self.loops = np.array([[*gains, 0.0, *place] for gains, place in zip(plant.gains, plant.places, strict=True)])

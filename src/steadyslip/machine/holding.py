@@ -22,7 +22,7 @@ AS_MEASURED = ("drive.dead_band", "drive.resolution")
 def as_measured(role: Parameter, turns: bool) -> Parameter:
     """Role of one of `AS_MEASURED`, of a body that turns or slides."""
     unit = "rad" if turns else "m"
-    return role if role.unit == unit else replace(role, unit=unit, instance=None)
+    return role if role.unit == unit else replace(role, unit=unit, instance="")
 
 
 def dead_time() -> Any:

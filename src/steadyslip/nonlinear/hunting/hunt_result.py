@@ -130,7 +130,8 @@ class Hunt(ReadOnly):
     @property
     def _encoder(self) -> str:
         """Step of an encoder elsewhere than where the drive acts, and by how much that moves; empty for others."""
-        drive, ratio = self.rig.drive, self.rig.seen()[0]
+        drive: Any = self.rig.drive
+        ratio = self.rig.seen()[0]
         step = getattr(drive, "resolution", None)
         if not step or ratio == 1.0:
             return ""

@@ -39,6 +39,17 @@ function moved(series) {
   }
   return true;
 }
+function numbers(low, high) {
+  const make = document.createElementNS;
+  let texts = 0;
+  document.createElementNS = (space, kind) => {
+    texts += kind === "text";
+    return make();
+  };
+  axis(box, spanning([low, high], "velocity").scale, [low, high], { unit: "m/s" }, "velocity", true);
+  document.createElementNS = make;
+  return texts - 1; // but its name
+}
 function placed(places) {
   const one = new Element();
   putAt(one, places);
@@ -52,6 +63,12 @@ WINDOWS = ((0.0, 1.0), (0.5, 0.5 + 1e-9), (1.0, np.nextafter(1.0, 2.0)), (-1.0, 
 @pytest.fixture(scope="module")
 def drawings():
     return Script(f"{DOCUMENT}\n{page_modules()}\n{ASK}")
+
+
+@pytest.mark.parametrize(("low", "high"), [(8e-6, 36e-6), (0.61, 0.627), (9e-6, 2.9e-4), (1e-6, 1.0), (6e-6, 1.9e-4)])
+def test_an_axis_has_two_numbers(drawings, low, high):
+    """One number, as 20 between 8 and 36, tells no scale."""
+    assert drawings("numbers(low, high)", low=low, high=high) >= 2
 
 
 def test_no_drawing_gets_a_number_that_is_not_finite(drawings):

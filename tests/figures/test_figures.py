@@ -327,7 +327,7 @@ def test_the_locus_shows_the_eigenvalues_of_every_stiffness():
 def test_the_crossing_is_at_eq_26_and_the_rig_at_its_own_eigenvalues():
     rig = paper_rig()
     ax = figures.root_locus(rig, unmanaged_axes())
-    crossing = labelled(ax.lines, "critical stiffness 29.07 GPa/m")
+    crossing = labelled(ax.lines, "critical stiffness 29.07\xa0GPa/m")
     beta = np.sqrt(ss.paper.inclined_frequency_squared(**PAPER, d_c=1e-6, v0=1e-6, angle=-45 * deg))
     assert np.sort(crossing.get_ydata()) == pytest.approx([-beta, beta], rel=1e-12, abs=0)
     assert crossing.get_xdata() == pytest.approx(0, abs=1e-12)
@@ -341,7 +341,8 @@ def test_fast_eigenvalues_out_of_view_are_named():
     ax = figures.root_locus(paper_rig(0.3).with_values({"slider.mass": 1e3}), unmanaged_axes())
     (text,) = [text for text in legend_texts(ax) if "this rig" in text]
     fast = ss.eigenvalues(paper_rig(0.3).with_values({"slider.mass": 1e3})).real.min()
-    assert f"−{abs(fast):.3g}" in text
+    digits, power = f"{abs(fast):.2e}".split("e")
+    assert rf"−{digits}$\times10^{{{int(power)}}}$" in text
 
 
 @pytest.mark.parametrize("name", [name for name in ODD if name != "locked-up"])

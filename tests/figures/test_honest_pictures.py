@@ -18,7 +18,7 @@ from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.hunting import hunting
 from steadyslip.figures.map_axes import Scale, is_geometric
-from steadyslip.figures.style import EDGES, save_with_footer
+from steadyslip.figures.style import EDGES, fit_words, save_with_footer
 from steadyslip.maps.view.cut import _quantiles, _with_failures
 
 
@@ -154,3 +154,19 @@ def test_a_column_of_a_journal_holds_all_words(tmp_path, kind):
         assert box.x1 < figure.bbox.x1 + 1
         assert box.y1 < figure.bbox.y1 + 1
     plt.close(figure)
+
+
+def test_words_of_a_report_fit_their_axes():
+    """Numbers of a narrow axis do not touch, and the name of a low panel is no longer than it."""
+    rigs = [ss.read_rig(f"examples/{name}.toml") for name in ("strengthening-gouge", "inclined-spring")]
+    run = ss.simulate(rigs[1], ss.protocol.VelocityStep(at=1.0, to=1.1e-6), until=9.0)
+    with figures.journal():
+        axes = [figures.root_locus(rigs[0]), *figures.history(run)]
+    for one in axes:
+        fit_words(one.figure)
+        one.figure.draw_without_rendering()
+        boxes = [text.get_window_extent() for text in one.get_xticklabels() if text.get_text()]
+        assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
+    long = [one.yaxis.label for one in axes if "normal stress" in one.get_ylabel()]
+    assert [label.get_text() for label in long] == ["normal stress\n(MPa)"]
+    assert long[0].get_window_extent().height <= axes[-1].get_window_extent().height

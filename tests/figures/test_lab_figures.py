@@ -140,7 +140,7 @@ def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
     assert ax.get_title() == "likelihood: " + ("Gaussian" if found.gaussian else "not Gaussian")
     short = replace(found, rise=np.minimum(found.rise, 3.0))
     assert short.plot(Figure().subplots()).get_title().endswith("; the profile ends before 95 %")
-    assert ax.get_xlabel() == "d_c (µm)"
+    assert ax.get_xlabel() == r"$d_{\mathrm{c}}$ (µm)"
 
 
 def test_laws_and_experiments_as_bars():

@@ -31,4 +31,5 @@ class Balanced(HTMLParser):
 
 def words(text):
     """Visible text of a page, with its elements checked."""
-    return re.sub(r"\s+", " ", " ".join(Balanced(re.sub(r"<sub>(\w+)</sub>", r"_\1", text).replace("<wbr>", "")).words))
+    joined = re.sub("<wbr>|\u2060", "", re.sub(r"<sub>(\w+)</sub>", r"_\1", text))  # where lines may break, or not
+    return re.sub(r"\s+", " ", " ".join(Balanced(joined).words))

@@ -10,7 +10,7 @@ from read_pages import Balanced, words
 from rigs_of_theory import rate_state, rig
 from steadyslip.core.expressions import latex
 from steadyslip.reports.brief import text_html
-from steadyslip.reports.elements import html_text, math, table
+from steadyslip.reports.elements import html_text, math, paragraph, table
 
 # -- set as in print
 
@@ -110,3 +110,17 @@ def test_brackets_are_as_high_as_a_letter_or_the_fraction_that_they_hold():
     assert "symmetric" not in flat
     assert [divided.count(f'<mo {kind}="false">(</mo>') for kind in ("symmetric", "stretchy")] == [1, 1]
     assert "<mo>(" not in flat + divided
+
+
+def test_tables_too_wide_for_a_telephone_become_blocks():
+    """The third column of a fit was cut there; a table of short words keeps its columns."""
+    rows = [("evolution effect b", "−0.005294 ± 0.00067", "0.01346 to 0.01564")]
+    assert 'class="stacks"' in table(rows, ("parameter", "value", "95 %"))
+    assert 'class="stacks"' not in table([("evolution effect b", "0.0147", "0.0135")], ("parameter", "value", "edge"))
+
+
+def test_no_line_breaks_behind_the_slash_of_a_unit():
+    assert (
+        paragraph("from 0.6 N/um to 2 kN s/m, a/b")
+        == "<p>from 0.6\u00a0N/\u2060µm to 2\u00a0kN\u00a0s/\u2060m, a/b</p>"
+    )

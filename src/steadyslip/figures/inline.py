@@ -14,11 +14,11 @@ import numpy as np
 from matplotlib import pyplot as plt, rc_context
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.figures.style import JOURNAL
+from steadyslip.figures.style import JOURNAL, fit_words
 
 MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
 _LEAST = 640.0  # pixels across a figure, so that one column is sharp on a screen of two per CSS pixel (by trial)
-_LARGE = 6.5  # inches across from which letters are too small on a telephone, where such figures scroll instead
+_LARGE = 6.0  # inches across from which letters are too small on a telephone, where such figures scroll instead
 _SVG_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "steadyslip",
@@ -52,6 +52,7 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
             found = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
             if width is not None:
                 found.set_size_inches(width, found.get_size_inches()[1] * width / found.get_size_inches()[0])
+            fit_words(found)
             large = ' class="large"' if found.get_figwidth() >= _LARGE else ""
             text = io.StringIO()
             found.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -85,7 +86,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         figure.colorbar(points, ax=ax, label=axis_label(parameter_label(rig, along), unit_name))
     for edge, at in zip(edges, crossings, strict=True):
         what = words_of(rig, along) if along == name else "stiffness"
-        label = f"critical {what} {edge / factor:.4g} {unit_name}"
+        label = f"critical {what} {edge / factor:.4g}\xa0{unit_name}"
         ax.plot(at.real, at.imag, "D", color="white", markeredgecolor=BLACK, markersize=8, zorder=3, label=label)
     _set_view(ax, roots, own_roots, crossings)
     ax.plot(
@@ -158,8 +159,9 @@ def _own_label(ax: Axes, own_roots: Any) -> str:
     if not outside.size:
         return "this rig"
     values = ",\n".join(_format_complex(s) for s in outside if s.imag >= 0)
-    return f"this rig; out of view\n{values} 1/s"
+    return "this rig; out of view\n" + f"{values} 1/s".replace(" ", "\xa0")
 
 
 def _format_complex(s: complex) -> str:
-    return (f"{s.real:.3g}" + (f" ± {s.imag:.3g}i" if s.imag else "")).replace("-", "−")
+    text = f"{s.real:.3g}" + (f" ± {s.imag:.3g}i" if s.imag else "")
+    return re.sub(r"e([+-]\d+)", lambda power: rf"$\times10^{{{int(power[1])}}}$", text).replace("-", "−")

@@ -9,7 +9,14 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.format import format_quantity
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
-from steadyslip.figures.style import add_arrowheads, add_legend_above, axes_or_new, axis_label, display_unit
+from steadyslip.figures.style import (
+    add_arrowheads,
+    add_legend_above,
+    axes_or_new,
+    axis_label,
+    display_unit,
+    plain_log_ticks,
+)
 from steadyslip.machine.machine import Machine
 from steadyslip.model.sliding import steady_contact_at
 from steadyslip.motion.events import ContactSlip
@@ -82,6 +89,8 @@ def phase_plane(
         return ax
     if logarithmic:
         ax.set_xscale("log")
+        if high < 100 * low:  # less than two decades: numbers instead of powers of ten
+            plain_log_ticks(ax.xaxis)
     if abs(high - low) < _MIN_SPAN * max(abs(high), abs(low)):
         ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # otherwise rounding would fill the panel
     else:

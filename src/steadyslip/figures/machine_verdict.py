@@ -84,7 +84,6 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
         raise NotAvailable("no parameter of this machine has an edge that could be drawn")
     ax = axes_or_new(ax, 1.4 + 0.32 * len(margins))
     beside = partial(ax.text, 1.02, va="center", fontsize="small", transform=ax.get_yaxis_transform())
-    beside(-0.8, "edge")
     named: set[int] = set()
     for row, margin in enumerate(margins):
         known = (
@@ -108,7 +107,7 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     _label_rows(ax, [parameter_label(found.rig, margin.parameter) for margin in margins])
     left = len(undrawn_edges(found))
     more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
-    ax.set_xlabel(f"value over its own, now at 1{more}")
+    ax.set_xlabel(f"value over its own, now at 1;\nits edge is beside it{more}")
     add_legend_above(ax, 3, 1.0, fontsize="small")
     return ax
 

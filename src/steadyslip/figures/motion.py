@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding
@@ -26,6 +25,7 @@ from steadyslip.figures.style import (
     display_unit,
     given_panels,
     new_panels,
+    plain_log_ticks,
 )
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.machine.machine import Machine
@@ -165,9 +165,7 @@ def _velocity_panel(run: History, v: np.ndarray, ax: Axes, time: np.ndarray) -> 
         ax.set_yscale("log")
         load = load_shown
         if np.nanmax(v) < 100 * np.nanmin(v):  # less than two decades: numbers instead of powers of ten
-            ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_formatter(NullFormatter())
+            plain_log_ticks(ax.yaxis)
     ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label=reference)
     ax.plot(time, v / factor, color=BLUE, label="block")
     ax.set_ylabel(axis_label("velocity", unit))

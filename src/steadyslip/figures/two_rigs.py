@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.palette import BLACK, BLUE, STABLE, UNSTABLE
@@ -19,6 +17,7 @@ from steadyslip.figures.style import (
     axis_label,
     display_unit,
     parameter_label,
+    plain_log_ticks,
 )
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import growth_rate
@@ -68,7 +67,7 @@ def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
     _paint(ax, heights)
     if x[0] > 0:
         ax.set_xscale("log")
-        _plain_ticks(ax.xaxis)
+        plain_log_ticks(ax.xaxis)
     ax.set_xlim(x[0] / factor, x[-1] / factor)
     ax.set_xlabel(axis_label(parameter_label(rigs[0], name), unit))
     add_legend_above(ax, 2, 1.0, fontsize="small")
@@ -120,7 +119,7 @@ def _paint(ax: Axes, heights: _Heights) -> None:
     values = values[np.isfinite(values)]
     if heights.stable_above and values.min() > 0:
         ax.set_yscale("log")
-        _plain_ticks(ax.yaxis)
+        plain_log_ticks(ax.yaxis)
         low, high = values.min() / 1.6, values.max() * 1.6
     else:
         room = 0.12 * (values.max() - values.min() or 1.0)
@@ -135,10 +134,3 @@ def _paint(ax: Axes, heights: _Heights) -> None:
         )  # fmt: skip
     ax.axhline(heights.edge, color=BLACK, linewidth=1)
     ax.set_ylabel(heights.words)
-
-
-def _plain_ticks(axis: Axis) -> None:
-    """Mark 1, 2 and 5 of every decade of a logarithmic axis, as numbers without powers of ten."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())

@@ -105,21 +105,21 @@ def said(rig: Rig, name: str) -> str:
 
 
 _ESTIMATES = {
-    r"step\.(\d+)\.at": "time of change {} of the drive",
-    r"step\.(\d+)\.duration": "duration of change {} of the drive",
-    r"jump\.(\d+)": "time of jump {}",
-    r"lag": "lag of friction behind the drive",
-    r"trend\.1": "drift of friction over the record",
-    r"trend\.(\d+)": "drift of friction, order {}",
-    r"offset": "offset of friction",
-    r"start\.hold": "rest before the record",
-    r"initial\.(.+)": "{} at the beginning",
-    r"a - b": "direct less evolution effect a - b",
-    r"k_c": "critical stiffness k_c",
-    r"k/k_c": "stiffness over critical k/k_c",
-    r"k/k_cal": "stiffness over that of the calibration k/k_cal",
+    r"step\.(\d+)\.at": ("time of change {} of the drive", "change {}"),
+    r"step\.(\d+)\.duration": ("duration of change {} of the drive", "ramp {}"),
+    r"jump\.(\d+)": ("time of jump {}", "jump {}"),
+    r"lag": ("lag of friction behind the drive", "lag"),
+    r"trend\.1": ("drift of friction over the record", "drift"),
+    r"trend\.(\d+)": ("drift of friction, order {}", "drift, order {}"),
+    r"offset": ("offset of friction", "offset"),
+    r"start\.hold": ("rest before the record", "rest before"),
+    r"initial\.(.+)": ("{} at the beginning", "{} at first"),
+    r"a - b": ("direct less evolution effect a - b", "a − b"),
+    r"k_c": ("critical stiffness k_c", "k_c"),
+    r"k/k_c": ("stiffness over critical k/k_c", "k/k_c"),
+    r"k/k_cal": ("stiffness over that of the calibration k/k_cal", "k/k_cal"),
 }
-"""Words for what a fit finds beside parameters of a rig."""
+"""Words for what a fit finds beside parameters of a rig, and shorter ones for an axis."""
 
 
 def estimate_words(rig: Rig, name: str) -> str:
@@ -130,23 +130,44 @@ def estimate_words(rig: Rig, name: str) -> str:
     ['direct effect a (record 2)', 'time of change 1 of the drive', 'drift of friction over the record']
     """
     bare, _, record = name.partition("@")
-    found = ((re.fullmatch(pattern, bare), words) for pattern, words in _ESTIMATES.items())
-    text = next((words.format(*match.groups()) for match, words in found if match), "") or said(rig, bare)
+    text = _estimate(bare)[0] or said(rig, bare)
     return f"{text} (record {record})" if record else text
 
 
+def estimate_label(name: str) -> str:
+    """Short words of what a fit finds, for an axis: those of the record, or the last part of the name of a parameter.
+
+    >>> [estimate_label(name) for name in ("friction.a@2", "step.1.at", "trend.1", "friction.states.2.b")]
+    ['a (2)', 'change 1', 'drift', 'b_2']
+    """
+    bare, _, record = name.partition("@")
+    number = _number_in(bare)
+    text = _estimate(bare)[1] or bare.rpartition(".")[2] + (f"_{number}" if number else "")
+    return f"{text} ({record})" if record else text
+
+
+def _estimate(name: str) -> tuple[str, str]:
+    """Words, and shorter ones, of what a fit finds beside parameters of a rig; empty for a parameter."""
+    found = ((re.fullmatch(pattern, name), words) for pattern, words in _ESTIMATES.items())
+    for match, (long, short) in found:
+        if match:
+            return long.format(*match.groups()), short.format(*match.groups())
+    return "", ""
+
+
 def worded(rig: Rig, text: str) -> str:
-    """Text with words and letters instead of the dotted names of parameters.
+    """Text with words and letters instead of the dotted names of parameters, and of what a fit finds beside them.
 
     >>> from steadyslip.reproduce import paper_rig
-    >>> worded(paper_rig(), "measure friction.d_c (67 %) next")
-    'measure slip distance d_c (67 %) next'
+    >>> worded(paper_rig(), "measure friction.d_c (67 %) next; step.1.at is open")
+    'measure slip distance d_c (67 %) next; time of change 1 of the drive is open'
     """
-    return re.sub(
-        r"(?<![\w.-])\w+(?:\.[\w-]+)+",
-        lambda found: said(rig, found[0]) if found[0] in rig.parameters() else found[0],
-        text,
-    )
+
+    def words(found: re.Match[str]) -> str:
+        name = found[0]
+        return said(rig, name) if name in rig.parameters() else _estimate(name)[0] or name
+
+    return re.sub(r"(?<![\w.-])\w+(?:\.[\w-]+)+", words, text)
 
 
 def _said(rig: Rig, name: str) -> str:

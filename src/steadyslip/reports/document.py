@@ -43,8 +43,8 @@ body { background: #fff; }
   .report.steadyslip-told p { margin: 7px 0; }
   .report.steadyslip-told figure { margin: 5px 0; }
   .report.steadyslip-told figcaption { font-size: 12px; line-height: 1.35; }
-  .report figure > svg:not(.sketch), .report figure > img, .report .broad > svg {
-    max-height: 78mm; width: auto !important; }
+  .report figure > :is(svg, img):not(.sketch, .large) { max-height: 78mm; width: auto !important; }
+  .report .large { max-height: 200mm; }
   .report.steadyslip-told .pair { grid-template-columns: 1fr 1fr; gap: 0 6mm; }
   .report .pair > figure > :is(svg, img) { max-height: none; width: 100% !important; }
   .report.steadyslip-told .wide, .report.steadyslip-told .formula { overflow: visible; }

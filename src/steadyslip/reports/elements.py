@@ -24,12 +24,14 @@ _EXPONENT, _SUPERSCRIPTS = (
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
 _NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # between a number and its unit, or what it counts
 _POWER = re.compile(r"(?<=10)([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) (?=[A-Za-zµ])")  # between a power of ten and its unit
+_SLASH = re.compile(r"(\d\u00a0(?:[^\s/]+\u00a0)?[^\s/]+/)(?=\S)")  # within a unit, such as N/µm, behind its number
 _UNIT = r"[mkMGTnµ]?(?:N|m|s|g|Pa|J|W|rad)|[cd]m|deg|rev"
 _WITHIN = re.compile(
     rf"(?<=\d\u00a0)(?:{_UNIT})[²³]?(?: (?:{_UNIT})[²³]?(?![\w.]))+"
 )  # a unit of several words behind its number
 _LONG = 30  # characters of a word that may be broken, for it is none
 _NARROW = 3  # columns that fit on a telephone (by trial, at 360 px)
+_NARROW_LINE = 44  # letters that fit beside each other there, of 13 px (358 px of some 8 px each)
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
@@ -71,6 +73,7 @@ STYLE = """
 @media screen and (max-width: 600px) {
   .steadyslip-told .broad { display: none; }
   .steadyslip-told .narrow { display: block; }
+  .steadyslip-told .narrow > svg { width: 100% !important; }
   .steadyslip-told figure:not(.pair > figure):has(> :is(svg, img)) { overflow-x: auto; }
   .steadyslip-told figure:not(.pair > figure) > :is(svg, img).large { max-width: none; width: 580px !important; }
   .steadyslip-told table { font-size: 13px; }
@@ -99,13 +102,15 @@ def why(refused: Exception) -> str:
     return re.split(r"; (?:offered are|ask `|stable_stiffness)", str(refused))[0]
 
 
-def html_text(text: Any) -> str:
+def html_text(text: Any, prose: bool = False) -> str:
     """Text with print typography, escaped for HTML; subscripts of letters, such as d_c, stand below the line.
 
-    No line breaks between a number and its unit or error, nor within a unit.
+    No line breaks between a number and its unit or error, nor within a unit; in `prose` not behind its slash either.
     """
     words = _WITHIN.sub(lambda unit: unit[0].replace(" ", "\u00a0"), _NUMBER.sub("\u00a0", typographic(text)))
     words = _POWER.sub("\\1\u00a0", words)
+    if prose:
+        words = _SLASH.sub("\\1\u2060", words)
     return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", html.escape(words, quote=True))
 
 
@@ -120,7 +125,7 @@ def with_subscripts(text: str) -> str:
 
 def paragraph(text: str, kind: str = "") -> str:
     """HTML paragraph of plain text, with an optional CSS class."""
-    return f"<p{f' class={kind!r}' if kind else ''}>{html_text(text)}</p>"
+    return f"<p{f' class={kind!r}' if kind else ''}>{html_text(text, prose=True)}</p>"
 
 
 def heading(text: str, level: int = 2) -> str:
@@ -132,11 +137,12 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
     """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of a row is its header.
 
     Tables with a caption are numbered by the style sheet of a document, as figures are. On a narrow screen the rows of
-    one with more than `_NARROW` columns become blocks, with the name of its column before each cell.
+    one with more than `_NARROW` columns, or wider ones, become blocks, with the name of its column before each cell.
     """
+    rows = list(rows)
     above = f"<caption>{html_text(caption)}</caption>" if caption else ""
     top = f"<thead><tr>{''.join(f'<th scope=col>{html_text(cell)}</th>' for cell in head)}</tr></thead>" if head else ""
-    stacked = len(head) > _NARROW
+    stacked = len(head) > _NARROW or (bool(head) and _least_width(rows) > _NARROW_LINE)
     names = [f' data-head="{html_text(cell)}"' if cell else "" for cell in head[1:]] if stacked else []
     lines = []
     for row in rows:
@@ -153,6 +159,22 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
         if lines
         else ""
     )
+
+
+def _least_width(rows: Sequence[Sequence[Any]]) -> int:
+    """Letters of the longest words of each column together, with the room between columns; HTML does not count."""
+    columns = zip_longest(*rows, fillvalue="")
+    longest = [
+        max((len(word) for cell in column if not isinstance(cell, Markup) for word in _words(cell)), default=0)
+        for column in columns
+    ]
+    return sum(longest) + max(len(longest) - 1, 0)
+
+
+def _words(cell: Any) -> list[str]:
+    """Parts of the text of a cell between which a line may be broken."""
+    text = _NUMBER.sub("\u00a0", typographic(cell))
+    return [text] if _width_class(text) == " class=n" else text.split(" ")
 
 
 def _breakable(name: str) -> str:

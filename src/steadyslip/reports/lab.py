@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from steadyslip import figures
@@ -34,7 +35,7 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
     rig, rows = result.rig(), _estimate_rows(result, result.rig())
     body = [
         *_use(result), heading("What was found"), table(rows, _FOUND),
-        *(paragraph(text, "warning") for text in warnings(result)),
+        *(paragraph(worded(rig, text), "warning") for text in warnings(result)),
     ]  # fmt: skip
     if draws is not None:
         body += [heading("How sure is that?"), *_draws_section(draws)]
@@ -120,9 +121,10 @@ def _draws_section(result: Draws) -> list[str]:
     """HTML of draws: values, errors and intervals beside those of the fit, sampler, figure."""
     rows = []
     for one in result.fit.estimates:
-        low, high = (format_quantity(end, one.unit, area=one.area) for end in result.interval(one.name))
+        low, high = result.interval(one.name)
         error = format_quantity(result.error(one.name), one.unit, 3, one.area)
-        rows.append((estimate_words(result.fit.rig(), one.name), one.shown(), error, f"{low} to {high}"))
+        interval = replace(one, low=low, high=high).range()
+        rows.append((estimate_words(result.fit.rig(), one.name), one.shown(), error, interval))
     details = ", ".join(f"{name} {value:.4g}" for name, value in result.details.items())
     many = f"{len(result)} draws, {result.kind}{f' ({details})' if details else ''}."
     body = [
@@ -142,7 +144,8 @@ def _draws(result: Draws) -> Parts:
     rig, names = result.fit.rig(), record_names(result.fit)
     body = [
         heading("What was found"), *_draws_section(result),
-        heading("The fit"), *(paragraph(text, "warning") for text in warnings(result.fit)), _details(result.fit, rig),
+        heading("The fit"), *(paragraph(worded(rig, text), "warning") for text in warnings(result.fit)),
+        _details(result.fit, rig),
     ]  # fmt: skip
     question = f"Which values of friction do the records allow: {names}?"
     return Parts(f"{len(result)} draws, {result.kind}, from {names}", "", question, body, rig)

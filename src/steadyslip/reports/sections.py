@@ -14,7 +14,8 @@ import sympy as sp
 
 from steadyslip import figures
 from steadyslip.core.areas import outside, stress_name
-from steadyslip.core.errors import SteadyslipError
+from steadyslip.core.dimensions import unit
+from steadyslip.core.errors import QuantityError, SteadyslipError
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import column_html
@@ -35,13 +36,16 @@ from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, motion_after
 from steadyslip.verdict.words import PACE
 
+_LONGEST_UNIT = 12  # characters of a comment that may be a unit: N m s/rad has 9
+
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
     """HTML of what the verdict takes for granted."""
     yield heading("Assumptions")
     inertia = "with inertia" if has_structure(rig) or build_model(rig).inertial else "without inertia (quasistatic)"
     bodies = "structures move as their matrices say, other" if has_structure(rig) else ""
-    words = f"The rig is modelled {inertia}; {bodies} bodies are rigid, and each contact has one normal force."
+    what = "machine" if rig.in_forces else "rig"
+    words = f"The {what} is modelled {inertia}; {bodies} bodies are rigid, and each contact has one normal force."
     yield paragraph(words.replace("  ", " "))
     yield paragraph(validity)
     yield from (paragraph(text, "warning") for text in warnings)
@@ -57,9 +61,9 @@ def tolerances_of(found: Tolerated | None) -> dict[str, str]:
 
 
 def notes_of(text: str) -> dict[str, str]:
-    """Comments behind the values of a rig file by dotted name, empty where there is none.
+    """Comments behind the values of a rig file by dotted name, empty where there is none, or a unit only.
 
-    >>> notes_of("[friction]\\na = 0.01  # measured on B819\\nb = 0.02")
+    >>> notes_of("[friction]\\na = 0.01  # measured on B819\\nb = 0.02  # 1")
     {'friction.a': 'measured on B819', 'friction.b': ''}
     """
     found, section = dict.fromkeys(_keys(tomllib.loads(text)), ""), ""
@@ -71,8 +75,17 @@ def notes_of(text: str) -> dict[str, str]:
                 many[section] += 1
                 section = f"{section}.{many[section]}"
         elif key := re.match(r"\s*([\w-]+)\s*=\s*(?:\"[^\"]*\"|[^#\"])*(?:#\s*(.*))?$", line):
-            found |= {name: (key[2] or "").strip() for name in [f"{section}.{key[1]}"] if name in found}
+            note = (key[2] or "").strip()
+            found |= {name: "" if _is_unit(note) else note for name in [f"{section}.{key[1]}"] if name in found}
     return found
+
+
+def _is_unit(note: str) -> bool:
+    """True of a comment that only tells the unit of its value, such as ``1/m``."""
+    try:
+        return len(note) <= _LONGEST_UNIT and unit(note) is not None
+    except QuantityError:
+        return False
 
 
 def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
@@ -160,10 +173,10 @@ def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
     rows = []
     for letter in letters_in(printed):
         if letter not in inputs:
-            unit, words = known.get(letter, ("", ""))
-            if unit:
-                unit = outside(unit, rig.area)[1]
-            rows.append((inline_math(sp.Symbol(letter)), unit, stress_name(words, rig.area)))
+            counted, words = known.get(letter, ("", ""))
+            if counted:
+                counted = outside(counted, rig.area)[1]
+            rows.append((inline_math(sp.Symbol(letter)), counted, stress_name(words, rig.area)))
     return table(
         rows, ("letter", "unit", "meaning"), left=False, caption="Letters of the equations besides the inputs."
     )

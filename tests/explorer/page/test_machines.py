@@ -33,6 +33,7 @@ def test_a_page_of_what_nothing_damps_says_undamped(browser, tmp_path):
             visit.page.locator(".bar").get_attribute("aria-label").startswith("undamped values of link one stiffness")
         )
         assert "undamped" in visit.page.locator(".map .word").all_text_contents()
+        assert "Stable means" not in visit.page.inner_text("footer"), "which is not what it is"
         assert "neither grows" in visit.page.locator(".facts tbody").inner_text()
         visit.type("contacts.belt.friction.viscous", "0.1")
         assert visit.sentence().startswith("Stable")

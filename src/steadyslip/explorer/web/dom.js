@@ -44,6 +44,9 @@ export function putAt(element, places) {
 /** Sentence in which no line ends between a number and its unit. @param {string} text */
 export const unbroken = (text) => text.replace(/(\d) (?=[^\s\d(])/g, "$1\u00a0");
 
+/** Text in which no line ends behind the slash of a unit, as in N/m. @param {string} text @returns {(string | Node)[]} */
+const whole = (text) => text.split(/(\d\u00a0[^\s/]+\/[^\s,;:]+)/).map((part, n) => (n % 2 ? make("span", { className: "whole", textContent: part }) : part));
+
 /** Text with the subscripts of letters, as in v_ref, below the line. @param {string} text @returns {(string | Node)[]} */
 export const subscripted = (text) => text.split(/(?<=(?<![\p{L}\d_.])\p{L})_([\p{L}\d]+)/u).map((part, n) => (n % 2 ? make("sub", { textContent: part }) : part));
 
@@ -51,6 +54,6 @@ export const subscripted = (text) => text.split(/(?<=(?<![\p{L}\d_.])\p{L})_([\p
 export function tell(element, text) {
   if (element.told === text && element.firstChild) return;
   element.told = text;
-  if (text.includes("_")) element.replaceChildren(...subscripted(text));
+  if (/[_/]/.test(text)) element.replaceChildren(...subscripted(text).flatMap((part) => (typeof part === "string" ? whole(part) : part)));
   else element.textContent = text;
 }

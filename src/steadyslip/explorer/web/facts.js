@@ -87,7 +87,7 @@ export class Facts {
     const found = page.edges(), far = found.filter((edge) => edge.far);
     const near = found.filter((edge) => !edge.far), [next] = near, one = next && page.rig.data.parameters[next.i];
     this.near.replaceChildren(...rows(near));
-    tell(page.next, one ? `nearest edge: ${one.title} → ${told(one, next.at, apart(page.rig.values[next.i], next.at))}, ${change(one, page.rig.values[next.i], next.at)}` : "");
+    tell(page.next, one ? `edge: ${one.title} → ${told(one, next.at, apart(page.rig.values[next.i], next.at))}, ${change(one, page.rig.values[next.i], next.at)}` : "");
     this.far.hidden = !far.length;
     if (far.length === found.length) this.far.open = true;
     tell(this.far.firstChild, `${far.length} ${fill(page.rig.data.beyond.far, page.rig.data)}`);

@@ -6,6 +6,7 @@ import { button, make, put } from "./dom.js";
 import { edgesOf } from "./edges.js";
 import { Facts } from "./facts.js";
 import { leaving } from "./leaving.js";
+import { STABLE } from "./linear.js";
 import { Chart } from "./map.js";
 import { unitFor } from "./quantities.js";
 import { Rig, inside, nearestOf, rangeOf, scaleOf } from "./rig.js";
@@ -59,6 +60,7 @@ export class Page {
     this.measure();
     this.tabs = Object.entries(OPENED).map(([part, words]) => make("button", { type: "button", textContent: words, onclick: () => this.open(part) }));
     this.word = make("b", {});
+    this.means = make("span", { className: "tells", textContent: this.rig.data.means }); // what "stable" leaves open
     this.next = make("small", {}); // the nearest edge, on a narrow page
     root.replaceChildren(this.skips(), this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, this.next, ...this.tabs));
     this.open(this.part);
@@ -194,7 +196,7 @@ export class Page {
   foot() {
     const many = this.rig.data.checks.length;
     const words = this.differs.length ? "" : `This browser agrees with ${many} answers of Python that came with the page. `;
-    return make("footer", {}, `${words}Everything is computed here; the page asks for nothing from outside. ${this.rig.data.means}`);
+    return make("footer", {}, `${words}Everything is computed here; the page asks for nothing from outside. `, this.means);
   }
 
   scale(i) {
@@ -394,6 +396,7 @@ export class Page {
     if (!this.controls) return;
     this.trace();
     this.banner.follow(this.answer, this.edges()[0]);
+    this.means.hidden = this.answer.status !== STABLE;
     this.controls.show();
     this.chart.show();
     this.facts.show(this.answer);

@@ -43,7 +43,9 @@ export function axis(box, scale, [low, high], one, label, upright) {
   const logarithmic = low > 0 && high / low > 30 && scale.of(0.5 * (low + high)) > 0.6;
   const [factor, name] = unitFor({ factor: 1, own: NEW, ...one }, Math.max(Math.abs(low), Math.abs(high)) / (logarithmic ? Math.sqrt(high / low) : 1));
   const group = svg("g", { class: "axis" }), length = upright ? box.height : box.width;
-  const marks = ticks(low / factor, high / factor, logarithmic, length / (upright ? 40 : 80));
+  const ends = [low / factor, high / factor], most = length / (upright ? 40 : 80);
+  let marks = ticks(...ends, logarithmic, most);
+  if (marks.length < 2) marks = ticks(...ends, false, 2 * most); // one number tells no scale
   const many = Math.min(12, Math.max(3, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (Math.abs(high - low) || 1))) + 3)); // digits that distinguish the ticks
   const powers = logarithmic && marks.some((value) => digits(value, 3).includes("e"));
   for (const value of marks) {

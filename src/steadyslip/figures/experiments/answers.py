@@ -13,8 +13,9 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from steadyslip.experiments.answers.predict import probability_text
-from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import axes_or_new, axis_label, display_unit
+from steadyslip.figures.experiments.panels import panel_grid
+from steadyslip.figures.style import axes_or_new, axis_label, display_unit, with_subscripts
+from steadyslip.machine.letters import estimate_label
 from steadyslip.nonlinear.kicks.kicks import KICKS
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
             ax.axvline(end, color=VERMILION, linewidth=1, linestyle=style)
         ax.plot([], [], color=VERMILION, linestyle=style, label=f"{100 * level:.0f} %")
     ax.set_ylim(0.0, min(top, 12.0))
-    ax.set_xlabel(axis_label(axis_name(result.name), unit))
+    ax.set_xlabel(axis_label(with_subscripts(estimate_label(result.name)), unit))
     ax.set_ylabel("rise of the misfit, −2 ln of the profile likelihood (1)")
     cut = "" if np.all(np.isfinite(result.interval(0.95))) else "; the profile ends before 95 %"
     ax.set_title(f"likelihood: {'Gaussian' if result.gaussian else 'not Gaussian'}{cut}", fontsize="medium")
@@ -147,7 +148,7 @@ def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
         ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
     ax.set_yticks(place, labels)
     ax.set_ylim(-0.6, len(labels) - 0.4)
-    ax.set_xlabel(axis_label(f"error of {axis_name(result.parameter)}", unit))
+    ax.set_xlabel(axis_label(f"error of {with_subscripts(estimate_label(result.parameter))}", unit))
     return ax
 
 

@@ -14,9 +14,9 @@ from scipy.stats import chi2, norm
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.palette import BLACK, BLUE, SKY, VERMILION
 from steadyslip.experiments.answers.uncertainty import Draws
-from steadyslip.figures.experiments.panels import axis_name, panel_grid
+from steadyslip.figures.experiments.panels import panel_grid
 from steadyslip.figures.style import axis_label, display_unit, is_narrow, with_subscripts
-from steadyslip.machine.letters import letter_of
+from steadyslip.machine.letters import estimate_label, letter_of
 from steadyslip.machine.rig import Rig
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _letters(rig: Rig, names: Sequence[str]) -> dict[str, str]:
     known = rig.parameters()
     letters = {name: letter_of(rig, name) for name in names if name in known}
     own = {name: letter for name, letter in letters.items() if letter and [*letters.values()].count(letter) == 1}
-    return {name: with_subscripts(own[name]) if name in own else axis_name(name) for name in names}
+    return {name: with_subscripts(own.get(name) or estimate_label(name)) for name in names}
 
 
 class _Scale:

@@ -70,13 +70,3 @@ def commanded_curve(course: Course, data: Record, time: np.ndarray) -> tuple[np.
     inside = [t for t in ends if data.time[0] < t < data.time[-1]]
     moments = np.sort(np.concatenate([data.time, inside]))
     return np.interp(moments, data.time, time), course.at(moments)
-
-
-def axis_name(name: str) -> str:
-    """Short name of a fitted parameter for an axis: last part, with its memory variable; steps and jumps in full."""
-    first, _, last = name.rpartition(".")
-    if ".states" in first:
-        return f"{last} {first.rpartition('.')[2]}"
-    if first.partition(".")[0] in ("jump", "step", "start", "initial", "trend"):
-        return name
-    return last

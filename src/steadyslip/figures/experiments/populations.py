@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.palette import BLUE, GREY, SKY, VERMILION
-from steadyslip.figures.experiments.panels import axis_name, panel_grid
-from steadyslip.figures.style import axis_label, display_unit
+from steadyslip.figures.experiments.panels import panel_grid
+from steadyslip.figures.style import axis_label, display_unit, with_subscripts
+from steadyslip.machine.letters import estimate_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +60,7 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
                 "s",
                 "with the others, 95 %" if y == place[0] else "",
             )
-        panel.set_xlabel(axis_label(axis_name(name), unit))
+        panel.set_xlabel(axis_label(with_subscripts(estimate_label(name)), unit))
         panel.set_yticks(place, list(result.fits) if panel is panels[0] else [""] * rows)
         panel.set_ylim(-0.6, rows - 0.4)
         panel.locator_params(axis="x", nbins=4)

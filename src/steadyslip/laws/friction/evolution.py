@@ -56,7 +56,7 @@ class Evolution(FrozenRecord, family="evolution law"):
 
 
 class Slip(Evolution, name="slip"):
-    """Slip law (Ruina 1983; eq. 1 of Dupont & Bapna): Θ̇ = −(v/d_c)[ln(v/v_ref) + Θ]."""
+    """Slip law (Ruina 1983; eq. 1 of Dupont & Bapna): dΘ/dt = −(v/d_c)[ln(v/v_ref) + Θ]."""
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         return -v / d_c * (sp.log(v / v_ref) + state)

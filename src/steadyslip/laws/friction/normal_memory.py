@@ -92,7 +92,7 @@ class NoMemory(NormalMemory, name="none"):
 
 
 class LinkerDieterich(NormalMemory, name="linker-dieterich"):
-    """Linker & Dieterich (1992): Θ̇ has an extra −α σ̇/(bσ).
+    """Linker & Dieterich (1992): dΘ/dt has an extra −α σ̇/(bσ).
 
     With the memory variable Ψ = bΘ + α ln(σ/σ_ref) no rate of σ is needed and jumps are exact:
     a sudden change σ1 → σ2 moves Θ by −(α/b) ln(σ2/σ1).

@@ -71,10 +71,9 @@ def test_lines_of_a_chart_end_at_its_frame_or_at_an_edge_of_steady_sliding():
 
 def _edge_over(rig, values):
     """Values of b, and the critical gain (N/µm) at each: what is critical beside the gain, and the gain."""
-    analyses = [ss.analyze(rig.with_values({"friction.b": float(one)})) for one in values]
-    known = [(b, one.critical_stiffness) for b, one in zip(values, analyses, strict=True)]
-    own = rig.value("drive.kp")
-    return np.array([(b, (k + own) * rig.area / 1e6) for b, k in known if k is not None]).T
+    critical = np.array([ss.critical_stiffness(rig.with_values({"friction.b": float(one)})) for one in values])
+    known = np.isfinite(critical)
+    return np.array([values, (critical + rig.value("drive.kp")) * rig.area / 1e6])[:, known]
 
 
 def test_contours_of_a_growth_rate_are_where_it_has_their_levels(tmp_path):

@@ -61,6 +61,11 @@ class Sliding:
     slip: sp.Expr
     ratio: sp.Expr
 
+    @property
+    def one_way(self) -> bool:
+        """True if the law knows forward slip alone: its velocity variable is a logarithm."""
+        return self.variable is not None and self.variable.kind == "logarithm"
+
 
 @dataclass(frozen=True, eq=False)
 class Reduction(Keeper):

@@ -53,7 +53,7 @@ def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
 
 
 @question
-def _slip_rates(model: Model) -> ArrayFunction:
+def slip_rates_at(model: Model) -> ArrayFunction:
     """Array function of slip rates from velocities of the coordinates, with the load point at its steady velocity."""
     steady = {model.inputs["load_velocity"]: model.steady[model.inputs["load_velocity"]]}
     slips = (model.definitions.get(contact.velocity, contact.velocity) for contact in model.contacts)
@@ -138,9 +138,9 @@ def _initial_values(
     alone = f"{own[0][0]}v"
     steady = point.evaluate(coordinate_speeds(model))
     speeds = [_number(start.get(f"{name}v", speed)) for (name, _), speed in zip(own, steady, strict=True)]
-    slips = point.evaluate(_slip_rates(model), *speeds)
+    slips = point.evaluate(slip_rates_at(model), *speeds)
     for i, (slip, sliding) in enumerate(zip(slips, reduction.slidings, strict=True)):
-        if sliding.variable is not None and sliding.variable.kind == "logarithm" and not np.all(slip > 0):
+        if sliding.one_way and not np.all(slip > 0):
             if model.is_single:
                 message = f"got {given.get(alone)!r}; allowed: > 0 m/s with this law"
                 raise ParameterError([Problem(f"initial.{alone}", message)])

@@ -196,3 +196,26 @@ def test_steady_sliding_is_found_where_rounding_moves_an_integral():
     kicked = Kicked(telescope, "velocity", 1, "before", {}, 0, None)
     found = np.sort_complex(kicked.rest.roots[0])
     np.testing.assert_allclose(found, np.sort_complex(ss.eigenvalues(telescope)), rtol=1e-6)
+
+
+def test_blows_against_a_belt_mirror_those_of_a_pulled_block():
+    """A block held on a belt is the pulled block seen from the belt: forward there is backward here, limits too."""
+    law = ss.laws.RateState(a=0.01, b=0.008, d_c=1e-5, mu_ref=0.5, v_ref=1e-3)
+    held, load = (
+        {"spring": ss.machine.Spring(between=("ground", "m"), stiffness=5e3)},
+        ss.laws.ConstantNormalStress(preload=10.0),
+    )
+    pulled = {"spring": ss.machine.Spring(between=("drive", "m"), stiffness=5e3)}
+    body, drive = {"m": ss.machine.SlidingBody(mass=2.0)}, ss.machine.Pull(velocity=1e-3)
+    belt = ss.Machine(bodies=body, links=held, drive=drive, contacts={
+        "c": ss.machine.Surface(body="drive", against="m", friction=law, contact=load)})  # fmt: skip
+    block = ss.Machine(bodies=body, links=pulled, drive=drive, contacts={
+        "c": ss.machine.Surface(body="m", friction=law, contact=load)})  # fmt: skip
+    for way in (1, -1):
+        own, other = (
+            ss.threshold(one, "impulse", at="m", direction=sign) for one, sign in ((belt, way), (block, -way))
+        )
+        assert own.size == other.size == np.inf
+        assert own.survived == pytest.approx(-other.survived, rel=1e-9)
+    assert own.survived == pytest.approx(-20.0)
+    assert ss.threshold(belt, "impulse", at="m").survived == pytest.approx(0.999 * 2e-3)  # more stops the slip

@@ -27,7 +27,7 @@ from steadyslip.motion.targets import Targets
 from steadyslip.nonlinear.inner_coordinates import refuse_many_inner
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
-from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, struck
+from steadyslip.nonlinear.kicks.places import largest_blow, place_problems, refuse_jump, size_units, struck
 from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
@@ -197,9 +197,12 @@ class Kicked:
     @property
     def highest(self) -> float:
         """Largest size that is searched: as told, or the usual; what would stop or lift the body is left out."""
-        usual = KICKS["impulse"].high if self._is_blow else self.kick.high
-        stops = self.sign < 0 and (self.kick.name in ("normal-stress", "normal-force") or self._is_blow)
-        return min(self.up_to or usual, 0.999 if stops else np.inf)
+        usual, stops = KICKS["impulse"].high if self._is_blow else self.kick.high, np.inf
+        if self._is_blow:
+            stops = largest_blow(self.jobs, self.at, self.sign * self.body_speed)
+        elif self.sign < 0 and self.kick.name in ("normal-stress", "normal-force"):
+            stops = 1.0
+        return min(self.up_to or usual, 0.999 * stops)
 
     @property
     def _is_blow(self) -> bool:

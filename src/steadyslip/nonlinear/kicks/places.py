@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.scales import natural_scales
-from steadyslip.model.start import coordinate_speeds
+from steadyslip.model.start import coordinate_speeds, slip_rates_at
 from steadyslip.model.weights import slip_rates
 from steadyslip.motion.jobs import Jobs
 from steadyslip.motion.single import areas as areas_of
@@ -135,6 +136,27 @@ def struck(point: OperatingPoint, at: str, change: Any) -> dict[str, Any]:
         for one, speed in zip(model.coordinates, speeds, strict=True)
         if one.name in moved
     }
+
+
+def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
+    """Size of a blow at which the first contact stops whose law knows forward slip alone, for `change` at size one.
+
+    Infinite where the blow stops no such contact: it may hurry contacts, or their laws know slip both ways.
+    """
+    model, point, found = jobs.point.model, jobs.point, math.inf
+    if not at:  # a slider's block
+        return 1.0 if np.any(change < 0) and jobs.reduction.slidings[0].one_way else found
+    steady = [np.asarray(one, dtype=float) for one in point.evaluate(coordinate_speeds(model))]
+    names = [one.name for one in model.coordinates]
+    after = struck(point, at, change)
+    speeds = [after.get(f"{name}.v", speed) for name, speed in zip(names, steady, strict=True)]
+    before, later = point.evaluate(slip_rates_at(model), *steady), point.evaluate(slip_rates_at(model), *speeds)
+    for sliding, slip, then in zip(jobs.reduction.slidings, before, later, strict=True):
+        if sliding.one_way:
+            lost = np.maximum(np.asarray(slip, dtype=float) - then, 0.0)
+            with np.errstate(divide="ignore"):
+                found = min(found, float(np.min(slip / lost)))
+    return found
 
 
 def _share_of_blow(model: Model, at: str) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,6 +30,7 @@ from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.loading.loading import as_followed
 from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.measured.waves import WAVE
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.machine import Machine
@@ -173,6 +174,7 @@ def search_fit(
 
     Where a displacement around changes is beside the commanded loading, and friction is not fitted to its noise with
     the load point that follows it, friction tells if it does: else the sensor has glitches there.
+    So it tells of a wave that repeats with travel.
     """
     search: Any = {"errors": errors, "starts": starts, "effort": effort, "threads": threads, "progress": progress}
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
@@ -197,7 +199,20 @@ def search_fit(
                 break
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
-    return fit_with_errors(Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+    fit = fit_with_errors(Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+    wavy = any(WAVE in note for record in plan.records for note in record.notes)
+    if wavy and plan.drive == "commanded" and not plan.beginnings and fit.whiteness.p < STRUCTURE:
+        moving = options | {"drive": "smoothed", "initial": "free"}  # a load point in a wave slides steadily nowhere
+        return _better(fit, lambda: search_fit(rig, records, free, **search, **moving))
+    return fit
+
+
+def _better(fit: Fit, other: Callable[[], Fit]) -> Fit:
+    """Fit with less residuals of two, of which the other may fail."""
+    try:
+        return min(fit, other(), key=operator.attrgetter("rms"))
+    except NotAvailable:
+        return fit
 
 
 def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | None, **options: Any) -> Fit:

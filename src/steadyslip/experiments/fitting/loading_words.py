@@ -10,6 +10,7 @@ from steadyslip.core.format import enumerated, format_percent, format_quantity
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.protocol_words import protocol_against_record
 from steadyslip.experiments.loading.across import yielding
+from steadyslip.experiments.measured.waves import WAVE
 from steadyslip.experiments.numerics.noise import STRUCTURE, whiteness
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
@@ -103,6 +104,11 @@ def _waves(fit: FitNumbers) -> list[str]:
     """Warnings on displacements that wander about their lines by much more than noise, and not as slow noise does."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading if fit.plan.follows else (), strict=False):
+        found += [
+            f"{record.source}: {note}, as one of its sensor; if the load point moves so, drive = 'smoothed' follows it"
+            for note in record.notes
+            if WAVE in note
+        ]
         load, moved = loading.load, record.displacement
         if load is None or moved is None or load.curve is not None or any(one.pieces for one in load.changes):
             continue

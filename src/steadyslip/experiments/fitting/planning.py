@@ -24,6 +24,7 @@ from steadyslip.experiments.fitting.settings import FitSettings, faults
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.clipped import without_clipped, without_wild
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.measured.waves import without_wave
 from steadyslip.experiments.numerics.splitting import spread
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.slider import Slider
@@ -76,6 +77,8 @@ def make_plan(
         options["weights"] = _checked_weights(weights, many, problems)
     if problems:
         raise ParameterError(problems)
+    if plan_protocol is None and options.get("drive", "commanded") == "commanded":
+        many = tuple(without_wave(record) for record in many)
     if weights is None:
         many = tuple(without_clipped(record) for record in many)
         if options.get("loss", "linear") == "linear":  # in other losses wild samples weigh little

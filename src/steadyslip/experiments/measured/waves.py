@@ -1,0 +1,146 @@
+"""Waves of a displacement sensor: errors that repeat with travel, as those of a scale, a screw or an encoder do.
+
+Lines through such a displacement have wrong rates, and slips and changes that are none. The wave is a sine of the
+place, fitted together with the lines between changes of the rate, and taken out.
+"""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.format import format_quantity
+from steadyslip.experiments.loading.kinks import load_course
+from steadyslip.experiments.loading.loading import Course
+from steadyslip.experiments.measured.record import Record, frozen
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
+
+GRID = 4096  # places of equal distance at which deviations are looked at for a wave: 10 a period of the shortest
+FEWEST_PERIODS, MOST_PERIODS = 3, GRID // 10
+LEAST_SHARE = 0.2  # of the variance of deviations from lines that one wave has; of noise with memory .9 it has .01
+WANDERS = 1.3  # times its noise from sample to sample by which a displacement strays, from which a wave is looked for
+MANY_SLIPS = 3  # slips and glitches of the sensor from which it is looked for too
+ROUNDS = 2  # of wave and lines in turn: lines without the wave have their changes where these are
+TURNS = 12  # of a place in terms of itself; each takes a share 2 pi amplitude / period of the error of the last
+OUTLIER = 4.0  # standard deviations beyond which a sample counts for nothing
+AFTER, SETTLED = 0.05, 6.0
+"""Share of a run, and lags of its servo, that its first samples last, in which the load point may still follow."""
+LEAST_GAIN = 0.8  # share of the strays, or of the slips and glitches, that is left where a wave was there
+LEAST_SIZE = 10.0  # amplitude in its standard errors, for white noise
+WAVE = "was taken out of the displacement"
+
+
+def without_wave(record: Record) -> Record:
+    """Record whose displacement has no wave that repeats with travel, with a note; itself where there is none."""
+    load, moved = record.loading.load, record.displacement
+    if load is None or moved is None or record.integrated or load.curve is not None or len(record) < 2 * FEWEST_PERIODS:
+        return record
+    noise = displacement_noise(record.time, moved)
+    if load.strays < WANDERS * noise and load.slips + load.glitches < MANY_SLIPS:
+        return record
+    travel = float(np.ptp(moved))
+    count = _periods(record.time, moved, load) if travel > 0 else None
+    if count is None:
+        return record
+    course, parts = load, _first(record.time, moved, load, count)
+    for _ in range(ROUNDS):
+        parts, place, error = _fitted(record.time, moved, course, parts)
+        course = load_course(record.time, place)
+        if course.curve is not None:
+            return record
+    size, period = float(np.hypot(*parts[:2])), float(parts[2])
+    halved = course.strays < 0.5 * load.strays
+    better = course.strays < LEAST_GAIN * load.strays
+    fewer = course.slips + course.glitches < LEAST_GAIN * (load.slips + load.glitches) - 1
+    told = halved or ((better or fewer) and course.strays < WANDERS * noise)
+    if not told or size < LEAST_SIZE * error:
+        return record
+    note = f"a wave of {format_quantity(size, 'm', 2)} every {format_quantity(period, 'm', 3)} of travel {WAVE}"
+    return replace(record, displacement=frozen(place), commanded=replace(record.loading, load=course),
+                   notes=(*record.notes, note))  # fmt: skip
+
+
+def _lines(time: Array, course: Course) -> tuple[Array, Array]:
+    """Columns (n, k) of a line for each run between changes, and mask of its samples, some after each change left out.
+
+    How the load point follows a change is not known before the wave is.
+    """
+    ends = np.array([time[0], *(change.time for change in course.changes), time[-1]])
+    keep = np.ones(len(time), dtype=bool)
+    for change, lasts in zip(course.changes, np.diff(ends)[1:], strict=True):
+        after = max(AFTER * lasts, SETTLED * change.lag, change.duration)
+        keep &= (time < min(change.earliest, change.time)) | (time > change.time + after)
+    run = np.searchsorted(ends[1:-1], time, side="right")
+    own = run[:, None] == np.unique(run[keep])
+    middles = [float(np.mean(time[one & keep])) for one in own.T]
+    columns = np.hstack([own, own * (time[:, None] - middles)])
+    size = np.linalg.norm(columns[keep], axis=0)
+    return columns / np.where(size > 0, size, 1.0), keep
+
+
+def _periods(time: Array, moved: Array, course: Course) -> float | None:
+    """Periods over all travel of the strongest wave in the deviations from lines; None if none is strong."""
+    lines, keep = _lines(time, course)
+    moved, lines = moved[keep], lines[keep]
+    left = moved - lines @ np.linalg.lstsq(lines, moved)[0]
+    order = np.argsort(moved, kind="stable")
+    edges = np.linspace(moved[order[0]], moved[order[-1]], GRID + 1)
+    bins = np.clip(np.searchsorted(edges, moved) - 1, 0, GRID - 1)
+    number = np.bincount(bins, minlength=GRID)
+    known = number > 0
+    means = np.bincount(bins, left, minlength=GRID)[known] / number[known]
+    even = np.interp(np.arange(GRID), np.flatnonzero(known), means)
+    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(GRID))) ** 2
+    power[:FEWEST_PERIODS] = power[MOST_PERIODS:] = 0.0
+    peak = int(np.argmax(power))
+    near = power[max(peak - 2, 0) : peak + 3]  # the window spreads a sine over three lines, and one more beside them
+    whole = float(np.sum((even - even.mean()) ** 2 * np.hanning(GRID) ** 2)) * GRID / 2
+    return float(peak) if np.sum(near) > LEAST_SHARE * whole else None
+
+
+def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Array, Array, float]:
+    """Fit of a wave (parts with sine and cosine, m; period, m): parameters, place (n,), standard error of a part."""
+    lines, keep = _lines(time, course)
+
+    for _ in range(2):  # the second without outliers of the first
+        base = np.linalg.qr(lines[keep])[0]
+
+        def left(parts: Array, base: Array = base, own: Array = moved[keep]) -> Array:
+            place = _place(own, parts)
+            return np.asarray(place - base @ (base.T @ place))
+
+        scales = np.append(np.full(2, np.hypot(*start[:2])), start[2] ** 2 / np.ptp(moved))
+        start = least_squares(left, start, x_scale=scales, diff_step=1e-6, method="lm").x
+        off = left(start)
+        scale = MAD_TO_SIGMA * float(np.median(np.abs(off)))
+        keep[keep] = np.abs(off) < OUTLIER * max(scale, 1e-300)
+    return start, _place(moved, start), scale * float(np.sqrt(2 / np.sum(keep)))
+
+
+def _place(moved: Array, parts: Array) -> Array:
+    """Place (n,) of the load point, of which the sensor shows place and wave."""
+    sine, cosine, period = parts
+    place = moved
+    for _ in range(TURNS):
+        angle = 2 * np.pi / period * place
+        place = moved - sine * np.sin(angle) - cosine * np.cos(angle)
+    return place
+
+
+def _first(time: Array, moved: Array, course: Course, count: float) -> Array:
+    """Parts and period of a wave near `count` periods over all travel, from a linear fit together with lines."""
+    lines, keep = _lines(time, course)
+
+    def fit(count: float) -> tuple[float, Array]:
+        angle = 2 * np.pi * count / np.ptp(moved) * moved[keep]
+        columns = np.column_stack([np.sin(angle), np.cos(angle), lines[keep]])
+        found = np.linalg.lstsq(columns, moved[keep])[0]
+        return float(np.sum((moved[keep] - columns @ found) ** 2)), found
+
+    counts = count + np.linspace(-1, 1, 17)
+    best = min(((*fit(one), one) for one in counts), key=operator.itemgetter(0))
+    return np.append(best[1][:2], np.ptp(moved) / best[2])

@@ -1,7 +1,9 @@
 """Slip events and what a run tells of itself: by their definition, whatever the steps, for laws that stick."""
 
+import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, plain_guide, rig
 from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.motion.sentence import sentence
+from steadyslip.motion.sentence import growing_swings, sentence, steady_swings
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -439,3 +441,32 @@ def test_a_step_that_lifts_a_block_off_is_told_as_that(mass):
         rig, {"slider.stiffness": [1e10, 2e10]}, ss.protocol.NormalStressStep(at=10.0, by=-51e6), until=20.0
     )
     assert list(many.status) == ["contact lost"] * 2
+
+
+def swung(size, end=100.0, period=0.5):
+    """Peaks and troughs of a velocity that swings by `size(t)` about 1."""
+    times = np.arange(0.0, end, 0.5 * period)
+    return [
+        SimpleNamespace(
+            contact="", kind=f"velocity {'peak' if k % 2 else 'trough'}", time=t, velocity=1 + (k % 2 - 0.5) * size(t)
+        )
+        for k, t in enumerate(times)
+    ]
+
+
+@pytest.mark.parametrize("rate", np.geomspace(0.002, 0.5, 9))
+def test_swings_that_have_come_to_an_end_are_no_more_told_to_grow(rate):
+    """Those that grow at one rate go on; those of a logistic growth are alike once it is over."""
+    going = swung(lambda t: 1e-3 * math.exp(rate * t))
+    assert list(growing_swings(going, 100.0)) == [""]
+    if rate * 50 > math.log(1.2):
+        assert steady_swings(going, 100.0) == {}
+    over = swung(lambda t: 0.5 / (1 + math.exp((60.0 - t) * 10 * rate)))
+    ended = 10 * rate * 30 > math.log(100)  # within a hundredth from the last tenth on
+    if ended:
+        assert growing_swings(over, 100.0) == {}
+        (found,) = steady_swings(over, 100.0).values()
+        assert found.high - found.low == pytest.approx(0.5, rel=0.011)
+        assert found.period == pytest.approx(0.5)
+    elif rate < 0.005:
+        assert list(growing_swings(over, 100.0)) == [""]

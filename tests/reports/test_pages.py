@@ -133,7 +133,7 @@ def test_a_report_says_everything_about_a_rig():
         assert part in text, part
     assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
     assert " um" not in text
-    assert found.html.count("<figure>") == 6  # the rig, two charts, eigenvalues, motion over time and in its plane
+    assert found.html.count("<figure") == 6  # the rig, two charts, eigenvalues, motion over time and in its plane
     assert found.html.count("<math") > 10
     assert found.html.count('class="steadyslip-root"') == 1
     assert len(found.html.encode()) <= 500_000
@@ -244,7 +244,7 @@ def test_runs_have_documents(results):
     count = len(results["history"].slip_events)
     assert f"{count} slip event{'' if count == 1 else 's'} in 1 min" in text or f"{count} slip event" in text
     assert "velocity-step" in found.html
-    assert found.html.count("<figure>") == 3
+    assert found.html.count("<figure") == 3
 
 
 @pytest.mark.usefixtures("unpainted")
@@ -313,7 +313,7 @@ def test_basins_have_documents(kicked):
     found = ss.basin(kicked[0], x=np.linspace(-1e-6, 1e-6, 5), v=np.geomspace(3e-7, 3e-6, 5), along="stiffness")
     document = ss.report(found, explorer=False).html
     assert f"{100 * found.share:.3g} % of the starting points return" in words(document)
-    assert document.count("<figure>") == 2
+    assert document.count("<figure") == 2
 
 
 @pytest.mark.usefixtures("unpainted")

@@ -84,11 +84,13 @@ def test_large_figures_scroll_on_a_telephone_and_keep_their_letters(tmp_path):
     ss.report(run, explorer=False).save(tmp_path / "a.html")
     sizes = """[...document.querySelectorAll("figure")].filter(one => one.querySelector(".large"))
         .map(one => [one.clientWidth, one.scrollWidth])"""
+    reached = "[...document.querySelectorAll('figure:has(> .large)')].every(one => one.tabIndex === 0)"
     with driver() as play:
         browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 390, "height": 740})
         page.goto((tmp_path / "a.html").as_uri())
         narrow, all_of_it = page.evaluate(sizes), page.evaluate("document.documentElement.scrollWidth")
+        assert page.evaluate(reached), "what scrolls takes the focus of the keyboard"
         page.set_viewport_size({"width": 1024, "height": 740})
         broad = page.evaluate(sizes)
         browser.close()

@@ -35,6 +35,7 @@ DIFFERS = " ({before} the time before)"
 """Slip of the forward event before the last, where it differs by more than `ALIKE`."""
 DIGITS = 3  # significant, of quantities in sentences
 TREND = 0.01  # relative growth or decay of swings in the last half of a run up to which they go on
+LAST = 0.9  # share of a run after which swings that grew before must be alike if they have come to an end
 BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
 SUDDEN = 10.0  # peak over mean speed of an event; a half sine has 1.6, stick-slip without creep before it 2 to 4
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
@@ -115,9 +116,9 @@ def joined(rig: Slider | Machine, sentences: Mapping[str, str]) -> str:
 
 
 class Swings(NamedTuple):
-    """Oscillation of a contact in the last half of a run: mean period (s), lowest and highest velocity (m/s), trend.
+    """Oscillation of a contact at the end of a run: mean period (s), lowest and highest velocity (m/s), trend.
 
-    The trend is the relative growth of the swings in that half; 0 where they become larger and smaller by turns.
+    The trend is the relative growth of the swings there; 0 where they become larger and smaller by turns.
     """
 
     period: float
@@ -127,11 +128,11 @@ class Swings(NamedTuple):
 
 
 def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
-    """Oscillation of each contact whose swings are alike in the last half of a run, by name."""
+    """Oscillation of each contact whose swings are alike in the last half of a run, or have come to an end, by name."""
     found = {}
     for name in dict.fromkeys(one.contact for one in events):
-        peaks, troughs = _extremes(events, name, end)
-        sizes = [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
+        peaks, troughs = _extremes(events, name, LAST * end if _settled(events, name, end) else 0.5 * end)
+        sizes = _sizes(peaks, troughs)
         if len(sizes) > 1 and max(sizes) < BEATS * min(sizes):
             period = (peaks[-1].time - peaks[0].time) / (len(peaks) - 1)
             low, high = min(one.velocity for one in troughs), max(one.velocity for one in peaks)
@@ -140,16 +141,25 @@ def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
 
 
 def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
-    """Last swing of each contact that swings more than half a run before, by name."""
+    """Last swing of each contact that swings more than half a run before, and goes on growing, by name."""
     found = {}
     for name in dict.fromkeys(one.contact for one in events):
-        peaks, troughs = _extremes(events, name, end)
-        if min(len(peaks), len(troughs)) > 1:
+        peaks, troughs = _extremes(events, name, 0.5 * end)
+        if min(len(peaks), len(troughs)) > 1 and not _settled(events, name, end):
             first, last = (peaks[i].velocity - troughs[i].velocity for i in (0, -1))
             if last > first:
                 period = peaks[-1].time - peaks[-2].time
                 found[name] = Swings(period, troughs[-1].velocity, peaks[-1].velocity, last / first - 1)
     return found
+
+
+def _settled(events: Sequence[AnyEvent], name: str, end: float) -> bool:
+    """True if swings that grew in the last half of a run do so no more at its end, by more than `TREND`.
+
+    Those that grew by as much as `BEATS` at one rate would do so by 4 % in the last tenth.
+    """
+    half, late = (_sizes(*_extremes(events, name, share * end)) for share in (0.5, LAST))
+    return len(late) > 2 and late[-1] > BEATS * half[0] and max(late) <= (1 + TREND) * min(late)
 
 
 def oscillations(events: Sequence[AnyEvent], end: float) -> dict[str, str]:
@@ -186,9 +196,14 @@ def _seen(swings: Swings) -> bool:
     return low != high
 
 
-def _extremes(events: Sequence[AnyEvent], name: str, end: float) -> tuple[list[AnyEvent], list[AnyEvent]]:
-    """Peaks and troughs of the velocity of a contact in the last half of a run."""
-    late = [one for one in events if one.contact == name and one.time > 0.5 * end]
+def _sizes(peaks: Sequence[AnyEvent], troughs: Sequence[AnyEvent]) -> list[float]:
+    """Velocities of peaks above those of the troughs (m/s)."""
+    return [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
+
+
+def _extremes(events: Sequence[AnyEvent], name: str, since: float) -> tuple[list[AnyEvent], list[AnyEvent]]:
+    """Peaks and troughs of the velocity of a contact from a time (s) on."""
+    late = [one for one in events if one.contact == name and one.time > since]
     peaks, troughs = ([one for one in late if one.kind == f"velocity {kind}"] for kind in ("peak", "trough"))
     return peaks, troughs
 

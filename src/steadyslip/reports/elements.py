@@ -323,9 +323,10 @@ def inline_math(symbol: sp.Symbol) -> Markup:
 
 
 def figure(drawing: str, caption: str = "") -> str:
-    """HTML figure of a drawing with a caption; empty if the drawing is empty."""
+    """HTML figure of a drawing with a caption; empty if the drawing is empty. Those that may scroll take the focus."""
     below = f"<figcaption>{html_text(caption)}</figcaption>" if caption else ""
-    return f"<figure>{drawing}{below}</figure>" if drawing else ""
+    scrolls = ' tabindex="0"' if drawing.startswith(('<svg class="large"', '<img class="large"')) else ""
+    return f"<figure{scrolls}>{drawing}{below}</figure>" if drawing else ""
 
 
 def beside(figures: Iterable[str]) -> str:

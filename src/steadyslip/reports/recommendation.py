@@ -17,7 +17,7 @@ from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import stability
 from steadyslip.machine.letters import said
 from steadyslip.reports.elements import heading, paragraph, table, why
-from steadyslip.verdict import Cures, StableWithin, Tolerated, Window, cure, stable_within
+from steadyslip.verdict import Cures, StableWithin, Tolerated, Window, analyze, cure, stable_within
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.change_costs import PART, SETTING, TASK, unit_cost
 from steadyslip.verdict.cures import default_adjust
@@ -86,9 +86,12 @@ def recommendation(
         yield from _cured(analysis, {}, adjustable, "stable", "stable at")
         return
     close = [one for one, row in found.items() if adjustable or not _is_far(one.value, row.edge)]
+    first, *_ = close or found
     rows = [found[one].cells for one in close or found][:_ROWS]
     name, now, to, *_ = rows[0]
-    yield paragraph(f"Change {name} from {now} to {to}. Each row below is enough alone, the others unchanged.")
+    alone = " Each row below is enough alone, the others unchanged." if len(rows) > 1 else ""
+    because = _because(analysis, {first.parameter: found[first].to})
+    yield paragraph(f"Change {name} from {now} to {to}.{because}{alone}")
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
     sequence = "Changes that make it stable: first of settings, then of parts, last of the speed, which is the task."
@@ -284,10 +287,11 @@ def _curing(margin: Margin) -> list[Boundary]:
 
 
 class _Change(NamedTuple):
-    """Row of a table: name, value, recommended value, edge, that it is stable there; and the edge as a number."""
+    """Row of a table: name, value, recommended value, edge, that it is stable there; edge and new value in SI units."""
 
     cells: tuple[str, str, str, str, str]
     edge: float
+    to: float
 
 
 def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Change | None:
@@ -307,8 +311,16 @@ def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _C
             if stability(rig.with_values({margin.parameter: to})) == "stable":
                 now, then, end = (_value(analysis, margin, value) for value in (margin.value, to, edge))
                 word = "above" if rises else "below"
-                return _Change((said(rig, margin.parameter), now, then, f"{word} {end}", "yes"), edge)
+                return _Change((said(rig, margin.parameter), now, then, f"{word} {end}", "yes"), edge, to)
     return None
+
+
+def _because(analysis: Analysis, change: Mapping[str, float]) -> str:
+    """Sentence on why a change helps: what feeds the motion of a machine, or the reason for the verdict with it."""
+    if analysis.origin is not None:
+        return f" Why it is unstable: {analysis.origin.words}."
+    rig: Any = analysis.rig
+    return "" if rig.contacts else f" Then {analyze(rig.with_values(change), branch=analysis.branch).reason}."
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:

@@ -303,7 +303,10 @@ def _slip_table(result: History) -> Iterator[str]:
     drop = "force drop" if isinstance(slips[0], ContactSlip) else "stress drop"
     if len(rows) > MAX_ROWS:
         yield paragraph(f"The last {MAX_ROWS} of {len(rows)}.", "small")
-    yield table(rows[-MAX_ROWS:], ("", "begins", "lasts", "slip", "peak velocity", drop))
+    yield table(
+        rows[-MAX_ROWS:],
+        ("contact" if result.rig.contacts else "number", "begins", "lasts", "slip", "peak velocity", drop),
+    )
 
 
 @parts_of.register

@@ -36,6 +36,7 @@ from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, motion_after
 from steadyslip.verdict.words import PACE
 
+CUT_SHORT = "too many steps"
 _LONGEST_UNIT = 12  # characters of a comment that may be a unit: N m s/rad has 9
 
 
@@ -155,6 +156,8 @@ def _told(run: History, analysis: Analysis) -> str:
 
     What would mend such an end is left out: what to change is recommended elsewhere.
     """
+    if run.sentence and run.status == CUT_SHORT:
+        return f"{run.sentence} (simulated for {format_quantity(run.end, 's')})"
     ended = [run.message.partition("; ")[0].replace("_", " ")] if run.status != "done" else []
     if run.sentence or ended:
         return "; then ".join([run.sentence, *ended] if run.sentence else ended)

@@ -32,7 +32,7 @@ def _comparison(result: RigComparison) -> Parts:
         *(part for name, one, within in of_each
           for part in recommendation(one, _order(within), within, f"The recommendation for {name}")),
         *first, *(part for part in second if part not in first),
-        heading("Side by side"), table(told, (label, *names), caption="The two rigs."),
+        heading("Side by side"), table(told, (label or "of", *names), caption="The two rigs."),
         heading("What differs?"), *_differences(result), _chart(result),
         *(part for name, one, _ in of_each
           for part in (heading(f"How far is the edge of {name}?"), *edge_table(one),
@@ -63,7 +63,7 @@ def _answer(result: RigComparison) -> str:
         return "No difference decides, as the verdict is the same."
     one = result.differences[0]
     name = said(rig, one.parameter)
-    part = f", by {result.part_in_words(one)} of {result.of}" if result.measure else ""
+    part = f", by {result.part_in_words(one).replace('x ', 'a factor of ')} of {result.of}" if result.measure else ""
     return f"No difference decides, as the verdict is the same; most of what differs comes from {name}{part}."
 
 

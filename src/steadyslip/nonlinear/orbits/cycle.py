@@ -92,8 +92,9 @@ class Cycle(Displayed):
     contacts : dict of str to CycleRange
         Of a machine: all of them.
     closing : float
-        Distance of the end of one period from its start, by an integration of the motion alone, as a share of the
-        cycle's size: logarithms of large states, shares of natural sizes of small ones.
+        Distance of the end of one period from the cycle, by an integration of the motion alone, as a share of the
+        cycle's size: logarithms of large states, shares of natural sizes of small ones; or how early or late the end
+        is, as a share of the period, if that is more.
     returned : float
         Largest distance between returns of the simulated motion that led to the cycle, a period apart, over its last
         two periods, in the same measure; NaN if none did.

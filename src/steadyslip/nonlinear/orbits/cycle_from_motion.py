@@ -117,7 +117,8 @@ def cycle_data(shooting: Shooting, u: Array) -> CycleData:
     own = ranges[flow.contact]
     names = [contact.name for contact in flow.reduction.model.contacts]
     nexts = np.roll(orbit.states, -1, axis=0)
-    missed = np.abs(np.array(ends) - nexts) / np.hypot(flow.scales, nexts)
+    missed = (np.array(ends) - nexts) / np.hypot(flow.scales, nexts)
+    along = flow.field(setting, nexts)[0] / np.hypot(flow.scales, nexts)
     away = (np.vstack(back)[::-1] - orbit.states[0]) / np.hypot(flow.scales, orbit.states[0])
     same = np.flatnonzero(np.abs(away).max(axis=1) < SAME * shooting.amplitude)
     cycle = Cycle(
@@ -136,11 +137,34 @@ def cycle_data(shooting: Shooting, u: Array) -> CycleData:
         speed=setting.speed,
         contact=names[flow.contact],
         contacts=dict(zip(names, ranges, strict=True)) if names[0] else {},
-        closing=float(np.max(missed)) / shooting.amplitude,
+        closing=closing_error(missed, along, orbit.period, shooting.amplitude),
         _orbit=orbit,
     )
     extent = np.asarray(np.ptp(np.vstack(visited), axis=0))
     return CycleData(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0], extent, beginning.orbit)
+
+
+def closing_error(missed: Array, along: Array, period: float, amplitude: float) -> float:
+    """How far a motion misses a cycle after a period, as a share of its size, or comes there early or late.
+
+    A cycle is a curve: of what is missed, the part along it is a time, and counts as a share of the period. Where slip
+    begins after a rest of many times its duration, an error of the period far below what is told is most of a cycle's
+    size a moment later.
+
+    Parameters
+    ----------
+    missed : ndarray (K, n)
+        Ends of the segments less the starts of the next, over their sizes.
+    along : ndarray (K, n)
+        Rates at these starts, over the same sizes (1/s).
+    period : float
+        s.
+    amplitude : float
+        Size of the cycle, below 1 for small ones.
+    """
+    late = np.sum(missed * along, axis=1) / np.sum(along * along, axis=1)
+    across = np.abs(missed - late[:, None] * along)
+    return float(max(np.max(across) / amplitude, np.max(np.abs(late)) / period))
 
 
 class _Begin:

@@ -12,7 +12,7 @@ from steadyslip.cli.answers import output_result, print_json, print_text
 from steadyslip.cli.options import AsJson, outputs
 
 if TYPE_CHECKING:
-    from steadyslip.experiments import Fit
+    from steadyslip.experiments import Fit, LawComparison
 
 
 def fit(
@@ -56,7 +56,7 @@ def fit(
         write_population,
         write_table,
     )
-    from steadyslip.experiments.from_files import spec_of
+    from steadyslip.experiments.from_files import fitted, records_of, spec_of
     from steadyslip.experiments.machine_spec import MachineSpec
     from steadyslip.files.output import check_output
 
@@ -69,7 +69,7 @@ def fit(
     if bootstrap == 1:
         raise ParameterError([Problem("--bootstrap", "got 1; allowed: 0 for none, or 2 or more resampled records")])
     records, spec = split_files(files)
-    plan = None if spec is None else spec_of(spec, changes or ())
+    plan = spec_of(spec, changes or ())
     if isinstance(plan, MachineSpec):
         if bootstrap or steps or listed:
             message = "is for records of sliders; leave --bootstrap, --steps and tables out for a machine"
@@ -79,7 +79,7 @@ def fit(
             print_text(f"{record}\n")
         output_result(machine, output or (), as_json, lambda one, path: write_fit(one, None, path))
         return
-    if spec is not None and plan is not None and plan.population is not None:
+    if plan.population is not None and spec is not None:
         if bootstrap:
             message = "cannot be combined with [population], whose draws carry the uncertainty"
             raise ParameterError([Problem("--bootstrap", message)])
@@ -90,13 +90,17 @@ def fit(
         members = population_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
         output_result(members, output or (), as_json, write_population)
         return
-    fitted, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
-    found = cast("Fit", fitted)
+    own = records_of(plan, records, skip_bad_lines)
+    for record in () if as_json else own:  # before the search, which may last
+        print_text(f"{record}\n")
+    found, comparison = cast("tuple[Fit, LawComparison | None]", fitted(plan, own))
     for path in others:
         write_fit(found, comparison, path)
     if not as_json:
-        for record in found.plan.records:
-            print_text(f"{record}\n")
+        known = {note for record in own for note in record.notes}
+        added = dict.fromkeys(note for record in found.plan.records for note in record.notes if note not in known)
+        if added:
+            print_text("".join(f"note            {note}\n" for note in added))
         if comparison is not None:
             print_text(f"{comparison}\n")
         print_text(str(found))
@@ -112,8 +116,8 @@ def fit(
             stopped = True
     table = None
     if (steps or listed) and not stopped:
-        options = {} if plan is None else plan.options
-        table = step_table(found, **{name: options[name] for name in ("starts", "effort") if name in options})
+        search = {name: plan.options[name] for name in ("starts", "effort") if name in plan.options}
+        table = step_table(found, **search)
     if table is not None:
         for path in listed:
             write_table(table, path)

@@ -68,7 +68,11 @@ def fit_files(
     friction.d_c = 10.06 ± 0.077 um
     """
     plan = spec_of(spec, changes)
-    records = _read(plan, paths, skip_bad_lines)
+    return fitted(plan, records_of(plan, paths, skip_bad_lines))
+
+
+def fitted(plan: Spec | MachineSpec, records: Sequence[Any]) -> tuple[Fit | MachineFit, LawComparison | None]:
+    """Fit records as their file asks; see `fit_files`."""
     with progress_text("searching") as said:
         report = _progress_reporter(said)
         if isinstance(plan, Spec) and plan.compared(records):
@@ -129,7 +133,7 @@ def population_files(
     if isinstance(given, dict) and set(given) != set(labels):
         message = f"got those of {', '.join(given)}; allowed: one of each of {', '.join(labels)}"
         raise ParameterError([Problem("population.values", message)])
-    records = _read(plan, paths, skip_bad_lines)
+    records = records_of(plan, paths, skip_bad_lines)
     needed = FEWEST + (members.condition is not None)
     if len(records) < needed:
         message = f"got {len(records)} record{'s' * (len(records) != 1)}; allowed: {needed} or more"
@@ -158,7 +162,7 @@ def load_friction(path: str | PathLike[str]) -> Fit | Population:
     return load_population(path) if holds(path, POPULATION) else load_friction_fit(path)
 
 
-def _read(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> list[Any]:
+def records_of(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> list[Any]:
     """Read all records; one error lists the problems of all files."""
     records, faults = [], []
     for path in paths:

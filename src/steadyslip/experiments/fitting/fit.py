@@ -203,14 +203,14 @@ def search_fit(
     wavy = any(WAVE in note for record in plan.records for note in record.notes)
     if wavy and plan.drive == "commanded" and not plan.beginnings and fit.whiteness.p < STRUCTURE:
         moving = options | {"drive": "smoothed", "initial": "free"}  # a load point in a wave slides steadily nowhere
-        return _better(fit, lambda: search_fit(rig, records, free, **search, **moving))
+        return _without_structure(fit, lambda: search_fit(rig, records, free, **search, **moving))
     return fit
 
 
-def _better(fit: Fit, other: Callable[[], Fit]) -> Fit:
-    """Fit with less residuals of two, of which the other may fail."""
+def _without_structure(fit: Fit, other: Callable[[], Fit]) -> Fit:
+    """Another fit, if that leaves no structure in the residuals; it may fail."""
     try:
-        return min(fit, other(), key=operator.attrgetter("rms"))
+        return found if (found := other()).whiteness.p >= STRUCTURE else fit
     except NotAvailable:
         return fit
 

@@ -209,8 +209,36 @@ UNITLESS = {
         'a reduction is written "1/500", this one "500/1"$',
     ),
     "a lead": (MACHINE, '"10 mm/rev"', "10", "lead = 10 is read as .*; the largest in use are some 100 mm/rev: write"),
+    "a damping ratio": (
+        SHEETS["guide with seal"],
+        '"0.5 N s/mm"',
+        "0.05",
+        "critical damping; .* ratio write 1.732 kN s/m",
+    ),
+    "the speed of an axis": (
+        SHEETS["telescope worm"],
+        'velocity_of = "axis"',
+        "",
+        'of axis write velocity_of = "axis"$',
+    ),
     "an integral time": (MACHINE, '"20 ms"', "20", "tn = 20 is read as 20 s; the largest in use are some 1 s: write"),
 }
+
+
+def test_tables_of_a_slider_in_a_machine_are_one_problem():
+    """There were eight, of which the first asked for a table [fit]."""
+    with pytest.raises(
+        ss.RigFileError, match=r"line 2: friction: got the tables friction and slider .*\[contacts\] of a machine; in"
+    ):
+        ss.rig_from_text(SHEETS["guide with seal"].replace("[contact]", "[contacts.seal]"))
+
+
+def test_a_clause_that_is_left_out_closes_its_bracket():
+    two = 'contact = { law = "constant", preload = "1 N" }\nfriction = { law = "coulomb", mu_coulomb = 0.5 }\n'
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(f"[bodies.a]\nmass = 1\n[contacts.one]\n{two}[contacts.two]\n{two}[drive]\nvelocity = 1\n")
+    for line in str(caught.value).splitlines():
+        assert line.count("(") == line.count(")")
 
 
 @pytest.mark.parametrize(("text", "right", "wrong", "answer"), UNITLESS.values(), ids=UNITLESS)

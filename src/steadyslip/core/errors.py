@@ -96,10 +96,15 @@ def _advised_once(lines: Sequence[str]) -> list[str]:
     given: set[str] = set()
     for line in lines:
         parts = line.split("; ")
-        kept = [part for i, part in enumerate(parts) if i == 0 or len(part) < ADVICE or part not in given]
+        kept = [part for i, part in enumerate(parts) if i == 0 or not _is_advice(part) or part not in given]
         given.update(parts[1:])
         found.append("; ".join(kept))
     return found
+
+
+def _is_advice(clause: str) -> bool:
+    """True for a long clause that is not a part of a bracket, which would stay open without it."""
+    return len(clause) >= ADVICE and clause.count("(") == clause.count(")")
 
 
 class RigFileError(ParameterError):

@@ -56,6 +56,8 @@ REMEDIES = {
     "": "write the unit that is meant",
 }
 """What to write instead, by last part of the name, else by SI unit, else for all."""
+UNDAMPED = 1e-4  # of critical damping, below which nobody gives a dashpot: steel alone has some 1e-4 to 1e-3
+IDLE, GEARED = 1e-4, 5.0  # rad/s (a turn in 17 h) of a motor, and its least reduction: none is geared down to stand
 BENT = 2e-4  # m: by how much friction bends bristles at most before it slides; measured are some um to 0.1 mm
 LIGHTEST = 1000.0  # Pa: 10 cm of water; faults and laboratories have ten times as much and more
 LIGHT = 0.05  # share of its weight by which a body is hardly ever pressed
@@ -78,7 +80,18 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
     """
     by_programs = all(unit(name)[0] == 1.0 for name in written)
     large = {} if by_programs else dict(_large(rig, read))
-    typed = () if by_programs else (*_soft(rig, read), *large.values(), *_light(rig, read), *_pliable(rig, read))
+    typed = (
+        ()
+        if by_programs
+        else (
+            *_soft(rig, read),
+            *large.values(),
+            *_light(rig, read),
+            *_pliable(rig, read),
+            *_undamped(rig, read),
+            *_idle(rig),
+        )
+    )
     for text in (*_questions(rig, read), *typed, *_doubts(rig, large)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
@@ -139,6 +152,35 @@ def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str,
         was, largest = (format_quantity(value, si) for value in (float(raw), known.value))
         remedy = (REMEDIES.get(last) or REMEDIES.get(si) or REMEDIES[""]).format(raw=raw, share=raw / 100)
         yield name, f"{name} = {raw:g} is read as {was}; the largest {known.of} are some {largest}: {remedy}"
+
+
+def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+    """Question about a damping below 1 without a unit that hardly damps: it may be a damping ratio."""
+    name, raw, area = "slider.damping", read.get("slider.damping", (None, ""))[0], rig.area or 1.0
+    own = (float(rig.parameters()[one].value or 0.0) * area if one in rig.parameters() else 0.0
+           for one in ("slider.mass", "slider.stiffness"))  # fmt: skip
+    critical = 2 * math.sqrt(math.prod(own))
+    if _is_between(raw, 0.0, min(1.0, UNDAMPED * critical)):
+        si, c = "N s/m" if rig.area else "Pa s/m", format_quantity(raw * critical, "N s/m" if rig.area else "Pa s/m")
+        yield (
+            f"{name} = {raw:g} has no unit and is read as {raw:g} {si}, {raw / critical:.1g} of critical damping; if "
+            f"it is a damping ratio write {c}"
+        )
+
+
+def _idle(rig: Rig) -> Iterator[str]:
+    """Question about a motor that turns as slowly as only what is behind its gear does."""
+    if not isinstance(rig, Machine) or not rig.drive.turns or rig.fed is not None or not 0 < rig.drive.velocity < IDLE:
+        return
+    behind = {name: float(speed) for name, speed in rig.speeds().items() if rig.turns_on(name)}
+    name = min(behind, key=lambda one: abs(behind[one]), default="")
+    if name and 0 < behind[name] <= rig.drive.velocity / GEARED:
+        motor, axis = (format_quantity(speed, "rad/s") for speed in (rig.drive.velocity, behind[name]))
+        at = rig.drive.driven() or "the drive"
+        yield (
+            f"drive.velocity = {motor} is that of {at}, with which {name} turns at {axis}; "
+            f'if it is that of {name} write velocity_of = "{name}"'
+        )
 
 
 def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:

@@ -22,6 +22,7 @@ from steadyslip.core.errors import (
     repr_short,
     unknown_name,
 )
+from steadyslip.core.format import enumerated
 from steadyslip.core.options import checked
 from steadyslip.core.quantities import parse, units_in
 from steadyslip.core.records import FrozenRecord, Part
@@ -344,12 +345,29 @@ class _ContentsReader(TableReader):
         others = {PROTOCOL.name, *READ_ELSEWHERE, UNKNOWN, *TOLERANCES, *further}
         for name in list(self.tables):
             self._misspelt(name, others)
+        if self._is_of_both():
+            return None
         self.sections = (*self._own_sections(), *further.values())
         known = others.union(section.name for section in self.sections)
         for name in self.tables:
             if name not in known:
                 self.problem(name, unknown_name("table", name, sorted(known), taken=self.tables))
         return self._machine() if is_machine(self.tables) else self._slider()
+
+    def _is_of_both(self) -> bool:
+        """Report tables of a rig of one body beside those of a machine, as nothing else follows from them."""
+        single = {section.name for section in sections()} - {section.name for section in machine_sections()}
+        both = [name for name in self.tables if name in single]
+        if not (both and is_machine(self.tables)):
+            return False
+        machine = next(one.name for one in machine_sections() if one.keyed and one.name in self.tables)
+        self.problem(
+            both[0],
+            f"got the tables {enumerated(both)} of a rig of one body and contact beside [{machine}] of a machine; in a "
+            "machine write each body in [bodies.NAME], each contact with its friction and contact in [contacts.NAME], "
+            "[contacts.NAME.friction], [contacts.NAME.contact]",
+        )
+        return True
 
     def _own_sections(self) -> tuple[Section, ...]:
         return machine_sections() if is_machine(self.tables) else sections()

@@ -98,3 +98,23 @@ def test_large_figures_scroll_on_a_telephone_and_keep_their_letters(tmp_path):
     assert all(shown <= 390 and whole == 580 for shown, whole in narrow)
     assert all_of_it <= 390
     assert all(shown == whole for shown, whole in broad)
+
+
+def test_formulas_break_between_terms_on_a_telephone_and_nowhere_else(tmp_path):
+    """Of eleven formulas three scrolled there; a broad window keeps each sum on its lines."""
+    found = ss.report(ss.analyze(ss.read_rig("examples/machines/feed-axis.toml")), explorer=False)
+    found.save(tmp_path / "a.html")
+    wide = """[...document.querySelectorAll(".formula")].map(one => one.scrollWidth - one.clientWidth)
+        .filter(over => over > 0)"""
+    hidden = """[...document.querySelectorAll(".formula mrow")].some(one => {
+        const box = one.closest(".formula");
+        return one.getBoundingClientRect().left < box.getBoundingClientRect().left - box.scrollLeft - 1; })"""
+    with driver() as play:
+        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 390, "height": 740})
+        page.goto((tmp_path / "a.html").as_uri())
+        assert len(page.evaluate(wide)) <= 1
+        assert not page.evaluate(hidden), "no term begins where one cannot scroll to"
+        page.set_viewport_size({"width": 1024, "height": 740})
+        assert page.evaluate(wide) == []
+        browser.close()

@@ -33,6 +33,7 @@ _LONG = 30  # characters of a word that may be broken, for it is none
 _NARROW = 3  # columns that fit on a telephone (by trial, at 360 px)
 _NARROW_LINE = 44  # letters that fit beside each other there, of 13 px (358 px of some 8 px each)
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
+_ZERO = '<mrow><mo form="infix">=</mo><mn>0</mn></mrow>'
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
 .steadyslip-told { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b2430; }
@@ -67,7 +68,13 @@ STYLE = """
   white-space: pre-wrap; overflow-wrap: anywhere; }
 .steadyslip-told sub { line-height: 0; }
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
-@media screen and (max-width: 600px) { .steadyslip-told .formula math { font-size: 14px; } }
+@media screen and (max-width: 600px) {
+  .steadyslip-told .formula math { font-size: 14px; }
+  .steadyslip-told .formula math, .steadyslip-told .formula mtd { display: flex; flex-wrap: wrap; align-items: center;
+    row-gap: 4px; }
+  .steadyslip-told .formula math { justify-content: safe center; }
+  .steadyslip-told .formula :is(mtable, mtr) { display: block; min-width: 0; }
+}
 @media print { .steadyslip-told .formula math { font-size: 12px; } }
 .steadyslip-told .narrow { display: none; }
 @media screen and (max-width: 600px) {
@@ -199,20 +206,32 @@ def math(expression: Any, display: bool = True) -> Markup:
 
 
 def equation(one: sp.Eq) -> str:
-    """HTML of an equation on lines of its own: long sums go on below, as paper has no bar to scroll by."""
+    """HTML of an equation on lines of its own: long sums go on below, as paper has no bar to scroll by.
+
+    Terms of a sum are elements of their own, between which a telephone breaks lines.
+    """
     left, right = one.args
-    side, end = (left, "<mo>=</mo><mn>0</mn>") if right == 0 else (right, "")
-    lines = [_presented(sp.Add(*terms, evaluate=False)) for terms in _lines(side.as_ordered_terms())]
-    if len(lines) == 1:
-        return f'<div class="formula" tabindex="0">{math(one)}</div>'
-    before = [f"{_presented(left)}<mo>=</mo>" if right != 0 else "", *("" for _ in lines[1:])]
-    signs = ["", *("" if re.sub("<.*?>", "", text).startswith("−") else "<mo>+</mo>" for text in lines[1:])]
-    after = [*("" for _ in lines[1:]), end]
+    side, begin, end = (left, "", _ZERO) if right == 0 else (right, f"{_presented(left)}<mo>=</mo>", "")
+    lines = [[_presented(term) for term in terms] for terms in _lines(side.as_ordered_terms())]
+    whole = ["".join(_term(text, not (n or k)) for k, text in enumerate(line)) for n, line in enumerate(lines)]
+    if len(whole) == 1:
+        begin = f"<mrow>{begin}</mrow>" if begin else ""
+        return f'<div class="formula" tabindex="0">{_mathml(begin + whole[0] + end, True)}</div>'
+    before, after = [begin, *("" for _ in whole[1:])], [*("" for _ in whole[1:]), end]
     rows = (
-        f'<mtr><mtd style="text-align:right">{a}</mtd><mtd style="text-align:left">{b}{text}{c}</mtd></mtr>'
-        for a, b, text, c in zip(before, signs, lines, after, strict=True)
+        f'<mtr><mtd style="text-align:right">{a}</mtd><mtd style="text-align:left">{text}{c}</mtd></mtr>'
+        for a, text, c in zip(before, whole, after, strict=True)
     )
     return f'<div class="formula" tabindex="0">{_mathml("<mtable>" + "".join(rows) + "</mtable>", True)}</div>'
+
+
+def _term(text: str, first: bool) -> str:
+    """MathML of a term of a sum with its sign, which is spaced as between two of them unless it is the first."""
+    if first:
+        return f"<mrow>{text}</mrow>"
+    if re.sub("<.*?>", "", text).startswith("−"):
+        return "<mrow>" + text.replace("<mo>−</mo>", '<mo form="infix">−</mo>', 1) + "</mrow>"
+    return f'<mrow><mo form="infix">+</mo>{text}</mrow>'
 
 
 def _lines(terms: Iterable[sp.Expr]) -> list[list[sp.Expr]]:

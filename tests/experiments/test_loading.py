@@ -405,3 +405,15 @@ def test_a_brief_hold_is_no_response_of_a_servo():
     course = load_course(time, moves + 1e-8 * white + 1.2e-8 * slow)
     assert [change.time for change in course.changes] == pytest.approx(ends[1:-1], abs=0.02)
     assert not any(change.lag for change in course.changes)
+
+
+def test_long_ramps_of_a_displacement_without_noise():
+    """Some last samples of a ramp seemed a level of the sensor: the ramp became a step, values were 4 errors off."""
+    pieces = (
+        ss.protocol.VelocityRamp(at=30.2, to=8e-6, duration=12),
+        ss.protocol.VelocityRamp(at=70.3, to=1e-6, duration=20),
+    )
+    columns = lab.columns(lab.rig(), ss.Protocol(pieces=pieces, until=130.0), 1500)
+    found = load_course(columns["time"], columns["displacement"]).changes
+    assert [change.time for change in found] == pytest.approx([30.2, 70.3], abs=1e-3)
+    assert [change.duration for change in found] == pytest.approx([12, 20], rel=1e-4)

@@ -272,7 +272,12 @@ def test_other_conditions_move_means_and_what_follows(fits):
     told = str(ss.predict(lab.rig(), ends[20e6], count=100))
     assert "another experiment of a population at normal stress 20 MPa" in told
     assert "means           at normal stress 5 MPa" in str(ends[5e6])
-    assert "! normal stress 40 MPa is beyond 5 MPa to 20 MPa" in str(rock.at({"normal stress": 40e6}))
+    there = str(rock.at({"normal stress": 40e6}))
+    assert "! normal stress 40 MPa is beyond 5 MPa to 20 MPa" in there
+    assert "mean at normal stress 40 MPa " in there
+    assert "another experiment at normal stress 40 MPa, 95 %" in there
+    with pytest.raises(ss.ParameterError, match=r"where: got 40000000\.0; allowed: numbers by the name of a condition"):
+        rock.at(40e6)
     for wrong, words in (({"stress": 1e6}, "allowed: 'normal stress'"), ({"normal stress": "hot"}, "finite number")):
         with pytest.raises(ss.ParameterError, match=words):
             rock.at(wrong)

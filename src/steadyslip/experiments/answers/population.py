@@ -80,8 +80,12 @@ class Population(ReadOnly):
     @property
     def kind(self) -> str:
         """What predictions from it are of."""
+        return f"another experiment of a population{self._at}"
+
+    @property
+    def _at(self) -> str:
         at = " and ".join(f"{name} {_condition(name, value)}" for name, value in self.where.items())
-        return "another experiment of a population" + (f" at {at}" if at else "")
+        return f" at {at}" if at else ""
 
     @cached_property
     def axes(self) -> Axes:
@@ -102,6 +106,9 @@ class Population(ReadOnly):
             If a condition is unknown or no finite number.
         """
         allowed = ", ".join(map(repr, self.conditions)) or "none were given"
+        if not isinstance(where, Mapping):
+            wanted = f"numbers by the name of a condition, which are {allowed}"
+            raise ParameterError([Problem("where", f"got {where!r:.80}; allowed: {wanted}")])
         problems = [
             Problem("where", f"got {name!r}; allowed: {allowed}") for name in where if name not in self.conditions
         ]
@@ -187,14 +194,14 @@ class Population(ReadOnly):
             lines.append(f"  {label:<{wide}}  {given}")
         for name, one in self.axes.quantities.items():
             mean, other = self.mean(name), self.another(name)
-            lines += ["", f"{name}: mean {mean.shown()}, 95 %: {mean.range()}"]
+            lines += ["", f"{name}: mean{self._at} {mean.shown()}, 95 %: {mean.range()}"]
             lines.append(f"  experiments differ by {_spread_words(self.spread(name), one, mean.value)}")
             lines += [
                 f"  {_slope_words(self.slope(name, c), one, c, x, mean.value)}" for c, x in self.conditions.items()
             ]
-            lines.append(f"  another experiment, 95 %: {other.range()}")
+            lines.append(f"  another experiment{self._at}, 95 %: {other.range()}")
             if name == DIFFERENCE:
-                lines.append(f"  of further experiments {format_percent(self.weakening)} have b > a")
+                lines.append(f"  of further experiments{self._at} {format_percent(self.weakening)} have b > a")
             for label, alone in self.alone(name).items():
                 said = "not determined alone" if alone is None else f"alone {alone.shown()}"
                 lines.append(f"  {label:<{wide}}  {said}, with the others {self.experiment(label, name).shown()}")

@@ -237,7 +237,8 @@ class _ChangeFit:
         self.spacing = float(np.median(np.diff(time[max(before.last - 3, 0) : after.first + 3])))
         self.adjacent = before.last == after.first
         self.rates = before.rate, after.rate
-        self.levels = float(before.levels[-1]), float(after.levels[0])
+        which = -1 if strays <= EXACTLY * float(np.ptp(displacement)) else 0  # without noise, ends of ramps seem levels
+        self.levels = _levels(before, -1)[which], _levels(after, 0)[which]
         difference = after.rate - before.rate
         self.meet = self.origin + (self.levels[0] - self.levels[1]) / difference
         self.meets = [

@@ -225,6 +225,22 @@ UNITLESS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("text", "wrong", "answer"),
+    [
+        (HUNTING, 'control = "pid"\n', "drive.control: missing; kp, .* of control = 'pid': write it"),
+        (MACHINE, 'control = "rotary-p-pi"\n', "drive.control: missing; body, .* are of .* 'rotary-p-pi': write one"),
+    ],
+    ids=["slider", "machine"],
+)
+def test_keys_of_a_controller_without_its_name_are_one_problem(text, wrong, answer):
+    """There were four, and of a motor "got 'steady', but 'motor' turns"."""
+    assert wrong in text
+    with pytest.raises(ss.RigFileError, match=answer) as caught:
+        ss.rig_from_text(text.replace(wrong, ""))
+    assert len(caught.value.problems) == 1
+
+
 def test_tables_of_a_slider_in_a_machine_are_one_problem():
     """There were eight, of which the first asked for a table [fit]."""
     with pytest.raises(

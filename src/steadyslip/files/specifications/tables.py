@@ -11,6 +11,7 @@ from typing import Any
 from steadyslip.core.areas import is_per_area, total_unit
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, legible, repr_short, unknown_name
+from steadyslip.core.format import enumerated
 from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
@@ -57,11 +58,29 @@ class TableReader:
             if key not in table and default is None:
                 self.problem(prefix + key, f"missing; allowed: {', '.join(family.registry)}")
                 return None
-            chosen = self._law(family, table.get(key, default), prefix + key)
+            meant = "" if key in table or default is None else self._left_unnamed(family, default, table, prefix)
+            chosen = self._law(family, table.get(key, meant or default), prefix + key)
             if chosen is None:
                 return None
             law, rest = chosen, {name: value for name, value in table.items() if name != key}
         return self._complete(law, rest, prefix)
+
+    def _left_unnamed(self, family: type[FrozenRecord], default: str, table: Table, prefix: str) -> str:
+        """Report that a table has keys of another law than that without a name; the first that has them all, or ""."""
+        keys = {name: {key_of(item) for item, _ in own_fields(law)} for name, law in family.registry.items()}
+        foreign = [name for name in table if name not in keys[default]]
+        known = [name for name in keys if keys[name].issuperset(table)]
+        if len(foreign) < 2 or not known:
+            return ""
+        key, _ = selector(family)
+        words = " or ".join(f"{key} = {name!r}" for name in known)
+        self.problem(
+            prefix + key,
+            f"missing; {enumerated(foreign)} are of {words}: write one"
+            if known[1:]
+            else f"missing; {enumerated(foreign)} are of {words}: write it",
+        )
+        return known[0]
 
     def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
         """Record of a known law; if values are bad, contradictions between the others are still noted."""

@@ -38,7 +38,7 @@ class Coulomb(FrictionLaw, name="coulomb"):
 
     def conditions(self) -> Iterator[Condition]:
         if self.mu_static is not None:
-            message = "got {}, with mu_coulomb = {}; allowed: at least mu_coulomb"
+            message = "got {}, with mu_coulomb = {}; allowed: at least mu_coulomb: exchange the two if that is meant"
             at_rest, sliding = np.asarray(self.mu_static), np.asarray(self.mu_coulomb)
             yield Condition("mu_static", at_rest >= sliding, message, (at_rest, sliding))
 

@@ -196,6 +196,25 @@ def test_reduction_of_the_reed_is_off_by_what_theory_says(modes, root, rate):
     assert 0 < error < 1e-2
 
 
+@pytest.mark.parametrize("seed", [1, 5])
+def test_edges_of_what_changes_a_whole_structure_are_those_of_eigenvalues(seed):
+    """A response of few directions does not hold the change: spin had edges at 91.74 and 121.4 rad/s that are none."""
+    chance = np.random.default_rng([seed, 77])
+    size = int(chance.integers(34, 48))
+    machine, _ = random_structure(chance, size, 1)
+    own, turning = machine.bodies["s"], chance.standard_normal((size, size))
+    data = StructureData(own.matrices.mass, own.matrices.damping, own.matrices.stiffness, 0.3 * (turning - turning.T))
+    body = StructureBody(matrices=data, points=own.points, spin=1.0, modal_damping=1e-4)
+    machine = Machine(bodies={"s": body}, contacts=machine.contacts, drive=machine.drive)
+    for name, values in (("spin", np.geomspace(1e-3, 1e4, 150)), ("modal_damping", np.geomspace(1e-8, 1, 100))):
+        edges = [one.value for one in ss.boundary(machine, f"bodies.s.{name}", (values[0], values[-1]))]
+        growing = ss.growth_rate(machine, {f"bodies.s.{name}": values}) > 0
+        changes = np.flatnonzero(np.diff(growing))
+        assert len(edges) == len(changes)
+        assert all(values[i] <= edge <= values[i + 1] for edge, i in zip(edges, changes, strict=True))
+        assert edges or name == "modal_damping"
+
+
 # --- files ------------------------------------------------------------------------------------------
 
 PLACE = "x = 58\ny = 59"

@@ -179,8 +179,9 @@ def _require_answers(rig: Rig, branch: int) -> None:
 def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first.
 
-    Without those whose edges take too long to find, as delays may make it: all together are looked for in some ten
-    seconds. `boundary` takes its time for one parameter; `analyze` names those that are missing.
+    Without those whose edges take too long to find, as delays may make it, or a parameter that changes a whole
+    structure: all together are looked for in some ten seconds. `boundary` takes its time for one parameter; `analyze`
+    names those that are missing.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Edges of stability in one parameter of a machine given by matrices.
 
 A parameter that enters by a term of rank one, whatever the machine's size, has its edges among the values at which a
-scalar response of the unchanged machine is real (theory 13). Of others roots are counted along the parameter.
+scalar response of the unchanged machine is real (theory 13). Of others roots are counted along the parameter, and of
+one that changes a whole structure by eigenvalues, which takes minutes for hundreds of degrees of freedom.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from steadyslip.core.questions import question
 from steadyslip.linear import samples
+from steadyslip.linear.allowance import may_take
 from steadyslip.linear.roots import Array
 from steadyslip.linear.search import Boundary, natural_size
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
@@ -30,6 +32,7 @@ _FAR = 1e12  # ratio of two values beyond which the lower is a zero that roundin
 _PARTS = 32  # of a bracket of a small machine, counted together
 _HALVINGS = 60  # of a bracket at most: to neighbouring numbers
 _SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of a response
+_FLOPS = 40  # cubed rows of a pencil whose eigenvalues take as long as one term of a count (`allowance`), measured
 _TOGETHER = 2**20  # numbers of matrices that are treated together, 8 MiB
 _NEWTON = 12  # steps of Newton's method at most; its convergence is quadratic
 _LIKELY = 3  # eigenvalues nearest to the axis, by either measure, that are tried as the one that crosses
@@ -113,6 +116,9 @@ class MatrixSearch:
     def _growing(self, machines: MachinesAlong, sure: bool) -> NDArray[np.int64]:
         """Number of growing roots, (p,), ILL_POSED or UNDECIDED. Of large machines by turns of a response."""
         if self._small or self.turns is None:
+            count = len(machines.posed)
+            if not self._small and not may_take(count * len(self.own.pencil.a) ** 3 // _FLOPS):
+                return np.full(count, UNDECIDED)
             return machines.growing(sure)
         found = np.full(len(machines.posed), ILL_POSED)
         for i in np.flatnonzero(machines.balance.exists & machines.posed):
@@ -145,7 +151,8 @@ class MatrixSearch:
 
     @cached_property
     def turns(self) -> Turns | None:
-        return None if self.change is None else Turns(self.change)
+        """Turns of a response; None if the parameter changes nothing, or more than a response of few directions."""
+        return None if self.change is None or self.change.is_wide else Turns(self.change)
 
     # -- edges
 
@@ -154,10 +161,13 @@ class MatrixSearch:
         with np.errstate(all="ignore"):
             if not self.own.balance.exists:
                 return self._scanned(between)
-            if self.change is None or self.turns is None:
+            if self.change is None:
                 return ()
-            unit = rank_one(self.change, *self._probes) if len(self._probes[0]) > 1 else None
-            return self._scanned(between) if unit is None else self._linear(self.change, self.turns, unit, between)
+            few = self.turns is not None and len(self._probes[0]) > 1
+            unit = rank_one(self.change, *self._probes) if few else None
+            if unit is None or self.turns is None:
+                return self._scanned(between)
+            return self._linear(self.change, self.turns, unit, between)
 
     def _linear(
         self, change: LowRankChange, turns: Turns, unit: tuple[Array, Array], between: tuple[float, float] | None

@@ -135,7 +135,7 @@ def _by_matrices(rig: Machine) -> _Linear:
         edged,
         False,
         matrix_checks(point, numbers["stable"], edged),
-        lambda: matrix_edge_checks(point, margins(rig)),
+        lambda: matrix_edge_checks(point, *margins_and_missing(rig)),
         lambda eigenvalue: matrix_mode(point, eigenvalue),
     )
 

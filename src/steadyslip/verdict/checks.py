@@ -203,6 +203,13 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
 # -- edges
 
 
+def missing_edges(names: Sequence[str], why: str) -> Iterator[Check]:
+    """One check, which fails, for parameters whose edges were not looked for; none without such parameters."""
+    if names:
+        how = f"{why}; steadyslip.boundary(rig, name) looks for one alone"
+        yield Check(f"edges of {', '.join(names)}", how, np.inf, 0.0, False)
+
+
 def edge_checks(
     rig: Rig, margins: Sequence[Margin], missing: Sequence[str], branch: int
 ) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
@@ -211,10 +218,7 @@ def edge_checks(
     One check more, which fails, names the parameters that are `missing` among the margins.
     """
     edges = [(margin, edge) for margin in margins for edge in margin.edges]
-    checks = []
-    if missing:
-        how = "too many roots under delays to be counted in time; steadyslip.boundary(rig, name) looks for one alone"
-        checks.append(Check(f"edges of {', '.join(missing)}", how, np.inf, 0.0, False))
+    checks = list(missing_edges(missing, "too many roots under delays to be counted in time"))
     if not edges:
         return tuple(margins), tuple(checks)
     shares, touching = np.full(len(edges), np.inf), np.full(len(edges), np.inf)

@@ -25,7 +25,7 @@ from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.model.numeric.change import Turns, change_between
 from steadyslip.model.numeric.machine_point import MachinePoint
 from steadyslip.model.numeric.pencil import linearised
-from steadyslip.verdict.checks import BALANCE_TOLERANCE, SIDE_OFFSETS
+from steadyslip.verdict.checks import BALANCE_TOLERANCE, SIDE_OFFSETS, missing_edges
 from steadyslip.verdict.numbers import rates_of
 
 _CHECKED = 8  # rightmost eigenvalues whose matrix is looked at: a decomposition each
@@ -94,9 +94,14 @@ def _imbalance(point: MachinePoint) -> float:
     return max(worst, float(np.max(np.abs(np.sum(table, axis=0)), initial=0.0) / size))
 
 
-def matrix_edge_checks(point: MachinePoint, margins: Sequence[Margin]) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Margins without edges that fail their check, and a check for each: eigenvalues on both sides."""
-    lost, checks = [], []
+def matrix_edge_checks(
+    point: MachinePoint, margins: Sequence[Margin], missing: Sequence[str]
+) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
+    """Margins without edges that fail their check, and a check for each: eigenvalues on both sides.
+
+    One check more, which fails, names the parameters that are `missing` among the margins.
+    """
+    lost, checks = [], list(missing_edges(missing, "eigenvalues of the whole structure at every value take minutes"))
     for margin in margins:
         for edge in margin.edges:
             share = next((one for one in SIDE_OFFSETS if _sides_agree(point, margin, edge, one)), math.inf)

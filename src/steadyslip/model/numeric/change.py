@@ -17,7 +17,7 @@ from steadyslip.model.numeric.pencil import ComplexArray, StatePencil
 
 _RANK = 1e-12  # size relative to the largest below which a direction of a change is rounding
 _LINEAR = 1e-9  # relative difference of slopes that counts as rounding of assembly and elimination
-_SKETCH = 24  # random directions in which changes are looked at; a parameter changes fewer rows or columns
+_SKETCH = 24  # random directions in which changes are looked at; a parameter of a contact or link changes fewer rows
 _AROUND = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # places at each pole, in units of its distance from the axis
 _PER_DECADE = 24  # places between poles
 _BEYOND = 1e3  # factor beyond the slowest and fastest root up to which places are as dense
@@ -43,6 +43,11 @@ class LowRankChange:
     out: Array
     rows: Array
     columns: Array
+
+    @property
+    def is_wide(self) -> bool:
+        """True if the directions are perhaps more than were found, as for what damps or turns a whole structure."""
+        return bool(self.into.shape[1] > _SKETCH)
 
     def core(self, other: StatePencil) -> tuple[Array, Array]:
         """Be and Ba (k, k) of another pencil."""

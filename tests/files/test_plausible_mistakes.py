@@ -229,7 +229,11 @@ UNITLESS = {
     ("text", "wrong", "answer"),
     [
         (HUNTING, 'control = "pid"\n', "drive.control: missing; kp, .* of control = 'pid': write it"),
-        (MACHINE, 'control = "rotary-p-pi"\n', "drive.control: missing; body, .* are of .* 'rotary-p-pi': write one"),
+        (
+            MACHINE,
+            'control = "rotary-p-pi"\n',
+            "drive.control: missing; body, .* are of control = 'rotary-p-pi': write it",
+        ),
     ],
     ids=["slider", "machine"],
 )

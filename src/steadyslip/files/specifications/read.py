@@ -52,7 +52,7 @@ from steadyslip.machine.holding import AS_MEASURED, as_measured
 from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
-from steadyslip.machine.servo import MachineDrive, control_for, wrong_control
+from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
@@ -420,14 +420,14 @@ class _ContentsReader(TableReader):
     def _drive(self, table: Table, bodies: Mapping[str, Any] | None) -> FrozenRecord | None:
         """Read the drive of a machine, its velocity in the unit of the body named by ``velocity_of``."""
         key, default = MachineDrive.chosen_by
-        meant = "" if key in table or default is None else self._left_unnamed(MachineDrive, default, table, "drive.")
-        control = str(table.get(key, meant or default))
         named = (table.get(key) for key in ("body", "velocity_of"))
         driven, feed = (bodies.get(name) if bodies and isinstance(name, str) else None for name in named)
-        if meant:
-            control = control_for(meant, driven is not None and driven.turns)
-            table = table | {key: control}
         kinds: Mapping[str, Any] = MachineDrive.registry
+        if key not in table and default is not None:
+            able = [name for name, law in kinds.items() if driven is None or law.turns == driven.turns]
+            if meant := self._left_unnamed(MachineDrive, default, table, "drive.", able):
+                table = table | {key: meant}
+        control = str(table.get(key, default))
         law = kinds.get(control)
         if driven is not None and law is not None and driven.turns != law.turns:
             self.problems.append(wrong_control(control, table["body"], driven.turns))

@@ -65,11 +65,16 @@ class TableReader:
             law, rest = chosen, {name: value for name, value in table.items() if name != key}
         return self._complete(law, rest, prefix)
 
-    def _left_unnamed(self, family: type[FrozenRecord], default: str, table: Table, prefix: str) -> str:
-        """Report that a table has keys of another law than that without a name; the first that has them all, or ""."""
+    def _left_unnamed(
+        self, family: type[FrozenRecord], default: str, table: Table, prefix: str, able: Iterable[str] | None = None
+    ) -> str:
+        """Report that a table has keys of another law than that without a name; the first that has them all, or "".
+
+        Only those that are `able` are named, if these are given.
+        """
         keys = {name: {key_of(item) for item, _ in own_fields(law)} for name, law in family.registry.items()}
         foreign = [name for name in table if name not in keys[default]]
-        known = [name for name in keys if keys[name].issuperset(table)]
+        known = [name for name in (keys if able is None else able) if keys[name].issuperset(table)]
         if len(foreign) < 2 or not known:
             return ""
         key, _ = selector(family)

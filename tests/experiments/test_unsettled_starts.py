@@ -150,7 +150,7 @@ def test_figures_name_what_is_fitted_of_the_beginning(fit):
     """`friction` alone would be the record's."""
     panels = np.ravel(fit.plot("corner"))
     labels = {text for panel in panels if panel is not None for text in (panel.get_xlabel(), panel.get_ylabel())}
-    assert {"initial.friction (1)", "initial.Theta (1)"} <= labels
+    assert {"friction at first (1)", "Theta at first (1)"} <= labels
 
 
 @pytest.mark.parametrize("count", [27, 1000])

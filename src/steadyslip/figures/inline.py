@@ -19,6 +19,8 @@ from steadyslip.figures.style import JOURNAL, fit_words
 MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
 _LEAST = 640.0  # pixels across a figure, so that one column is sharp on a screen of two per CSS pixel (by trial)
 _LARGE = 6.0  # inches across from which letters are too small on a telephone, where such figures scroll instead
+_LEAST_SCALE = 0.83  # of a figure that is made narrower: letters keep their size, and leave no room for axes below (by
+# trial with the verdict on a machine, 8 inches for 9.6)
 _SVG_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "steadyslip",
@@ -43,7 +45,7 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
     words : str
         Text alternative for screen readers.
     width : float, optional
-        Width of the figure in inches; the height is scaled with it.
+        Width of the figure in inches, or at least `_LEAST_SCALE` of its own; the height is scaled with it.
     """
     known = set(plt.get_fignums())
     with rc_context(_SVG_STYLE):
@@ -51,7 +53,8 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
             axes = make()
             found = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
             if width is not None:
-                found.set_size_inches(width, found.get_size_inches()[1] * width / found.get_size_inches()[0])
+                scale = max(width / found.get_figwidth(), _LEAST_SCALE)
+                found.set_size_inches(*(scale * found.get_size_inches()))
             fit_words(found)
             large = ' class="large"' if found.get_figwidth() >= _LARGE else ""
             text = io.StringIO()

@@ -97,6 +97,8 @@ def test_reports_ask_for_nothing_fit_every_width_and_print_without_the_explorer(
         cut = "all => all.filter((one) => one.scrollHeight > one.clientHeight).length"
         assert visit.page.locator(".formula").evaluate_all(cut) == 0, "subscripts are seen"
         visit.page.emulate_media(media="print")
+        drawn = "[...document.querySelectorAll('.key i, .row input')].map((e) => getComputedStyle(e).printColorAdjust)"
+        assert set(visit.page.evaluate(drawn)) == {"exact"}, "keys and tracks are backgrounds, which browsers leave out"
         assert not visit.page.locator(".steadyslip-root").is_visible()
         assert visit.page.get_by_role("heading", name="How far is the edge?").is_visible()
 

@@ -16,6 +16,7 @@ _STEPS = 60  # of Newton's method; laws that are linear in the stresses take two
 _CONVERGED = 1e-13  # change of the stresses relative to them, some hundred units in the last place
 _STALLED = 1e-6  # change that no longer falls: rounding, of stresses far smaller than the forces that balance
 _SHRINK = 0.1  # smallest share of a stress that one step leaves
+_LARGE = 64  # unknowns from which one system of equations after the other is faster than all together
 _FREE = 1e-13  # pivot of the balances, relative to the largest, below which they leave a body free
 
 
@@ -236,7 +237,32 @@ def _solved(matrix: Array, right: Array) -> tuple[Array, NDArray[np.bool_]]:
     finite = np.all(np.isfinite(even), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1)
     one = np.eye(matrix.shape[-1])
     even = np.where(finite[..., None, None], even, one)
-    good = finite & np.all(rows > 0, axis=-1) & (np.linalg.cond(even) <= 1 / _FREE)
-    even = np.where(good[..., None, None], even, one)
-    found = np.linalg.solve(even, (right / np.where(rows > 0, rows, 1.0))[..., None])[..., 0] / columns
-    return np.where(good[..., None], found, np.nan), good
+    good = finite & np.all(rows > 0, axis=-1)
+    right = right / np.where(rows > 0, rows, 1.0)
+    if matrix.shape[-1] > _LARGE:
+        solved = [_solved_by_factors(*pair) for pair in zip(even.reshape(-1, *one.shape), _flat(right), strict=True)]
+        found = np.array(solved).reshape(right.shape)
+        good &= np.all(np.isfinite(found), axis=-1)
+    else:
+        good &= np.linalg.cond(even) <= 1 / _FREE
+        found = np.linalg.solve(np.where(good[..., None, None], even, one), right[..., None])[..., 0]
+    return np.where(good[..., None], found / columns, np.nan), good
+
+
+def _flat(rows: Array) -> Array:
+    return rows.reshape(-1, rows.shape[-1])
+
+
+def _solved_by_factors(matrix: Array, right: Array) -> Array:
+    """Solution of one system of equations; NaN where an estimate of the condition, of factors, finds it singular.
+
+    Singular values would take ten times as long for hundreds of unknowns.
+    """
+    from scipy.linalg import lapack  # slow to import
+
+    factors, pivots, _ = lapack.dgetrf(matrix)
+    inverse_condition, _ = lapack.dgecon(factors, np.max(np.sum(np.abs(matrix), axis=0)))
+    if not inverse_condition * len(matrix) >= _FREE:  # in sums of entries, which are up to n times the singular values
+        return np.full(len(matrix), np.nan)
+    found, _ = lapack.dgetrs(factors, pivots, right)
+    return np.asarray(found)

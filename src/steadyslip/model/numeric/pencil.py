@@ -23,6 +23,7 @@ _MASSLESS = 1e-12  # eigenvalue of the scaled inertia matrix, relative to the la
 _INFINITE = 1e-9  # 1/eigenvalue of a pencil in units of its own frequencies below which it is infinite; QZ loses half
 _TRUSTED = 1e-8  # relative error of the resolvent by eigenvectors, above which equations are solved instead
 _SPOILT = 1e8  # condition of E from which dividing by it loses half of the digits
+_INVERSE_STEPS = 3  # of inverse iteration; one is enough where no other eigenvalue is near
 _MARGIN = 10.0  # rounding errors between a real part and zero that leave no doubt of its sign
 _SURE = 1e-9  # real part, relative to the largest eigenvalue, above which rounding cannot change its sign
 ILL_POSED, UNDECIDED = -1, -2  # in place of a number of growing eigenvalues
@@ -108,10 +109,22 @@ class StatePencil:
         return int(np.sum(roots.real > 0))
 
     def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
-        """Left and right null vectors of s E − A, (N,) each, for an eigenvalue s (1/s)."""
+        """Left and right null vectors of s E − A, (N,) each, for an eigenvalue s (1/s), by inverse iteration."""
+        from scipy.linalg import lapack  # slow to import
+
         rows, columns = self.scale
-        left, _, right = np.linalg.svd(rows[:, None] * (s * self.e - self.a) * columns)
-        return left[:, -1].conj() * rows, right[-1].conj() * columns
+        factors, pivots, _ = lapack.zgetrf(rows[:, None] * (s * self.e - self.a) * columns)
+        diagonal = np.einsum("ii->i", factors)
+        diagonal[diagonal == 0] = np.finfo(float).tiny  # an eigenvalue to the last digit
+        found = []
+        for way in (2, 0):  # of the adjoint for the left one, and plain
+            one = np.random.default_rng(0).standard_normal(len(rows)) + 0j
+            for _ in range(_INVERSE_STEPS):
+                one = lapack.zgetrs(factors, pivots, one, trans=way)[0]
+                one /= np.max(np.abs(one))
+                one /= np.linalg.norm(one)
+            found.append(one)
+        return found[0].conj() * rows, found[1] * columns
 
     def mode(self, s: complex) -> ComplexArray:
         """Right null vector of s E − A, (N,), for an eigenvalue s (1/s)."""
@@ -236,6 +249,10 @@ def pencils(machine: MachineMatrices, found: Balance) -> tuple[Array, Array, NDA
     return e, a, posed & finite & (sign >= 0)
 
 
+def _flat(rows: Array) -> Array:
+    return np.reshape(rows, (-1, np.shape(rows)[-1]))
+
+
 def _add_contact(
     e: Array, a: Array, site: Site, slopes: Slopes, n: int, own: slice, integrates: bool
 ) -> NDArray[np.bool_]:
@@ -269,11 +286,11 @@ def _add_contact(
     sigma = solved[..., None] * (of_friction[..., None] * friction + (1 - by[2])[..., None] * normal)
     late_tau, late_sigma = solved * by[1] * of_acceleration, solved * (1 - by[2]) * of_acceleration
     area = np.asarray(site.area)[..., None, None]
-    a[..., moving, :] += area * (
-        site.apart[..., :, None] * sigma[..., None, :] - site.slip[..., :, None] * tau[..., None, :]
-    )
-    pushed = late_sigma[..., None] * site.apart - late_tau[..., None] * site.slip
-    e[..., moving, moving] -= area * pushed[..., :, None] * site.slip[..., None, :]
+    felt = np.flatnonzero(np.any(_flat(site.apart) != 0, axis=0) | np.any(_flat(site.slip) != 0, axis=0))
+    apart, slip = site.apart[..., felt], site.slip[..., felt]  # a contact acts on few of a structure's coordinates
+    a[..., n + felt, :] += area * (apart[..., :, None] * sigma[..., None, :] - slip[..., :, None] * tau[..., None, :])
+    pushed = late_sigma[..., None] * apart - late_tau[..., None] * slip
+    e[..., n + felt, moving] -= area * pushed[..., :, None] * site.slip[..., None, :]
     for j, place in enumerate(range(memory.start, memory.stop)):
         row = slopes.rates[..., j, :]
         of_v, of_sigma, of_tau = (row[..., k, None] for k in range(3))

@@ -1,6 +1,8 @@
 """Why a mode grows, which modes meet, and slopes of eigenvalues: laws, closed forms, and equations typed by hand."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -265,3 +267,22 @@ def test_the_command_tells_modes(tmp_path):
     assert names[0].read_text().startswith("number,frequency (Hz),growth (1/s),damping ratio,amplitude of pad,")
     assert "modes 1 and 2 meet at 746.5 Hz" in names[1].read_text(encoding="utf-8").replace("\xa0", " ")
     assert names[2].stat().st_size > 0
+
+
+def test_a_mode_of_many_points_names_those_that_move_most_and_contacts_that_feed_alike():
+    """Six contacts of a pad were named one by one, with every share, and the first alone as what feeds the mode."""
+    size = 5
+    stiffness = 4e5 * np.eye(size) + 3e6 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    data = ss.machine.StructureData(0.1 * np.eye(size), 1e-7 * stiffness, stiffness, np.zeros((size, size)))
+    points = {f"p{i}": ss.machine.StructurePoint(x=i + 1) for i in range(size)}
+    law = ss.laws.RateState(a=0.010, b=0.014, d_c=2e-5, mu_ref=0.45, v_ref=1.0)
+    load = ss.laws.ConstantNormalStress(preload=500.0)
+    contacts = {
+        f"c{i}": ss.machine.Surface(body="drive", against=f"s.p{i}", friction=law, contact=load) for i in range(size)
+    }
+    body = ss.machine.StructureBody(matrices=data, points=points)
+    found = ss.analyze(ss.Machine(bodies={"s": body}, contacts=contacts, drive=ss.machine.Pull(velocity=1.0)))
+    assert "c0, c1, c2, c3 and c4 each slide at 1 m/s" in str(found)
+    assert re.search(r"friction at c\d and \d other contacts falls with velocity", found.origin.words)
+    mode = replace(found.mode, amplitudes={f"s.p{i}": 0.9**i + 0j for i in range(9)})
+    assert mode.words().startswith("the s.p0, the s.p1 and the s.p2 oscillate most, of 9 coordinates; ")

@@ -9,7 +9,7 @@ import sympy as sp
 from steadyslip.core.records import with_values
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.nodes import Program
-from steadyslip.linear.modes import HARDLY, MOVES, WORDS, stores
+from steadyslip.linear.modes import HARDLY, MANY, MOVES, NAMED, WORDS, stores
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.model.equations import Model
@@ -46,6 +46,6 @@ def mode_part(machine: Machine, model: Model) -> tuple[list[Program], dict[str, 
         "coordinates": names,
         "matrix": [len(characteristic_rows(model)), [[i, j, power] for i, j, power, _ in entries]],
         "stores": [[one.name, one.kinetic, [names.index(name) for name in one.row]] for one in held],
-        "shape": {"moves": MOVES, "hardly": HARDLY, "suffix": NORMAL, "words": WORDS},
+        "shape": {"moves": MOVES, "hardly": HARDLY, "many": MANY, "named": NAMED, "suffix": NORMAL, "words": WORDS},
     }
     return programs, facts

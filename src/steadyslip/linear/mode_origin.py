@@ -38,6 +38,7 @@ _STEPS = 16  # of friction between none and the machine's own, through which the
 _MOST = 4.0  # times the machine's own friction up to which a meeting is looked for
 _ROUNDS, _LAST = 60, 4 * np.finfo(float).eps  # of regula falsi, and its last relative step
 _SAME = 1e-6  # relative difference of frequencies, and share of one, that counts as rounding of a double root
+_ALIKE = 0.5  # share of the largest feed from which another contact is told beside it
 _NEAR = 0.25  # share of its frequency by which a mode may be off that of the undamped pair which is taken for it
 
 
@@ -61,6 +62,8 @@ class Origin(Displayed):
         Places by rising frequency of the two that meet; empty if none do.
     friction : float or None
         Friction coefficient of the contact where they meet, those of all contacts raised or lowered alike.
+    others : int
+        Further contacts that feed it in the same way, each at least half as much.
     """
 
     kind: str
@@ -70,6 +73,7 @@ class Origin(Displayed):
     feeds: Mapping[str, float]
     modes: tuple[int, ...] = ()
     friction: float | None = None
+    others: int = 0
 
     @property
     def words(self) -> str:
@@ -77,8 +81,14 @@ class Origin(Displayed):
         friction = "" if self.friction is None else f"{self.friction:.3g}"
         first, second = self.modes or (0, 0)
         frequency = format_quantity(self.frequency, "Hz")
+        several = f" and {self.others} other contact{'s' * (self.others > 1)}" if self.others else ""
         return WORDS[self.kind].format(
-            number=self.number, frequency=frequency, name=self.name, friction=friction, first=first, second=second
+            number=self.number,
+            frequency=frequency,
+            name=self.name + several,
+            friction=friction,
+            first=first,
+            second=second,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -92,7 +102,8 @@ def origin_of(point: MachinePoint, s: complex, number: int) -> Origin:
     most = max(feeds, key=lambda name: feeds[name])
     name, frequency = most.partition(".")[2], abs(s.imag) / (2 * np.pi)
     if most.endswith(BY_VELOCITY):
-        return Origin("velocity", name.removesuffix(BY_VELOCITY), number, frequency, feeds)
+        alike = [one for key, one in feeds.items() if key.endswith(BY_VELOCITY) and one >= _ALIKE * feeds[most]]
+        return Origin("velocity", name.removesuffix(BY_VELOCITY), number, frequency, feeds, others=len(alike) - 1)
     if not most.endswith(BY_NORMAL):
         return Origin("other", name, number, frequency, feeds)
     name = name.removesuffix(BY_NORMAL)

@@ -27,10 +27,11 @@ WORDS = {
     "oscillate": "oscillates|oscillate", "drift": "drifts|drift", "still": "hardly moves|hardly move",
     "opposed": " against each other", "the": "the {name}", "and": " and ", "normal": " (normal)",
     "both": " (along and normal)", "share": "{name} by {share} of that",
-    "energy": "; {share} of the energy is in the {name}",
+    "energy": "; {share} of the energy is in the {name}", "most": " most, of {count} coordinates",
 }  # fmt: skip
 """Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""
 MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body oscillates, below the second it hardly moves
+MANY, NAMED = 8, 3  # coordinates above which a sentence names those that move most alone, and how many of them
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,12 @@ class Mode(Displayed):
         leads = [name for name, size in sizes.items() if size >= MOVES]
         rest = [name for name, size in sizes.items() if HARDLY <= size < MOVES]
         still = [name for name, size in sizes.items() if size < HARDLY]
+        if many := len(sizes) > MANY:
+            leads, rest, still = sorted(sizes, key=lambda name: -sizes[name])[:NAMED], [], []
         movers = _merged(leads)
         parts = [f"{_listed(movers)} {_does('oscillate' if self.eigenvalue.imag else 'drift', movers)}"]
+        if many:
+            parts[0] += WORDS["most"].format(count=len(sizes))
         if len(leads) == 2 and self._opposed(*leads):
             parts[0] += WORDS["opposed"]
         if rest:

@@ -97,11 +97,17 @@ def _nearest(found: Findings, margin: Margin) -> str:
 
 
 def _sliding(steady: SteadyMachine) -> str:
+    """Steady sliding of each contact; those that slide alike in one clause."""
+    alike: dict[str, list[str]] = {}
+    for name, one in steady.contacts.items():
+        told_of = (
+            f"{format_quantity(one.slip_rate, 'm/s')}, normal force {format_quantity(one.normal_force, 'N')}, "
+            f"friction force {format_quantity(one.friction_force, 'N')}, friction {one.friction:.4g}"
+        )
+        alike.setdefault(told_of, []).append(name)
     return "; ".join(
-        f"{name} slides at {format_quantity(one.slip_rate, 'm/s')}, normal force "
-        f"{format_quantity(one.normal_force, 'N')}, friction force "
-        f"{format_quantity(one.friction_force, 'N')}, friction {one.friction:.4g}"
-        for name, one in steady.contacts.items()
+        f"{', '.join(names[:-1])} and {names[-1]} each slide at {what}" if names[1:] else f"{names[0]} slides at {what}"
+        for what, names in alike.items()
     )
 
 

@@ -92,17 +92,19 @@ export function percent(share) {
 }
 
 /** Sentence on the shape of a mode. @param {any} mode @param {any} shape words and limits */
-export function words(mode, { moves, hardly, suffix, words: said }) {
+export function words(mode, { moves, hardly, many, named: few, suffix, words: said }) {
   const sizes = Object.entries(mode.amplitudes).map(([name, one]) => /** @type {[string, number]} */ ([name, sizeOf(one)]));
   const named = (test) => sizes.filter(([, size]) => test(size)).map(([name]) => name), called = (name) => name.replace(suffix, said.normal);
-  const leads = named((size) => size >= moves), rest = sizes.filter(([, size]) => size >= hardly && size < moves), still = named((size) => size < hardly);
+  const crowd = sizes.length > many, largest = [...sizes].sort(([, a], [, b]) => b - a).slice(0, few).map(([name]) => name);
+  const leads = crowd ? largest : named((size) => size >= moves), rest = crowd ? [] : sizes.filter(([, size]) => size >= hardly && size < moves);
+  const still = crowd ? [] : named((size) => size < hardly);
   const movers = leads.flatMap((name) => (leads.includes(name + suffix) ? [name + said.both] : name.endsWith(suffix) && leads.includes(name.slice(0, -suffix.length)) ? [] : [name]));
   const listed = (names) => {
     const all = names.map((name) => fill(said.the, { name: called(name) }));
     return all.length === 1 ? all[0] : all.slice(0, -1).join(", ") + said.and + all[all.length - 1];
   };
   const does = (what, names) => said[what].split("|")[names.length > 1 ? 1 : 0];
-  const parts = [`${listed(movers)} ${does(mode.eigenvalue.im ? "oscillate" : "drift", movers)}`];
+  const parts = [`${listed(movers)} ${does(mode.eigenvalue.im ? "oscillate" : "drift", movers)}${crowd ? fill(said.most, { count: sizes.length }) : ""}`];
   if (leads.length === 2 && leads[0].replace(suffix, "") !== leads[1].replace(suffix, "")) {
     const [a, b] = leads.map((name) => mode.amplitudes[name]);
     if (a.re * b.re + a.im * b.im < 0) parts[0] += said.opposed;

@@ -99,8 +99,9 @@ def _numbers(row: Shares, names: dict[str, int]) -> Array:
 
 def _too_large(part: StructurePart, why: str) -> NotAvailable:
     return NotAvailable(
-        f"bodies.{part.name}: motion is not offered with {len(part.coordinates)} degrees of freedom, {why}; reduce "
-        "them: ss.machine.reduced keeps those where links and contacts act, and some modes"
+        f"bodies.{part.name}: motion, kicks, cycles, cures, chances and maps are not offered with "
+        f"{len(part.coordinates)} degrees of freedom, {why}; reduce them: ss.machine.reduced keeps those where links "
+        "and contacts act, and some modes"
     )
 
 

@@ -155,7 +155,7 @@ def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
         if sliding.one_way:
             lost = np.maximum(np.asarray(slip, dtype=float) - then, 0.0)
             with np.errstate(divide="ignore"):
-                found = min(found, float(np.min(slip / lost)))
+                found = min(found, float(np.nanmin(np.append(slip / lost, math.inf))))  # rigs that do not slide: NaN
     return found
 
 

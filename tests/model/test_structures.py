@@ -343,6 +343,19 @@ def test_reduced_matrices_keep_the_names_of_degrees_of_freedom(tmp_path):
     assert again == small
 
 
+def test_kept_modes_reduce_matrices_as_they_are_read(tmp_path):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    machine = ss.read_rig(reed_file(tmp_path, 'matrices = "reed.npz"\nkept_modes = 5', "tip", PLACE))
+    small, error = reduced(StructureData(mass, damping, stiffness, 0 * mass), (58, 59), 5)
+    by_hand = reed(body=StructureBody(matrices=small, points={"tip": StructurePoint(x=1, y=2, angle=np.radians(60))}))
+    np.testing.assert_allclose(ss.eigenvalues(machine), ss.eigenvalues(by_hand), rtol=1e-12)
+    assert f"are off by up to {100 * error:.3g}" in " ".join(ss.analyze(machine).warnings)
+    assert "kept_modes = 5" in ss.rig_to_text(machine)
+    with pytest.raises(ss.RigFileError, match="allowed: up to 58"):
+        ss.read_rig(reed_file(tmp_path, 'matrices = "reed.npz"\nkept_modes = 59', "tip", PLACE))
+
+
 def test_damping_of_modes_is_the_ratio_of_each():
     mass, damping, stiffness = reed_matrices()
     data = StructureData(mass, 0 * damping, stiffness, 0 * mass)

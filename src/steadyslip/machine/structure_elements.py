@@ -100,8 +100,8 @@ def _numbers(row: Shares, names: dict[str, int]) -> Array:
 def _too_large(part: StructurePart, why: str) -> NotAvailable:
     return NotAvailable(
         f"bodies.{part.name}: motion, kicks, cycles, cures, chances and maps are not offered with "
-        f"{len(part.coordinates)} degrees of freedom, {why}; reduce them: ss.machine.reduced keeps those where links "
-        "and contacts act, and some modes"
+        f"{len(part.coordinates)} degrees of freedom, {why}; reduce them: kept_modes = 10 keeps ten "
+        "modes beside those of points, as does ss.machine.reduced"
     )
 
 

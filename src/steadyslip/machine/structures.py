@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from numbers import Integral
 from typing import Any, ClassVar
 
@@ -333,6 +333,10 @@ class StructureBody(Body, name="structure"):
     spin: float | None = parameter(
         "rad/s", real, "speed of rotation, by which the gyroscopic matrix is multiplied; 1 unless given", default=None
     )
+    kept_modes: int | None = setting(
+        Whole("modes kept beside the degrees of freedom of points; all that the matrices have if missing", 0),
+        default=None,
+    )
     modal_damping: float | None = parameter(
         "1", nonnegative, "damping ratio of each mode of the structure alone, beside its damping matrix", default=None
     )
@@ -343,24 +347,50 @@ class StructureBody(Body, name="structure"):
         if sum(one is not None for one in (self.matrices, self.modes, self.response)) != 1:
             yield Problem("matrices", _ONE)
             return
+        if self.kept_modes is not None and self.matrices is None:
+            yield Problem("kept_modes", "is of matrices; allowed without them: fewer lines in the table of modes")
         for name, point in self.points.items():
-            known, taken = name in self.data.points, (point.x, point.y) != (None, None)
+            known, taken = name in self._read.points, (point.x, point.y) != (None, None)
             if known and taken:
-                yield Problem(f"points.{name}", f"the file {self.data.source!r} has this point; leave x and y out")
+                yield Problem(f"points.{name}", f"the file {self._read.source!r} has this point; leave x and y out")
             elif not known and not taken:
-                found = ", ".join(self.data.points)
+                found = ", ".join(self._read.points)
                 hint = f"; the file names {found}" if found else ""
                 yield Problem(f"points.{name}.x", f"missing; give the degree of freedom along x, y or both{hint}")
             for axis in ("x", "y"):
                 try:
                     if (place := getattr(point, axis)) is not None:
-                        self.data.row(place)
+                        self._read.row(place)
                 except ParameterError as error:
                     yield Problem(f"points.{name}.{axis}", error.problems[0].message)
+                    return
+        most = self._read.size - len(self._rows)
+        if self.kept_modes is not None and self.kept_modes > most:
+            yield Problem("kept_modes", f"got {self.kept_modes}; allowed: up to {most}, the other degrees of freedom")
 
     @property
     def data(self) -> StructureData:
-        """The matrices, or those of the modes; of a response a stand-in that only tells where points are."""
+        """The matrices, reduced if so told, or those of the modes; of a response what tells where its points are."""
+        return self._read if self.kept_modes is None else self._reduced[0]
+
+    @property
+    def reduction_error(self) -> float | None:
+        """Largest relative error of the structure's own frequencies (`reduced`); None if it is not reduced."""
+        return None if self.kept_modes is None else self._reduced[1]
+
+    @property
+    def _reduced(self) -> tuple[StructureData, float]:
+        return _reduced_once(self._read, self._rows, self.kept_modes or 0)
+
+    @property
+    def _rows(self) -> tuple[int, ...]:
+        """Rows of the matrices, from 0, that points name, each once."""
+        places = (place for point in self.points.values() for place in (point.x, point.y) if place is not None)
+        return tuple(dict.fromkeys(map(self._read.row, places)))
+
+    @property
+    def _read(self) -> StructureData:
+        """Data as the file has them."""
         if self.response is not None:
             one = np.eye(len(self.response.names))
             return StructureData(one, 0 * one, one, 0 * one, self.response.points(), self.response.source)
@@ -378,8 +408,11 @@ class StructureBody(Body, name="structure"):
         if name in self.data.points:
             return self.data.points[name]
         point = self.points[name]
-        unit = np.eye(self.data.size)
-        x, y = (None if place is None else unit[self.data.row(place)] for place in (point.x, point.y))
+        unit, rows = np.eye(self.data.size), self._rows
+        places = (None if place is None else self._read.row(place) for place in (point.x, point.y))
+        x, y = (
+            None if place is None else unit[place if self.kept_modes is None else rows.index(place)] for place in places
+        )
         return x, y
 
     def moves_away(self, name: str) -> bool:
@@ -483,6 +516,11 @@ def reduced(structure: StructureData, kept: Sequence[int | str], modes: int) -> 
     names += tuple(f"mode {i + 1}" for i in range(modes)) if names else ()
     small = StructureData(mass, damping, held, turning, points, freedoms=names)
     return small, _frequency_error(structure, small, _GOOD_TO**2 * float(squares[-1]) if modes else 0.0)
+
+
+@lru_cache(maxsize=8)  # of a file; other values of a machine's parameters ask for the same again
+def _reduced_once(structure: StructureData, rows: tuple[int, ...], modes: int) -> tuple[StructureData, float]:
+    return reduced(structure, tuple(row + 1 for row in rows), modes)
 
 
 def _along(row: Array | None, basis: Array) -> Array | None:

@@ -16,5 +16,6 @@ def refuse_many_inner(model: Model, what: str) -> None:
     if count > MOST_INNER:
         raise NotAvailable(
             f"{what} are not offered with {count} degrees of freedom of structures; allowed: {MOST_INNER}; reduce "
-            "them: ss.machine.reduced keeps those where links and contacts act, and some modes; simulate takes more"
+            "them: kept_modes = 5 keeps five modes beside those of points, as ss.machine.reduced does; simulate takes "
+            "more"
         )

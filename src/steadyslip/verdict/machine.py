@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.letters import said
 from steadyslip.machine.machine import Machine
@@ -112,7 +112,7 @@ def _sliding(steady: SteadyMachine) -> str:
 
 
 def warnings(analysis: Findings, states: Sequence[SteadyMachine]) -> Iterator[str]:
-    """Warnings: friction that is not positive, laws without memory, structures that give way by themselves."""
+    """Warnings: friction that is not positive, laws without memory, structures reduced or that give way."""
     contacts = states[0].contacts
     for name, one in contacts.items():
         if one.friction <= 0:
@@ -126,6 +126,11 @@ def warnings(analysis: Findings, states: Sequence[SteadyMachine]) -> Iterator[st
             "low speed is not predicted; use a law with memory"
         )
     for name, body in analysis.rig.bodies.items():
+        if isinstance(body, StructureBody) and body.reduction_error is not None:
+            yield (
+                f"{name} is reduced to {body.data.size} degrees of freedom: its own frequencies, up to half that of "
+                f"the last mode kept, are off by up to {format_percent(body.reduction_error)}"
+            )
         if not analysis.stable and isinstance(body, StructureBody) and body.data.gives_way:
             yield (
                 f"the stiffness matrix of {name} is negative in some direction, so that the structure gives way "

@@ -81,3 +81,23 @@ def test_a_problem_that_cannot_be_computed_is_left_alone():
     assert found.coordinates[0, 0] == pytest.approx(1.0)
     assert found.ssq[1] == np.inf
     assert not found.converged[1]
+
+
+@pytest.mark.parametrize(("known", "gets_there"), [(0.02, False), (0.2, True)])
+def test_searches_that_do_not_get_to_a_wanted_sum_of_squares_end_early(known, gets_there):
+    """Decay of an exponential beside a curve that it never meets: sum of squares .0623 at the least, from far away."""
+    t, asked = np.linspace(0, 4, 50), []
+    data = np.exp(-t) + 0.05 * np.sin(9 * t)
+
+    def decay(z, _):
+        asked.append(len(z))
+        model = np.exp(-np.exp(z) * t)
+        return data - model, (-t * np.exp(z) * model)[:, None, :]
+
+    start, wide = np.array([[-1.5]]), (np.array([-9.0]), np.array([9.0]))
+    whole = minimise(decay, start, *wide)
+    most = len(asked)
+    asked.clear()
+    found = minimise(decay, start, *wide, known=known)
+    assert known < whole.ssq[0] if not gets_there else found.ssq[0] == whole.ssq[0]
+    assert (len(asked) < most) is not gets_there

@@ -120,15 +120,16 @@ def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
         As of `remedies`.
     """
     size, samples = len(plan.space()), sum(map(len, plan.records))
+    wanted = ssq * float(np.exp(-STRONG_EVIDENCE / samples))  # more is too little even in white noise
     for own in _changed(plan):
         if not _choice(plan, own) or not _is_brief(own, values):
             continue
         try:
-            best = _from_minimum(own, _effort(own), values, LAGS[:3])
+            best = _from_minimum(own, _effort(own), values, LAGS[:3], wanted)
         except NotAvailable:
             continue
-        if samples * float(np.log(ssq / best.ssq)) < STRONG_EVIDENCE:
-            continue  # too little even in white noise; to describe the noise takes longer than this search
+        if best.ssq > wanted:
+            continue  # to describe the noise takes longer than this search
         if remedy(plan, own, best.comparison, best.coordinates, ssq, size).gain > STRONG_EVIDENCE:
             return True
     return False
@@ -215,8 +216,13 @@ def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, 
     return Remedy(_choice(plan, own), least, gain, whiteness(parts).p, ends)
 
 
-def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float], lags: Sequence[float] = LAGS) -> FoundMinimum:
-    """Minimum of a plan with a lag or a trend more, from several values of those and the minimum without."""
+def _from_minimum(
+    own: Plan, effort: Effort, values: Mapping[str, float], lags: Sequence[float] = LAGS, wanted: float = np.inf
+) -> FoundMinimum:
+    """Minimum of a plan with a lag or a trend more, from several values of those and the minimum without.
+
+    Searches end early that are not about to reach the sum of squares `wanted`.
+    """
     space, comparison = own.space(), own.comparison(effort)
     begin = space.coordinates(np.array([values.get(one.name, 0.0) for one in space.unknowns]))
     added = np.array([one.parameter == "lag" and one.name not in values for one in space.unknowns])
@@ -225,8 +231,9 @@ def _from_minimum(own: Plan, effort: Effort, values: Mapping[str, float], lags: 
     stop = effort.budget.part(np.inf)
     enough, near = SMALL_FALL / comparison.size, DAMPING_NEAR
     ends = minimise(
-        lambda x, _: comparison.residuals(x), z, low, high, MAX_ITERATIONS, tolerance=enough, stop=stop, damping=near
-    )
+        lambda x, _: comparison.residuals(x), z, low, high, MAX_ITERATIONS, tolerance=enough, known=wanted, stop=stop,
+        damping=near,
+    )  # fmt: skip
     ends = first_computable(comparison, ends.sorted())
     if not np.isfinite(ends.ssq[0]):
         raise NotAvailable("the model cannot follow these records")

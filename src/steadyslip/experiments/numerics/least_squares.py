@@ -30,6 +30,7 @@ PROGRESS_ITERATIONS = 10  # iterations over which the progress of a problem is a
 LEAST_PROGRESS = (
     3e-7  # relative decrease in `PROGRESS_ITERATIONS` iterations below which a problem ends: it follows a flat valley
 )
+LEAST_PROMISE = 0.1  # share of the way to a known sum of squares; searches that got there predicted .4 or more
 MAX_SSQ = 1e100  # sums of squares above count as infinite; their products would overflow
 DAMPING_FAR, DAMPING_NEAR = 1e-2, 1e-6  # initial damping, relative to the curvature: far from a minimum, and near one
 MAX_STEP = 2.0  # largest step in any coordinate: a factor exp(2) of a logarithmic parameter
@@ -124,7 +125,8 @@ def minimise(
         If positive, all problems are starts of one: once `race` of them have converged to the best minimum or are one
         step away from it, those that predict no better end stop; once one has, those too slow to get there stop.
     known : float
-        Sum of squares that this one problem is known to reach from elsewhere.
+        Sum of squares that this one problem is known to reach from elsewhere: starts too slow to get there stop, and
+        without a race those that predict to get hardly nearer.
     callback : callable, optional
         Called after every iteration with the `Minima` so far.
     stop : callable, optional
@@ -166,9 +168,11 @@ def minimise(
         if iteration % PROGRESS_ITERATIONS == 0:
             gone = (earlier[active] - before) / PROGRESS_ITERATIONS
             over = over | (gone * PROGRESS_ITERATIONS <= LEAST_PROGRESS * before)
-            if race:
-                over |= before - gone * (most - iteration) > best
+            if race or known < np.inf:
+                over = over | (before - gone * (most - iteration) > best)
             earlier = found.ssq.copy()
+        if not race and known < np.inf:
+            over = over | (promise < LEAST_PROMISE * (before - known))
         if race and best < np.inf:
             there, ends = found.converged & (found.ssq <= best * (1 + SAME_SSQ)), before - promise
             there[active[done]] |= before[done] <= best * (1 + SAME_SSQ)

@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.at_minimum import fit_with_errors
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
-from steadyslip.experiments.numerics.noise import describe
+from steadyslip.experiments.numerics.noise import describe, first_order
 from steadyslip.experiments.numerics.pooling import spread_of_chains
 
 # -- errors
@@ -109,6 +109,23 @@ def test_white_noise_beside_an_autoregression_is_one_too():
     assert order > 5
     np.testing.assert_allclose(toeplitz(own[:order]) @ noise.coefficients, own[1 : order + 1], atol=2e-3 * own[0])
     assert own[0] - noise.coefficients @ own[1 : order + 1] == pytest.approx(noise.innovation, rel=2e-3)
+
+
+def test_noise_of_the_same_residuals_is_sought_once(monkeypatch):
+    """As of a fit, whose minimum, errors and text ask for it; with other derivatives it is other noise."""
+    import scipy.optimize
+
+    asked, search = [], scipy.optimize.minimize
+    monkeypatch.setattr(scipy.optimize, "minimize", lambda *given, **named: asked.append(1) or search(*given, **named))
+    rng = np.random.default_rng(8)
+    own, rows = np.cumsum(rng.standard_normal(400)) * 0.1 + rng.standard_normal(400), rng.standard_normal((2, 400))
+    ways = (own, None), (own, rows), (own, rows[::-1]), (own + 1e-9, None)
+    first = [first_order(*way) for way in ways]
+    assert len(asked) == len(ways)
+    for found, again in zip(first, [first_order(*way) for way in ways], strict=True):
+        assert (found.decay, found.average, found.alternatives) == (again.decay, again.average, again.alternatives)
+        np.testing.assert_array_equal(found.innovations, again.innovations)
+    assert len(asked) == len(ways)
 
 
 def test_an_autoregression_is_recovered():

@@ -6,7 +6,9 @@ take them for independent several times too small. Their autocovariance is descr
 
 from __future__ import annotations
 
+import hashlib
 import math
+from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
@@ -33,6 +35,9 @@ LEAST_CURVATURE = 0.25  # of their log-likelihood: where it is flatter they vary
 FITTED_RANK = 1e-6  # singular values of derivatives, scaled, below which they are combinations of each other
 VANISHED = 1e-30  # powers below it are taken as 0: they do not count, and denormal numbers are a hundred times slower
 TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
+
+_RECENT: deque[tuple[bytes, Array]] = deque(maxlen=8)
+"""Residuals and rows (a digest) that `first_order` was asked of last, and places found: a fit asks of many twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,8 +224,12 @@ def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
         variance = max(size**2, 1e-300) / freedom
         return decay, average, variance, through[-1], freedom * math.log(variance) + 2 * sum(map(math.log, fitted))
 
-    begin = min((np.arctanh(start) for start in FIRST_GUESSES), key=lambda x: left(x)[4])
-    best = minimize(lambda x: left(x)[4], begin, method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-3}).x
+    asked = hashlib.blake2b(residuals.tobytes() + (b"" if rows is None else rows.tobytes())).digest()
+    best = next((place for key, place in tuple(_RECENT) if key == asked), None)
+    if best is None:
+        begin = min((np.arctanh(start) for start in FIRST_GUESSES), key=lambda x: left(x)[4])
+        best = minimize(lambda x: left(x)[4], begin, method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-3}).x
+        _RECENT.append((asked, best))
     decay, average, variance, innovations, _ = left(best)
     others = tuple(left(x)[:3] for x in _likely(lambda x: left(x)[4], best)) if rows is not None else ()
     return FirstOrder(decay, average, variance, innovations, others)

@@ -156,6 +156,21 @@ def test_the_end_of_a_motion_is_told_as_in_a_run_of_python():
     assert "an oscillation." in machine_words.MEANS
 
 
+@pytest.mark.parametrize("until", [60, 200])
+def test_slip_events_that_have_come_to_an_end_are_told_as_in_python(until):
+    rig = ss.read_rig("examples/inclined-spring.toml").with_values({"stiffness": 32e9})
+    run = ss.simulate(rig, ss.protocol.VelocityStep(at=10, to=2e-6), until=until)
+    events = [{"contact": "", "begin": one.begin, "end": one.end, "slip": one.slip, "drop": one.stress_drop,
+               "every": one.recurrence if np.isfinite(one.recurrence) else None, "rings": [], "peak": one.peak_velocity,
+               "sticks": False}
+              for one in run.slip_events]  # fmt: skip
+    course = {"events": events, "status": "done", "end": run.end, "at": 10.0,
+              "contacts": [{"name": "", "v": [1.0], "floor": 0.0}]}  # fmt: skip
+    told = page("plain").script("outcome(course, { ...data, area: null })", course=course)
+    assert written(run.sentence.partition(" (")[0]) in written(told)
+    assert ("and no more after" in told) == (until == 200)
+
+
 SOURCE = Path(ss.__file__).parent
 MANY = 5  # words in a row that make a sentence
 NAMES = {

@@ -470,3 +470,17 @@ def test_swings_that_have_come_to_an_end_are_no_more_told_to_grow(rate):
         assert found.period == pytest.approx(0.5)
     elif rate < 0.005:
         assert list(growing_swings(over, 100.0)) == [""]
+
+
+def test_what_has_come_to_rest_judders_no_more():
+    """A stable rig slipped thrice after a step, then slid steadily for half an hour: "judders: every 16 s"."""
+    rig = ss.read_rig("examples/inclined-spring.toml").with_values({"stiffness": 32e9})
+    step = ss.protocol.VelocityStep(at=10, to=2e-6)
+    found = {until: ss.simulate(rig, step, until=until).sentence for until in (60, 200, 2000)}
+    assert found[60].startswith("judders: every 16 s it lags, then slips 18.1 um")
+    assert found[200] == found[2000]
+    assert found[200].startswith(
+        "slips 3 times, the last time 18.1 um within 5.91 s, a drop of 202 kPa, and no more after"
+    )
+    softer = rig.with_values({"stiffness": 25e9})
+    assert ss.simulate(softer, step, until=600).sentence.startswith("judders: every")

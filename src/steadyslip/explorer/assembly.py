@@ -48,7 +48,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.steady_results import ABSENT
-from steadyslip.motion.sentence import JUDDERS
+from steadyslip.motion.sentence import JUDDERS, OVER
 from steadyslip.motion.status import causes
 from steadyslip.verdict import machine as machine_words, slider as slider_words
 from steadyslip.verdict.numbers import linear_numbers
@@ -223,7 +223,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "pace": PACE,
         "columns": EIGENVALUE_COLUMNS,
         "aperiodic": NO_PERIOD,
-        "judders": JUDDERS,
+        "judders": JUDDERS | {"recurrences": OVER},
         "ends": causes(rig),
         "usual": DEFAULTS,
         "checks": _checks(rig, names, branch),

@@ -66,7 +66,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     @cached_property
     def _sentences(self) -> dict[str, str]:
         """Sentence of each contact that slips or oscillates, by name."""
-        slips = sentences(self.rig, self.events, self.slip_events)
+        slips = sentences(self.rig, self.events, self.slip_events, end=self.end)
         if any(one.begin > 0.5 * self.end for one in self.slip_events):
             return slips
         swings = oscillations(self.events, self.end)

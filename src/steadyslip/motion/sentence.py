@@ -15,6 +15,7 @@ from steadyslip.motion.events import AnyEvent, AnySlip, ContactSlip
 
 JUDDERS = {
     "again": "judders: every {every} it {waits}, then slips {slip} within {within}, a drop of {drop}",
+    "over": "slips {count} times, the last time {slip} within {within}, a drop of {drop}, and no more after {ended}",
     "alone": "slips {slip} within {within}, a drop of {drop}",
     "sticks": "sticks",
     "lags": "lags",
@@ -38,18 +39,20 @@ TREND = 0.01  # relative growth or decay of swings in the last half of a run up 
 LAST = 0.9  # share of a run after which swings that grew before must be alike if they have come to an end
 BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
 SUDDEN = 10.0  # peak over mean speed of an event; a half sine has 1.6, stick-slip without creep before it 2 to 4
+OVER = 2.0  # recurrences without another event after which events have come to an end
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
 def sentence(
     events: Sequence[AnyEvent], slips: Sequence[AnySlip], area: float | None = None, pulls: Sequence[str] = (),
-    since: float = math.inf,
+    since: float = math.inf, end: float = math.nan,
 ) -> str:  # fmt: skip
     """Sentence on the slip events of a block or contact; empty if there are none.
 
     It tells of the last forward event: how long after the one before, how far, how fast, how much the spring sheds, how
     far the one before slipped if that differs, and how it rings; and of the last backward stroke. The block *sticks* if
-    it was arrested since the event before, else it *lags* behind the load point.
+    it was arrested since the event before, else it *lags* behind the load point. It *judders* if events go on; long
+    after the last one it slips no more.
 
     Parameters
     ----------
@@ -61,6 +64,8 @@ def sentence(
         Names of what pulls at a machine's contact, which sheds the force (`Rig.pulls_at`).
     since : float
         Time from which forward events are told by their ranges, s; the last alone by default.
+    end : float
+        Of the run, s; events may go on by default.
     """
     if not slips:
         return ""
@@ -77,12 +82,14 @@ def sentence(
         "waits": JUDDERS["sticks" if _stuck(events, last) else "lags"],
         "slip": _told([abs(one.slip) for one in told], "m"), "within": _told([one.duration for one in told], "s"),
         "drop": drop, "rings": str(last.rings), "often": _told([last.ring_frequency], "Hz"), "backward": str(len(back)),
+        "count": str(len([one for one in slips if one.slip > 0])), "ended": _told([last.end], "s"),
     }  # fmt: skip
-    words = JUDDERS["again" if math.isfinite(last.recurrence) else "alone"]
+    over = end - last.end > OVER * last.recurrence
+    words = JUDDERS["over" if over else "again" if math.isfinite(last.recurrence) else "alone"]
     if last.peak_velocity > SUDDEN * last.slip / last.duration > 0:
         words += CREEPS.format(peak=_told([last.peak_velocity], "m/s"))
     before = next((one for one in reversed(slips[: slips.index(last)]) if one.slip > 0), last)
-    if since == math.inf and not math.isclose(before.slip, last.slip, rel_tol=ALIKE):
+    if since == math.inf and not over and not math.isclose(before.slip, last.slip, rel_tol=ALIKE):
         words += DIFFERS.format(before=_told([before.slip], "m"))
     if math.isfinite(last.ring_frequency):
         words += JUDDERS["rings"]
@@ -93,13 +100,14 @@ def sentence(
 
 
 def sentences(
-    rig: Slider | Machine, events: Sequence[AnyEvent], slips: Sequence[AnySlip], since: float = math.inf
-) -> dict[str, str]:
-    """Sentence of each contact that slips, by name ("" for a slider's)."""
+    rig: Slider | Machine, events: Sequence[AnyEvent], slips: Sequence[AnySlip], since: float = math.inf,
+    end: float = math.nan,
+) -> dict[str, str]:  # fmt: skip
+    """Sentence of each contact that slips, by name ("" for a slider's); see `sentence`."""
     found = {}
     for name in dict.fromkeys(one.contact for one in slips):
         own = [one for one in events if one.contact == name], [one for one in slips if one.contact == name]
-        found[name] = sentence(*own, rig.area, rig.pulls_at(name), since)
+        found[name] = sentence(*own, rig.area, rig.pulls_at(name), since, end)
     return found
 
 

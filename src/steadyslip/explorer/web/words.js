@@ -134,17 +134,18 @@ export function outcome({ events, status, end, contacts, at }, { area, phrases, 
   const counts = contacts.map(({ name }) => [events.filter((one) => one.contact === name).length, name]).filter(([many]) => many);
   const where = phrases ? ` (${counts.map(([many, name]) => (counts.length > 1 ? `${many} of ${name}` : name)).join(", ")})` : "";
   const drop = `${phrases || area !== null ? "force" : "stress"} drop ${phrases ? shown(last.drop, "N") : quantity(last.drop, "Pa", area)}`;
-  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => (phrases ? fill(judders.pull, { drop: shown(value, "N", 3), links: pulls[name] }) : quantity(value, "Pa", area, 3)))).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
+  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => (phrases ? fill(judders.pull, { drop: shown(value, "N", 3), links: pulls[name] }) : quantity(value, "Pa", area, 3)), end)).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
   return `${events.length} slip event${events.length > 1 ? "s" : ""}${where}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, ${drop}; ${told.join("; ")}.${ended}`;
 }
 
-/** Sentence on the slip events of one contact, as in Python (steadyslip.motion.sentence). @param {any} slips @param {Record<string, string>} words @param {(value: number) => string} force */
-function sentence(slips, words, force) {
+/** Sentence on the slip events of one contact, as in Python (steadyslip.motion.sentence). @param {any} slips @param {Record<string, any>} words @param {(value: number) => string} force @param {number} until */
+function sentence(slips, words, force, until) {
   const back = slips.filter((one) => one.slip < 0), last = slips.findLast((one) => one.slip > 0) ?? back[back.length - 1], { rings } = last, hindmost = back[back.length - 1];
-  const text = words[last.every !== null ? "again" : "alone"] + (rings.length > 1 ? words.rings : "") + (hindmost ? words.backward : "");
+  const over = last.every !== null && until - last.end > words.recurrences * last.every;
+  const text = words[over ? "over" : last.every !== null ? "again" : "alone"] + (rings.length > 1 ? words.rings : "") + (hindmost ? words.backward : "");
   return fill(text, {
     every: shown(last.every, "s", 3), waits: words[last.sticks ? "sticks" : "lags"], slip: shown(Math.abs(last.slip), "m", 3), within: shown(last.end - last.begin, "s", 3),
     drop: force(last.drop), rings: `${rings.length}`, often: rings.length > 1 ? shown(1 / (rings[rings.length - 1] - rings[rings.length - 2]), "Hz", 3) : "",
-    backward: `${back.length}`, back: hindmost ? shown(Math.abs(hindmost.slip), "m", 3) : "", during: hindmost ? shown(hindmost.end - hindmost.begin, "s", 3) : "",
+    count: `${slips.filter((one) => one.slip > 0).length}`, ended: shown(last.end, "s", 3), backward: `${back.length}`, back: hindmost ? shown(Math.abs(hindmost.slip), "m", 3) : "", during: hindmost ? shown(hindmost.end - hindmost.begin, "s", 3) : "",
   });
 }

@@ -208,7 +208,7 @@ def test_a_structure_that_is_too_large_to_move_says_what_to_do(size, said):
     found = ss.analyze(machine)
     assert found.stable is not None
     assert not found.judders
-    with pytest.raises(ss.NotAvailable, match=rf"bodies\.s: motion .*{said}.* reduce"):
+    with pytest.raises(ss.NotAvailable, match=rf"bodies\.s: motion, .*{said}.* reduce"):
         ss.simulate(machine, until=1.0)
 
 
@@ -226,7 +226,7 @@ def test_a_report_on_a_structure_that_is_too_large_to_move_tells_what_eigenvalue
 def test_verdict_on_the_reed_tells_what_it_does_instead():
     """Its oscillation at 100 N has grown over the whole run; at 50 N it is large within it."""
     found = ss.analyze(ss.read_rig(EXAMPLE))
-    assert found.judders.startswith("tip oscillates more and more")
+    assert found.judders.startswith("tip oscillates: every 1.38 ms between ")
     assert found.judders in str(found).replace("\n", " ")
 
 

@@ -255,7 +255,8 @@ def read_contents(
     found = read_tables(tables, key_lines(text), source, changes, further, complete, rig_needed)
     first, _, rest = text.partition("\n")
     if found.rig is not None and rest and first.startswith(TOLD_IN):
-        found.rig.told_in(sorted(units_in([f"1 {name}" for name in first.removeprefix(TOLD_IN).split("; ")])))
+        names = filter(None, first.removeprefix(TOLD_IN).split("; "))
+        found.rig.told_in(sorted(units_in([f"1 {name}" for name in names])))
     return found
 
 

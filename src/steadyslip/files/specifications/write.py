@@ -105,9 +105,9 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
 
 
 def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
-    """Text of `rig_to_text` for stored results, with the units in which the rig is told."""
+    """Text of `rig_to_text` for stored results, with the units in which the rig is told, perhaps none."""
     units = "; ".join(sorted(rig.written_in))
-    return (f"{TOLD_IN}{units}\n" if units else "") + rig_to_text(rig, protocol)
+    return f"{TOLD_IN}{units}\n{rig_to_text(rig, protocol)}"
 
 
 def settings_to_text(section: Section, settings: FrozenRecord) -> str:

@@ -39,7 +39,7 @@ ELSEWHERE, RISE = 0.1, 2.0  # e-folds or sizes apart, and multiple of the sum of
 SPREAD = 1.15  # largest distance of a start from the machine's own values, e-folds: a factor of three
 
 
-class Beginning:
+class FirstPart:
     """First part of all motions of a plan, and the logarithm of its responses.
 
     Parameters
@@ -128,7 +128,7 @@ def find_near(
             model.run({}, {}, 1)  # raises, and says why, if the machine itself cannot move
     stop = effort.budget.part(work_of_search(whole.size, len(whole.space)) * effort.budget.scale)
     motions = any(isinstance(record, MotionRecord) for record in plan.records)
-    parts = [Beginning(plan, share, effort) for share in (BEGINNINGS if motions else BEGINNINGS[:1])]
+    parts = [FirstPart(plan, share, effort) for share in (BEGINNINGS if motions else BEGINNINGS[:1])]
     parts = [one for one in parts if one.size >= 2 * len(whole.space)]
     begin, found, floor = _starts(plan, whole, starts), Minima.none(len(whole.space)), EXACT * whole.size
     tried, arrived, arrivals = 0, 0, np.empty(0, dtype=int)

@@ -244,3 +244,18 @@ def test_a_cure_with_tolerances_holds_for_all_that_is_not_known(seed):
         chances.append(one.share)
         assert one.share > 0.9 - 0.01
     assert min(chances) == pytest.approx(0.9, abs=0.01)
+
+
+def test_a_chance_of_one_holds_at_the_corners_of_the_ranges():
+    """The largest critical stiffness at a corner, over the least share of the stiffness; samples had 12 % less."""
+    own = ss.read_rig(EXAMPLES / "inclined-spring.toml")
+    spread = {"friction.a": "10 %", "friction.b": "10 %", "friction.d_c": "20 %", "stiffness": "10 %"}
+    corners = {f"friction.{one}": own.value(f"friction.{one}") for one in ("a", "b", "d_c")}
+    worst = {"friction.a": 0.9 * corners["friction.a"], "friction.b": 1.1 * corners["friction.b"],
+             "friction.d_c": 0.8 * corners["friction.d_c"]}  # fmt: skip
+    needed = float(ss.critical_stiffness(own, worst)) / 0.9
+    found = ss.cure(own, spread, adjust={"stiffness": Adjustment()}, sure=1.0).best.nearest
+    assert found == pytest.approx(needed, rel=1e-9)
+    for share, surely in ((0.999, False), (1.001, True)):
+        within = ss.tolerate(own.with_values({"stiffness": share * found}), spread)
+        assert (within.share == 1 and not within.otherwise) == surely

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array, valid_together
 from steadyslip.files.specifications.tolerance_tables import Tolerances
@@ -36,12 +37,15 @@ class Chances:
         Base-2 logarithms of the number of rigs of one group: of the whole sample, of few and of the fewest.
     unknown : tuple of mapping of str to float
         Values of parameters that are not known: chances are the least of these.
+    certain : bool
+        True if a chance is 1 only where all corners of the ranges are stable as well.
     """
 
     rig: Slider | Machine
     spreads: Spreads | None
     sizes: tuple[int, int, int]
     unknown: tuple[Mapping[str, float], ...] = ({},)
+    certain: bool = False
 
     @property
     def single(self) -> bool:
@@ -79,20 +83,34 @@ class Chances:
         if self.single:
             return float(found[0, 0]), 0.0
         shape = (GROUPS, -1)
-        return chance_of(found[0][possible[0]], possible[0].reshape(shape))
+        chance, error = chance_of(found[0][possible[0]], possible[0].reshape(shape))
+        at = {name: np.array([value]) for name, value in changes.items()}
+        return (chance, error) if self._corners_hold(at)[0] else (min(chance, 1 - 1 / found.size), error)
 
     def _chances(self, changes: Mapping[str, Array], log2: int) -> Array:
         rows = max((len(values) for values in changes.values()), default=1)
         found = []
         for one in self.unknown:
             stable, possible = self._judged({name: np.full(rows, x) for name, x in one.items()} | dict(changes), log2)
-            found.append(np.sum(stable & possible, axis=1) / np.maximum(np.sum(possible, axis=1), 1))
+            chance = np.sum(stable & possible, axis=1) / np.maximum(np.sum(possible, axis=1), 1)
+            holds = self._corners_hold({name: np.full(rows, x) for name, x in one.items()} | dict(changes))
+            found.append(np.where(holds, chance, np.minimum(chance, 1 - 1 / stable.shape[1])))
         return np.asarray(np.min(found, axis=0))
+
+    def _corners_hold(self, changes: Mapping[str, Array]) -> NDArray[np.bool_]:
+        """True (m,) where every possible corner of the ranges is stable, or corners do not count."""
+        if self.spreads is None or not self.certain:
+            return np.ones(max((len(values) for values in changes.values()), default=1), dtype=bool)
+        stable, possible = self._of_shares(changes, self.spreads.corner_shares())
+        return np.asarray(np.all(stable | ~possible, axis=1))
 
     def _judged(self, changes: Mapping[str, Array], log2: int) -> tuple[Array, Array]:
         """Whether each of n rigs about each of m values is stable, and whether it is possible, (m, n)."""
+        return self._of_shares(changes, None if self.spreads is None else self.spreads.shares(log2))
+
+    def _of_shares(self, changes: Mapping[str, Array], shares: Mapping[str, Array] | None) -> tuple[Array, Array]:
+        """The same of rigs at shares of the values of each parameter."""
         count = max((len(values) for values in changes.values()), default=1)
-        shares = None if self.spreads is None else self.spreads.shares(log2)
         size = 1 if shares is None else next(iter(shares.values())).size
         step = max(1, AT_ONCE // size)
         parts = [
@@ -117,16 +135,16 @@ class Chances:
 
 def chances_of(
     rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances,
-    unknown: Mapping[str, tuple[float, float]] | None = None,
+    unknown: Mapping[str, tuple[float, float]] | None = None, certain: bool = False,
 ) -> Chances:  # fmt: skip
-    """Chances of a rig within tolerances, certain ones where these are empty; the least over intervals of `unknown`."""
+    """Chances of a rig within tolerances, 0 or 1 where these are empty; the least over intervals of `unknown`."""
     whole = log2_of(rig)
     few = {LOG2_CLOSED: (LOG2_FEW, LOG2_FEWEST), LOG2_OTHERS: (LOG2_FEW - 1, LOG2_FEWEST - 2)}.get(whole, (1, 0))
     sizes = (whole, *few)
     places = [spread_over(*ends, np.linspace(0.0, 1.0, PLACES if len(unknown or {}) < 3 else 2))
               for ends in (unknown or {}).values()]  # fmt: skip
     values = tuple(dict(zip(unknown or {}, map(float, row), strict=True)) for row in itertools.product(*places))
-    return Chances(rig, spreads_of(rig, tolerances) if tolerances else None, sizes, values)
+    return Chances(rig, spreads_of(rig, tolerances) if tolerances else None, sizes, values, certain)
 
 
 def spread_over(low: float, high: float, share: Array) -> Array:

@@ -202,7 +202,7 @@ def cure(
     wanted = _share(sure)
     unknown = unknown or (tolerances.unknown if isinstance(tolerances, Tolerances) else {})
     within = stable_within(rig, unknown).each if unknown else ()
-    chances = chances_of(rig, tolerances or {}, {one.parameter: (one.low, one.high) for one in within})
+    chances = chances_of(rig, tolerances or {}, {one.parameter: (one.low, one.high) for one in within}, wanted == 1)
     own = adjust or (tolerances.adjust if isinstance(tolerances, Tolerances) else {}) or default_adjust(rig)
     given = {rig.resolve(name): one for name, one in own.items()}
     if not given:
@@ -293,9 +293,10 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
         return np.asarray(chances.few({name: at}) >= sure)
 
     inside = reached(values)
+    sharp = chances.single or chances.certain  # decided by single rigs, at the corners of the ranges
     at = np.flatnonzero(inside[1:] != inside[:-1])
-    edges = _narrowed(reached, values[at], values[at + 1], inside[at], HALVINGS if chances.single else FEW_HALVINGS)
-    edges = edges if chances.single else np.array([_settled(chances, name, edge, sure) for edge in edges])
+    edges = _narrowed(reached, values[at], values[at + 1], inside[at], HALVINGS if sharp else FEW_HALVINGS)
+    edges = edges if sharp else np.array([_settled(chances, name, edge, sure) for edge in edges])
     ends = [values[0], *edges, values[-1]]
     windows = tuple(
         (float(first), float(last))

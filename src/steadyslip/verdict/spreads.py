@@ -119,18 +119,21 @@ class Spreads:
 
     def corners(self) -> dict[str, Array]:
         """Values of every parameter at the corners of the ranges; normally distributed ones keep their value."""
-        bounded = [name for name, one in self.of.items() if not one.normal]
-        if len(bounded) <= MOST_ALL_CORNERS:
-            high = np.array(list(itertools.product((False, True), repeat=len(bounded))), dtype=bool)
-        else:
-            high = np.random.default_rng(0).random((2**MOST_ALL_CORNERS, len(bounded))) < 0.5
-            high[0], high[1] = False, True
+        shares = self.corner_shares()
         return {
-            name: np.where(high[:, bounded.index(name)], one.high, one.low)
-            if name in bounded
-            else np.full(len(high), one.value)
+            name: np.full(len(shares[name]), one.value) if one.normal else one.quantile(shares[name])
             for name, one in self.of.items()
         }
+
+    def corner_shares(self) -> dict[str, Array]:
+        """Share of all values below that at the corners, 0 or 1; a half of normally distributed ones."""
+        bounded = [name for name, one in self.of.items() if not one.normal]
+        if len(bounded) <= MOST_ALL_CORNERS:
+            high = np.array(list(itertools.product((0.0, 1.0), repeat=len(bounded))))
+        else:
+            high = (np.random.default_rng(0).random((2**MOST_ALL_CORNERS, len(bounded))) < 0.5).astype(float)
+            high[0], high[1] = 0.0, 1.0
+        return {name: high[:, bounded.index(name)] if name in bounded else np.full(len(high), 0.5) for name in self.of}
 
     def possible(self, varied: Mapping[str, Array]) -> Any:
         """Mask of the rigs whose numbers do not contradict each other (bool or array of bool)."""

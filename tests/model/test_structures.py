@@ -313,6 +313,14 @@ def test_matrices_of_abaqus_calculix_and_nastran_are_the_reed(tmp_path):
     np.testing.assert_allclose(body.matrices.stiffness, stiffness, rtol=1e-12)  # no names, so no rotations: as it is
 
 
+def test_wrong_units_of_a_file_are_told_once_where_they_stand(tmp_path):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    with pytest.raises(ss.RigFileError, match=r"units: got 'mm t'; allowed: units of length") as error:
+        ss.read_rig(reed_file(tmp_path, 'matrices = "reed.npz"\nunits = "mm t"', "tip", PLACE))
+    assert "matrices:" not in str(error.value)
+
+
 def test_massless_degrees_of_freedom_follow_the_others(tmp_path):
     """A spring in two halves with nothing between them is one of half the stiffness."""
     form = "{:d},{:d}, {:d},{:d}, {:.16e}\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,8 @@ def _loaded(body: Any, folder: Path) -> Any:
         if isinstance(path := found.get(key), str):
             try:
                 if key == "matrices" and "units" in found:
-                    more = (unit_sizes(found["units"]),)
+                    with suppress(ParameterError):  # the field of the units refuses them
+                        more = (unit_sizes(found["units"]),)
                 found[key] = read(path, folder, *more)
             except UnreadableFile as error:
                 found[key] = Unread(str(error))

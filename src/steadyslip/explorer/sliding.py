@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import sympy as sp
 
+from steadyslip.core.expressions import derivative
 from steadyslip.explorer.programs import program
-from steadyslip.kernels.nodes import Node, Program, Value
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
 from steadyslip.model.equations import Model
 from steadyslip.model.sliding import REFERENCE, friction_coefficient
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
@@ -58,25 +60,62 @@ def _formula(model: Model, place: int) -> list[sp.Expr]:
 
 
 def _joint_program(model: Model, joint: JointEquation) -> Program:
-    """Program that solves σ = A σ + b by Cramer's rule, and stores the characteristic polynomial of A behind."""
+    """Program that solves σ = A σ + b by Cramer's rule, and stores the characteristic polynomial of A behind.
+
+    With `JointEquation.bends` it takes the solution that `JointEquation.solve` takes.
+    """
     n = joint.size
-    wanted = [*(e for row in joint.matrix for e in row), *joint.rest]
+    sigmas = [contact.sigma_ss for contact in model.contacts]
+    nothing = dict.fromkeys(sigmas, sp.Integer(0))
+    inner = [e for one in joint.bends.inner for e in (*(derivative(one, s) for s in sigmas), one.xreplace(nothing))]
+    equations = [*(e for row in joint.matrix for e in row), *joint.rest, *inner]
+    patterns = joint.bends.patterns
+    wanted = [
+        sp.sympify(e).xreplace(dict(zip(joint.bends.signs, map(int, signs), strict=True)))
+        for signs in patterns
+        for e in equations
+    ]
+    many = len(equations)
+    shapes = [wanted[k * many : (k + 1) * many] for k in range(len(patterns))]
 
     def solved(found: list[Node]) -> Sequence[Value]:
-        places = [(i, j) for i in range(n) for j in range(n)]
-        a: Rows = [[None] * n for _ in range(n)]
-        for (i, j), value in zip(places, found, strict=False):
-            a[i][j] = value if joint.matrix[i][j] != 0 else None
-        left: Rows = [[_difference(1.0 if i == j else None, a[i][j]) for j in range(n)] for i in range(n)]
-        whole = _determinant(left)
-        sigmas = []
-        for k in range(n):
-            replaced = [[found[n * n + i] if j == k else left[i][j] for j in range(n)] for i in range(n)]
-            above = _determinant(replaced)
-            sigmas.append(float("nan") if whole is None else 0.0 if above is None else above / whole)
-        return [*sigmas, *characteristic_polynomial(a)]
+        chosen: list[Value] = []
+        settled: Any = False
+        for k, signs in enumerate(patterns):
+            values: list[Value | None] = [
+                None if e == 0 else v for e, v in zip(shapes[k], found[k * many :], strict=False)
+            ]
+            outcome, holds = _solution(values, n, signs)
+            takes = holds & ~settled if k else True
+            chosen = [select(takes, value, old) for value, old in zip(outcome, chosen or outcome, strict=True)]
+            settled = holds | settled if k else holds
+        return chosen
 
     return program(model, "steady", wanted, then=solved)
+
+
+def _solution(values: list[Value | None], n: int, signs: Sequence[float]) -> tuple[list[Value], Any]:
+    """Solution of σ = A σ + b with the characteristic polynomial of A, and whether it holds with given signs."""
+    a: Rows = [values[i * n : (i + 1) * n] for i in range(n)]
+    right = values[n * n : n * n + n]
+    left: Rows = [[_difference(1.0 if i == j else None, a[i][j]) for j in range(n)] for i in range(n)]
+    whole = _determinant(left)
+    sigmas: list[Value] = []
+    for column in range(n):
+        above = _determinant([[right[i] if j == column else left[i][j] for j in range(n)] for i in range(n)])
+        sigmas.append(float("nan") if whole is None else 0.0 if above is None else above / whole)
+    outcome = [*sigmas, *characteristic_polynomial(a)]
+    if not signs:
+        return outcome, True
+    holds: Any = as_node(0.0 if whole is None else whole) > 0
+    for sigma in sigmas:
+        holds = holds & (as_node(sigma) > 0)
+    for place, sign in enumerate(signs, start=n):
+        *slopes, inner = values[place * (n + 1) : (place + 1) * (n + 1)]
+        for slope, sigma in zip(slopes, sigmas, strict=True):
+            inner = _sum(inner, _product(slope, sigma))
+        holds = holds & (sign * as_node(0.0 if inner is None else inner) >= 0)
+    return outcome, holds
 
 
 def _sum(one: Value | None, other: Value | None) -> Value | None:

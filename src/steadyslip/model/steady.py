@@ -7,6 +7,7 @@ lock-up (friction grows faster than the spring can pull), σ0 + g0 <= 0 lift-off
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,6 +26,7 @@ GRID = np.geomspace(1e-12, 1e18, 6001)  # Pa; grid for sign changes, 200 points 
 ROOT_TOLERANCE = 1e-6  # residual over stress, above which a change of sign is a pole and not a root
 _NEARLY_REAL = 1e-9  # relative imaginary part of an eigenvalue that counts as rounding; chosen by trial
 _BATCH = 64  # rigs searched at once, so that arrays stay in the processor's cache
+MAX_BENDS = 8  # amounts |e| in coupled equations; each doubles the linear systems that are solved
 _HALVINGS = 48  # bisections: a cell is 0.012 of its stress wide, and 0.012 / 2**48 is below rounding
 
 
@@ -75,39 +77,94 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
 
 
 @dataclass(frozen=True)
-class JointEquation:
-    """Equations of coupled steady normal stresses: σ = A σ + b.
+class Bends:
+    """Places at which coupled steady normal stresses bend: each |e| of their equations is s e, with the sign s of e.
 
-    ``parts(*arguments)`` returns A row by row, then b; `matrix` and `rest` are the expressions of A and b.
+    Attributes
+    ----------
+    signs : tuple of sympy.Symbol
+        The signs s.
+    inner : tuple of sympy.Expr
+        The expressions e, linear in the stresses once the signs are given.
+    values : callable
+        ``values(*arguments, *signs, *stresses, *carried)`` returns all e.
+    """
+
+    signs: tuple[sp.Symbol, ...] = ()
+    inner: tuple[sp.Expr, ...] = ()
+    values: Callable[..., Any] | None = None
+
+    @property
+    def patterns(self) -> list[tuple[float, ...]]:
+        """All combinations of signs; all positive first."""
+        return list(itertools.product((1.0, -1.0), repeat=len(self.signs)))
+
+
+@dataclass(frozen=True)
+class JointEquation:
+    """Equations of coupled steady normal stresses: σ = A σ + b, for each combination of the signs of `bends`.
+
+    ``parts(*arguments, *signs)`` returns A row by row, then b; `matrix` and `rest` are the expressions of A and b.
     """
 
     size: int
     parts: Callable[..., Any]
     matrix: tuple[tuple[sp.Expr, ...], ...]
     rest: tuple[sp.Expr, ...]
+    bends: Bends = Bends()
 
     def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
-        """Values of A, (..., n, n), and b, (..., n)."""
+        """Values of A, (..., n, n), and b, (..., n), at arguments with signs."""
         count = self.size**2
         found = stacked_values(self.parts, arguments)
         return found[..., :count].reshape(*found.shape[:-1], self.size, self.size), found[..., count:]
 
+    def range_arrays(self, arguments: Arguments) -> tuple[Array, Array]:
+        """The same with all signs positive, for tests of overflow."""
+        return self.arrays((*arguments, *self.bends.patterns[0]))
+
     def solve(self, arguments: Arguments) -> tuple[Array, Array]:
-        """Solution σ (..., n) in Pa, and largest real eigenvalue of A (−inf if none is real); >= 1 is lock-up."""
-        matrix, right = self.arrays(arguments)
+        """Solution σ (..., n) in Pa, and largest real eigenvalue of A (−inf if none is real); >= 1 is lock-up.
+
+        With bends the first solution that has the signs it was made with, is positive and has det(I − A) > 0, that is,
+        does not lock up; where there is none, that of the first combination.
+        """
+        patterns = self.bends.patterns
+        sigma, gain, holds = self._one_pattern(arguments, patterns[0])
+        for signs in patterns[1:]:
+            other, other_gain, other_holds = self._one_pattern(arguments, signs)
+            takes = other_holds & ~holds
+            sigma, gain = np.where(takes[..., None], other, sigma), np.where(takes, other_gain, gain)
+            holds = holds | takes
+        return sigma, gain
+
+    def _one_pattern(self, arguments: Arguments, signs: tuple[float, ...]) -> tuple[Array, Array, Array]:
+        """Solution and largest eigenvalue with given signs, and where they hold and the contacts slide."""
+        matrix, right = self.arrays((*arguments, *signs))
         good = np.all(np.isfinite(matrix), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1)
         matrix = np.where(good[..., None, None], matrix, 0.0)
         gains = np.linalg.eigvals(matrix)
         largest = np.max(np.where(np.abs(gains.imag) <= _NEARLY_REAL * np.abs(gains), gains.real, -np.inf), axis=-1)
-        return solve_or_nan(np.eye(self.size) - matrix, np.where(good[..., None], right, np.nan)), largest
+        sigma = solve_or_nan(np.eye(self.size) - matrix, np.where(good[..., None], right, np.nan))
+        if self.bends.values is None:
+            return sigma, largest, good
+        sigmas = [sigma[..., i] for i in range(self.size)]
+        inner = stacked_values(
+            self.bends.values, (*arguments, *signs, *sigmas, *self._carried(arguments, sigmas, signs))
+        )
+        holds = np.all(inner * np.array(signs) >= 0, axis=-1) & np.all(sigma > 0, axis=-1)
+        return sigma, largest, holds & (np.linalg.det(np.eye(self.size) - matrix) > 0)
+
+    def _carried(self, arguments: Arguments, sigmas: Sequence[Any], signs: tuple[float, ...]) -> tuple[Any, ...]:
+        return ()
 
 
 @dataclass(frozen=True)
 class CarriedEquation(JointEquation):
     """Equations of coupled steady normal stresses and link forces z: M z = r + F τ + G σ, with linear laws.
 
-    ``parts(*arguments)`` returns the nonzero entries of nine blocks: M, r, F, G, derivatives of σ by z and by σ, of τ
-    by σ, and the constants of σ and τ; `places` has their rows and columns by block.
+    ``parts(*arguments, *signs)`` returns the nonzero entries of nine blocks: M, r, F, G, derivatives of σ by z and by
+    σ, of τ by σ, and the constants of σ and τ; `places` has their rows and columns by block.
     """
 
     places: tuple[tuple[tuple[int, int], ...], ...] = ()
@@ -141,8 +198,14 @@ class CarriedEquation(JointEquation):
         return direct + by_carried @ by_stress, (load + by_carried @ alone)[..., 0]
 
     def carried(self, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
-        """Link forces and displacements z at given normal stresses (Pa)."""
-        by_stress, alone = self._by_stress(self._blocks(arguments))
+        """Link forces and displacements z at given normal stresses (Pa).
+
+        They follow from the balances and the friction, in which no |e| occurs.
+        """
+        return self._carried(arguments, sigmas, self.bends.patterns[0])
+
+    def _carried(self, arguments: Arguments, sigmas: Sequence[Any], signs: tuple[float, ...]) -> tuple[Any, ...]:
+        by_stress, alone = self._by_stress(self._blocks((*arguments, *signs)))
         sigma = np.stack(np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in sigmas)), axis=-1)
         found = (by_stress @ sigma[..., None] + alone)[..., 0]
         return tuple(found[..., i][()] for i in range(self.count))
@@ -182,27 +245,58 @@ def joint_equation(model: Model) -> JointEquation | None:
     Raises
     ------
     NotAvailable
-        If a contact is not linear in the stresses.
+        If a contact is not linear in the stresses, apart from amounts |e|.
     """
     sigmas = [contact.sigma_ss for contact in model.contacts]
-    slopes = tuple(tuple(derivative(contact.steady_stress, one) for one in sigmas) for contact in model.contacts)
+    unknowns = [*sigmas, *(() if model.carried is None else model.carried.symbols)]
+    laws, bends = _straightened(model, unknowns)
+    slopes = tuple(tuple(derivative(law, one) for one in sigmas) for law in laws)
     size = len(sigmas)
     if model.carried is None and all(slopes[i][j] == 0 for i in range(size) for j in range(size) if i != j):
         return None
-    if any(slope.free_symbols & set(sigmas) for row in slopes for slope in row):
-        raise NotAvailable("contacts that press on each other must be linear in the stresses; these are not")
+    for contact, row in zip(model.contacts, slopes, strict=True):
+        if any(slope.free_symbols & set(unknowns) for slope in row):
+            raise _curved(contact.name)
     nothing = dict.fromkeys(sigmas, sp.Integer(0))
     if model.carried is not None:
-        return _carried_equation(model, model.carried, nothing)
-    rest = tuple(contact.steady_stress.xreplace(nothing) for contact in model.contacts)
-    parts = ArrayFunction(list(model.parameters.values()), [*(slope for row in slopes for slope in row), *rest])
-    return JointEquation(size, parts, slopes, rest)
+        return _carried_equation(model, model.carried, nothing, laws, bends)
+    rest = tuple(law.xreplace(nothing) for law in laws)
+    arguments = [*model.parameters.values(), *bends.signs]
+    parts = ArrayFunction(arguments, [*(slope for row in slopes for slope in row), *rest])
+    return JointEquation(size, parts, slopes, rest, bends)
 
 
-def _carried_equation(model: Model, carried: Carried, nothing: dict[sp.Symbol, sp.Expr]) -> CarriedEquation:
+def _curved(name: str) -> NotAvailable:
+    return NotAvailable(
+        f"the steady normal stress of contact '{name}' depends on that of others and is not linear in them; allowed: "
+        "any such law at a single contact, and for contacts that press on each other laws that are linear in the forces"
+    )
+
+
+def _straightened(model: Model, unknowns: Sequence[sp.Symbol]) -> tuple[list[sp.Expr], Bends]:
+    """Laws of the steady normal stresses with s e for each |e| that depends on the unknowns."""
+    laws = [contact.steady_stress for contact in model.contacts]
+    wanted = set(unknowns)
+    found = {atom: None for law in laws for atom in sorted(law.atoms(sp.Abs), key=str) if atom.free_symbols & wanted}
+    if len(found) > MAX_BENDS:
+        raise NotAvailable(
+            f"{len(found)} contacts that are pressed by the amount of a load depend on each other; allowed: at most "
+            f"{MAX_BENDS}"
+        )
+    signs = tuple(sp.Symbol(f"sign_{i}", real=True) for i in range(len(found)))
+    inner = tuple(atom.args[0] for atom in found)
+    straight = {atom: sign * e for atom, sign, e in zip(found, signs, inner, strict=True)}
+    if not straight:
+        return laws, Bends()
+    values = ArrayFunction([*model.parameters.values(), *signs, *unknowns], inner)
+    return [law.xreplace(straight) for law in laws], Bends(signs, inner, values)
+
+
+def _carried_equation(
+    model: Model, carried: Carried, nothing: dict[sp.Symbol, sp.Expr], laws: list[sp.Expr], bends: Bends
+) -> CarriedEquation:
     sigmas, symbols = list(nothing), carried.symbols
     none = nothing | dict.fromkeys(symbols, sp.Integer(0))
-    laws = [contact.steady_stress for contact in model.contacts]
     frictions = [model.steady[contact.friction] for contact in model.contacts]
 
     def slopes(expressions: list[sp.Expr], along: Sequence[sp.Symbol]) -> Entries:
@@ -219,9 +313,9 @@ def _carried_equation(model: Model, carried: Carried, nothing: dict[sp.Symbol, s
     flat = [e for group in groups for e in group.values()]
     if any(e.free_symbols & none.keys() for e in flat):
         raise NotAvailable("friction and contacts of a machine held in many ways must be linear in the stresses")
-    parts = ArrayFunction(list(model.parameters.values()), flat)
+    parts = ArrayFunction([*model.parameters.values(), *bends.signs], flat)
     places = tuple(tuple(group) for group in groups)
-    return CarriedEquation(len(laws), parts, (), (), places, len(symbols))
+    return CarriedEquation(len(laws), parts, (), (), bends, places, len(symbols))
 
 
 def carried_forces(model: Model, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
@@ -258,7 +352,7 @@ def out_of_range(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> 
     found = np.zeros(shape, dtype=bool)
     joint = joint_equation(model)
     if joint is not None:
-        matrix, right = joint.arrays(arguments)
+        matrix, right = joint.range_arrays(arguments)
         return found | ~(np.all(np.isfinite(matrix), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1))
     for equation in (steady_equation(model, place) for place in range(len(model.contacts))):
         if equation.parts is not None:

@@ -19,7 +19,6 @@ from functools import cache
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from scipy.linalg import schur
 
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.variables import Variable
@@ -41,6 +40,8 @@ class Transport:
 @cache
 def transport(order: int) -> Transport:
     """Transport over the unit interval by orthonormal Legendre polynomials, in real Schur form."""
+    from scipy.linalg import schur  # slow to import
+
     k = np.arange(order)
     size = np.sqrt(2.0 * k + 1.0)  # values of the polynomials at the end; at the beginning they alternate
     ahead = k[None, :] >= k[:, None]

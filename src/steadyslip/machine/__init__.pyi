@@ -41,11 +41,13 @@ from .servo import (
 from .slider import (
     Slider as Slider,
 )
+from .structure_data import (
+    StructureData as StructureData,
+    reduced as reduced,
+)
 from .structures import (
     StructureBody as StructureBody,
-    StructureData as StructureData,
     StructurePoint as StructurePoint,
-    reduced as reduced,
 )
 from .surfaces import (
     Surface as Surface,

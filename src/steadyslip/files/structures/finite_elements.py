@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.files.inputs import UnreadableFile
-from steadyslip.machine.structures import MOST_FREEDOM
+from steadyslip.machine.structure_data import MOST_FREEDOM
 
 _HELD = 0.99e36  # Abaqus writes a stiffness of 1e36 at degrees of freedom that boundary conditions hold
 _MATRICES = {"M": ("mgg", "maa", "mxx", "maax", "m"), "K": ("kgg", "kaa", "kxx", "kaax", "k"),

@@ -19,7 +19,7 @@ from steadyslip.files.structures.finite_elements import (
     calculix_matrices,
     nastran_matrices,
 )
-from steadyslip.machine.structures import MOST_FREEDOM, StructureData
+from steadyslip.machine.structure_data import MOST_FREEDOM, StructureData
 
 LETTERS = ("M", "K", "C", "G")
 """Names in files of the matrices of inertia, stiffness, damping and gyroscopic forces; C and G may be missing."""

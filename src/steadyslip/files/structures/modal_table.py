@@ -12,7 +12,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.names import unfit_name
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
-from steadyslip.machine.structures import StructureData
+from steadyslip.machine.structure_data import StructureData
 
 FREQUENCY, DAMPING, MASS = "frequency", "damping", "mass"
 """Columns: Hz, damping ratio, and modal mass in kg, 1 unless given."""

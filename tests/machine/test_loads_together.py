@@ -41,6 +41,47 @@ v_stribeck = "0.04 m/s"
 [contacts.{name}.contact]
 {law}
 """
+SERVO = (
+    SHAFT.split("[links.winding]")[0]
+    + """
+[contacts.mesh]
+body = "arm"
+radius = "1 m"
+loaded_by = "gear"
+[contacts.mesh.friction]
+law = "lugre"
+mu_static = {static}
+mu_coulomb = {coulomb}
+v_stribeck = "{stribeck} m/s"
+viscous = "{viscous} s/m"
+bristle_stiffness = "{bristle} 1/m"
+bristle_damping = "{micro} s/m"
+[contacts.mesh.contact]
+law = "transmitted"
+preload = "0.5 N"
+transmitted = {forward}
+transmitted_back = {back}
+[contacts.seal]
+body = "arm"
+radius = "1 m"
+[contacts.seal.friction]
+law = "lugre"
+mu_static = {static}
+mu_coulomb = {coulomb}
+v_stribeck = "{stribeck} m/s"
+bristle_stiffness = "{bristle} 1/m"
+bristle_damping = "0 s/m"
+[contacts.seal.contact]
+law = "constant"
+preload = "{press} N"
+[drive]
+control = "rotary-pd"
+velocity = "{speed} rad/s"
+body = "motor"
+kp = "{kp} N m/rad"
+kd = "{kd} N m s/rad"
+"""
+)
 PLACES = {"mesh": ("arm", "gear"), "seal": ("arm", None), "bearing": ("motor", "winding"), "nut": ("motor", "gear")}
 
 
@@ -136,3 +177,54 @@ def test_machines_without_a_formula_of_their_statics(seed, monkeypatch):
     for name, force in normal_forces(rest, contacts).items():
         assert steady.contacts[name].normal_force == pytest.approx(force, rel=1e-10)
     np.testing.assert_allclose(np.sort_complex(ss.eigenvalues(rig)), np.sort_complex(expected), rtol=1e-8)
+
+
+def servo_at_random(seed):
+    """Numbers of a servo joint with a gear that the load presses, and a seal."""
+    chance = np.random.default_rng([seed, 33])
+    coulomb, ratio = chance.uniform(0.1, 0.3), float(chance.choice([1, 20, 100]))
+    ends = {"stribeck": (-2, 0), "bristle": (2, 4), "micro": (-1, 1), "press": (0, 2), "kp": (0, 1), "kd": (-2, 0)}
+    found = {name: 10 ** chance.uniform(*own) for name, own in ends.items()}
+    found |= {"load": chance.uniform(-40, 40), "ratio": ratio, "coulomb": coulomb, "viscous": chance.uniform(0, 0.1)}
+    found |= {"static": coulomb + chance.uniform(0.3, 1), "speed": ratio * 10 ** chance.uniform(-1, 1)}
+    return found | dict(zip(("forward", "back"), chance.uniform(0.02, 0.3, 2), strict=True))
+
+
+def rates(y, n):
+    """Equations of motion of `SERVO`, typed by hand: angles from steady motion, velocities, deflections of bristles."""
+    motor, motor_speed, arm, speed, mesh, seal = y
+    pull = 16000 * (motor / n["ratio"] - arm) + 8 * (motor_speed / n["ratio"] - speed)
+    normal = 0.5 + (n["forward"] if pull > 0 else n["back"]) * abs(pull)
+    curve = n["coulomb"] + (n["static"] - n["coulomb"]) * np.exp(-((speed / n["stribeck"]) ** 2))
+    bends = [speed - n["bristle"] * abs(speed) * z / curve for z in (mesh, seal)]
+    friction = normal * (n["bristle"] * mesh + n["micro"] * bends[0] + n["viscous"] * speed)
+    friction += n["press"] * n["bristle"] * seal
+    drive = -n["kp"] * motor + n["kd"] * (n["speed"] - motor_speed)
+    return np.array([
+        motor_speed - n["speed"], (drive - pull / n["ratio"]) / 0.6e-4,
+        speed - n["speed"] / n["ratio"], (pull - friction + n["load"]) / 1.1, *bends,
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(k, marks=pytest.mark.campaign) for k in range(4, 40))])
+def test_eigenvalues_of_equations_typed_by_hand(seed):
+    n = servo_at_random(seed)
+    rig = ss.rig_from_text(SERVO.format(**n))
+    speed = n["speed"] / n["ratio"]
+    curve = n["coulomb"] + (n["static"] - n["coulomb"]) * np.exp(-((speed / n["stribeck"]) ** 2))
+    pull, normal = 0.0, 0.5
+    for _ in range(400):
+        pull = (curve + n["viscous"] * speed) * normal + curve * n["press"] - n["load"]
+        normal = 0.5 + (n["forward"] if pull > 0 else n["back"]) * abs(pull)
+    motor = -pull / n["ratio"] / n["kp"]
+    arm = motor / n["ratio"] - pull / 16000
+    steady = np.array([motor, n["speed"], arm, speed, curve / n["bristle"], curve / n["bristle"]])
+    assert np.max(np.abs(rates(steady, n))) < 1e-6
+    steps = 1e-6 * np.maximum(np.abs(steady), 1e-9)
+    matrix = np.transpose(
+        [(rates(steady + h * e, n) - rates(steady - h * e, n)) / (2 * h) for h, e in zip(steps, np.eye(6), strict=True)]
+    )
+    expected, found = np.linalg.eigvals(matrix), ss.eigenvalues(rig)
+    assert len(found) == 6
+    for one in expected:
+        assert np.min(np.abs(found - one)) < 1e-5 * abs(one)

@@ -13,6 +13,8 @@ import pytest
 import steadyslip as ss
 from explored_edges import Edges, other_edges, written
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
+from steadyslip.motion.events import ContactSlip
+from steadyslip.motion.sentence import sentences
 from steadyslip.motion.status import remedy
 from steadyslip.verdict import machine as machine_words, slider as slider_words
 
@@ -169,6 +171,31 @@ def test_slip_events_that_have_come_to_an_end_are_told_as_in_python(until):
     told = page("plain").script("outcome(course, { ...data, area: null })", course=course)
     assert written(run.sentence.partition(" (")[0]) in written(told)
     assert ("and no more after" in told) == (until == 200)
+
+
+def test_a_drop_on_a_body_that_turns_is_a_torque_as_in_python():
+    rig = ss.read_rig("examples/machines/telescope.toml")
+    there, (name,) = Edges(rig), rig.contacts
+    last = ContactSlip(name, 2.0, 2.5, 0.5, 1e-4, 300.0, 1e-3, 2.1, 1.0, 0, np.nan)
+    event = {"contact": name, "begin": last.begin, "end": last.end, "slip": last.slip, "drop": last.force_drop,
+             "every": last.recurrence, "rings": [], "peak": last.peak_velocity, "sticks": True}  # fmt: skip
+    (at,) = there.data["levers"]
+    lever = there.home[there.names.index(f"contacts.{name}.radius")]
+    assert there.script("data.facts.parameters[at]", at=at) == f"contacts.{name}.radius"
+    course = {"events": [event], "status": "done", "end": 3.0, "at": 1.0,
+              "contacts": [{"name": name, "v": [1.0], "floor": 0.0, "lever": lever}]}  # fmt: skip
+    told = there.script("outcome(course, data)", course=course)
+    (sentence,) = sentences(rig, [Arrest(name)], [last]).values()
+    assert written(f"torque drop {300 * lever:.4g} N m; {name} {sentence}") in written(told)
+
+
+class Arrest:
+    """Moment at which a contact is arrested between two slips."""
+
+    kind, time = "arrest", 1.5
+
+    def __init__(self, contact):
+        self.contact = contact
 
 
 SOURCE = Path(ss.__file__).parent

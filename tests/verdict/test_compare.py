@@ -12,7 +12,8 @@ import pytest
 import steadyslip as ss
 from command import run
 from rigs_of_theory import rate_state, rig
-from steadyslip.verdict import between
+from steadyslip.core.tolerances import read_tolerance
+from steadyslip.verdict import Tolerances, between
 from steadyslip.verdict.compare import compare_files
 from toleranced import AXIS
 
@@ -32,6 +33,39 @@ def test_nothing_differs_from_itself():
         found = ss.compare_rigs(one, one)
         assert found.differences == ()
         assert "same equations" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("second", "words"),
+    [
+        ({}, "The rigs have the same equations and numbers"),
+        (None, "The rigs have the same equations, numbers and tolerances"),
+        ({"friction.a": "5 %", "friction.b": "2 % (normal)"}, "other tolerances of friction.b"),
+        ({"friction.a": "5 %"}, "other tolerances of friction.b"),
+        (
+            Tolerances(
+                {"friction.a": read_tolerance("5 %"), "friction.b": read_tolerance("2 %")},
+                (("friction.b", "friction.a", 0.5),),
+            ),
+            "other tolerances of friction.a with friction.b",
+        ),
+    ],
+)
+def test_rigs_that_are_alike_are_told_whether_their_tolerances_are(second, words):
+    first = {} if second == {} else {"friction.a": "5 %", "friction.b": "2 %"}
+    found = ss.compare_rigs(rig(), rig(), tolerances=(first or None, (first if second is None else second) or None))
+    assert str(found).splitlines()[-1].endswith(words)
+
+
+def test_deviations_in_a_unit_are_the_same_as_shares_and_in_totals_of_a_contact(tmp_path):
+    """12 ± 2.4 N/um is 12 N/um ± 20 %; a contact twice as large enters no equation of forces."""
+    first, second = tmp_path / "a.toml", tmp_path / "b.toml"
+    first.write_text(AXIS)
+    second.write_text(AXIS.replace('"12 ± 20 % N/um"', '"12 ± 2.4 N/um"').replace("200 cm^2", "400 cm^2"))
+    assert second.read_text() != AXIS
+    assert str(compare_files(first, second)).splitlines()[-1] == (
+        "The rigs have the same equations, numbers and tolerances"
+    )
 
 
 def test_parts_of_a_product_are_its_factors():

@@ -110,10 +110,13 @@ def test_the_command_reads_what_may_be_adjusted(axis, tmp_path):
     ("options", "words"),
     [
         ({"sure": "much"}, "sure: 'much' is not a number"),
-        ({"sure": 2.0}, "sure: got 2.0; allowed: a chance between 0 and 1"),
-        ({"sure": "95"}, "sure: got '95'; allowed: a number from 0 to 1; write '95 %'$"),
-        ({"sure": "120 %"}, "sure: got '120 %'; allowed: a number from 0 to 1, or '0 %' to '100 %'$"),
-        ({"sure": "120"}, "sure: got '120'; allowed: a number from 0 to 1, or '0 %' to '100 %'$"),
+        ({"sure": 2.0}, r"sure: got 2.0; allowed: a number above 0, up to 1 \(100 %\), or text such as '95 %'$"),
+        ({"sure": 0}, r"sure: got 0; allowed: a number above 0, up to 1 \(100 %\), or text such as '95 %'$"),
+        ({"sure": "0 %"}, r"sure: got '0 %'; allowed: a number above 0, up to 1 \(100 %\)$"),
+        ({"sure": "95"}, r"sure: got '95'; allowed: a number above 0, up to 1 \(100 %\); write '95 %'$"),
+        ({"sure": "100"}, r"sure: got '100'; allowed: a number above 0, up to 1 \(100 %\); write '100 %'$"),
+        ({"sure": "120 %"}, r"sure: got '120 %'; allowed: a number above 0, up to 1 \(100 %\)$"),
+        ({"sure": "120"}, r"sure: got '120'; allowed: a number above 0, up to 1 \(100 %\)$"),
         ({"adjust": {"stifness": Adjustment()}}, "did you mean 'slider.stiffness'"),
     ],
 )

@@ -136,3 +136,46 @@ def test_an_unstable_rig_that_nothing_disturbs_is_disturbed_on_the_command_line(
         done = cli("simulate", tmp_path / "rig.toml", "--until", "4 s", "--set", f"drive.velocity={speed}")
         assert done.returncode == 0
         assert ("judders" in done.stdout) is ("nothing disturbs this unstable rig" in done.stderr) is judders
+
+
+JOINT = """
+[bodies.joint]
+motion = "rotation"
+inertia = "0.1 kg m^2"
+[links.shaft]
+kind = "shaft"
+between = ["drive", "joint"]
+stiffness = "10 kN m/rad"
+[contacts.bearing]
+body = "joint"
+radius = "{radius} m"
+[contacts.bearing.friction]
+law = "lugre"
+mu_coulomb = 0.1
+mu_static = 0.17
+v_stribeck = "{speed} m/s"
+viscous = 0
+bristle_stiffness = "{bristles} 1/m"
+[contacts.bearing.contact]
+law = "constant"
+preload = "{preload} N"
+[drive]
+control = "rotary-steady"
+velocity = "1 rpm"
+"""
+
+
+@pytest.mark.parametrize("radius", [1.0, 0.05])
+def test_the_drop_of_a_body_that_turns_is_a_torque_at_whatever_radius(radius):
+    """One joint, its bearing written at two radii; the torque is that of the shaft."""
+    text = JOINT.format(radius=radius, speed=0.73 * radius, bristles=2300 / radius, preload=33.6 / radius)
+    rig = ss.rig_from_text(text)
+    push = [ss.protocol.VelocityStep(at=at, to=to) for at, to in ((0.1, "1.1 rpm"), (0.2, "1 rpm"))]
+    run = ss.simulate(rig, push, until=3.0)
+    (drop,) = told(r"bearing .* a drop of ([\d.]+) N m in the torque of shaft on joint.*", run.sentence)
+    last = run.slip_events[-1]
+    begin, end = np.interp([last.begin, last.end], run["t"], run["links.shaft.force"])  # a torque
+    assert drop == pytest.approx(abs(begin - end), rel=0.02)  # between samples
+    assert drop == pytest.approx(last.force_drop * radius, rel=5e-3)
+    assert f"torque drop {last.force_drop * radius:.4g} N m" in run.summary()
+    assert "arrests" not in run.summary()  # hundreds where it rings

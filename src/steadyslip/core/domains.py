@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,10 +38,12 @@ positive = Domain(0, _INF, False, True, "a finite number > 0")
 moving = Domain(
     0, _INF, False, True, "a finite number > 0, or 0 to hold a place with control = 'pid' (steadyslip hunt)"
 )
+turning = replace(moving, text=moving.text.replace("'pid'", "'rotary-pid'"))
 speed = Domain(0, _INF, False, True, "a finite number > 0, or 0 to hold a place", apart=0.0)
 nonnegative = Domain(0, _INF, True, True, "a finite number >= 0")
 real = Domain(-_INF, _INF, True, True, "a finite number")
 share = Domain(0, 1, True, True, "a number from 0 to 1")
+chance = Domain(0, 1, False, True, "a number above 0, up to 1 (100 %)")
 below_one = Domain(0, 1, True, False, "a number from 0 to below 1")
 tolerance = Domain(1e-14, 0.1, True, True, "a number from 1e-14 to 0.1")  # from some roundings of a float on
 steps = Domain(1, 1e12, True, True, "a whole number from 1 to 1e12", whole=True)  # upper bound chosen by trial

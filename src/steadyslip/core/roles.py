@@ -196,8 +196,9 @@ class Parameter(Entry):
                 raise self.refused(value) from error
         if not self.domain.contains(number) and number != self.domain.apart:
             if (self.domain.low, self.domain.high) == (0, 1) and number > 1:
-                bare = number <= 100 and "%" not in str(value)
-                meant = f"; write '{number:g} %'" if bare else ", or '0 %' to '100 %'"
+                bare = self.domain.contains(number / 100) and "%" not in str(value)
+                percent = ", or '0 %' to '100 %'" if self.domain.low_allowed and self.domain.high_allowed else ""
+                meant = f"; write '{number:g} %'" if bare else percent
                 raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}{meant}")
             if self.optional and number == 0:
                 raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}; for none leave it out")

@@ -48,7 +48,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.steady_results import ABSENT
-from steadyslip.motion.sentence import JUDDERS, OVER
+from steadyslip.motion.sentence import JUDDERS, OVER, pull_words
 from steadyslip.motion.status import causes
 from steadyslip.verdict import machine as machine_words, slider as slider_words
 from steadyslip.verdict.numbers import linear_numbers
@@ -263,13 +263,17 @@ def _stiffness(rig: Slider, names: list[str]) -> str | None:
 
 
 def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Page data of machines only: indices of the areas of contacts, phrases, names of what pulls at contacts."""
+    """Page data of machines only: indices of areas and radii of contacts, what pulls at these, phrases."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
         "phrases": {name: words for name, words in machine_words.PHRASES.items() if name not in BEYOND},
         "means": machine_words.MEANS,
-        "pulls": {name: " and ".join(rig.pulls_at(name)) for name in rig.contacts},
+        "pulls": {name: pull_words(rig, name) for name in rig.contacts},
+        "levers": [
+            facts["parameters"].index(f"contacts.{name}.radius") if rig.lever_at(name) is not None else -1
+            for name in rig.contacts
+        ],
     }
 
 

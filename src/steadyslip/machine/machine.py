@@ -370,6 +370,12 @@ class Machine(Rig):
         names = [one.name for one in mechanism.pulling(port) if sliding & set(one.acts)]
         return tuple(dict.fromkeys(name.removeprefix("links.") or "the controller" for name in names))
 
+    def lever_at(self, contact: str) -> float | None:
+        surface = self.contacts[contact]
+        pulled = surface.loaded_by is None or surface.body in self.links[surface.loaded_by].between
+        radius: float | None = surface.radius
+        return radius if pulled and surface.body in self.bodies else None
+
     def area_of(self, name: str) -> float | None:
         kind, _, rest = name.partition(".")
         if kind != "contacts":

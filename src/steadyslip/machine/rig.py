@@ -144,6 +144,10 @@ class Rig(FrozenRecord, Keeper):
         """Names of the links, and ``the controller``, whose forces are the pull at a contact; none for a slider."""
         return ()
 
+    def lever_at(self, contact: str) -> float | None:
+        """Radius (m) by which the pull at a contact is a torque on a body that turns; None where that body slides."""
+        return None
+
     @property
     def holds(self) -> bool:
         """True if a controller holds a place: the velocity of the drive is 0, and there is no steady sliding."""

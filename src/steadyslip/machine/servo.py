@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from steadyslip.core.domains import moving, nonnegative, positive, speed
+from steadyslip.core.domains import moving, nonnegative, positive, speed, turning
 from steadyslip.core.entries import Text
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, parameter, setting
@@ -61,7 +61,7 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
     """A shaft end that turns at constant speed; links tie bodies to it as ``drive``."""
 
     turns: ClassVar[bool] = True
-    velocity: float = parameter("rad/s", moving, "speed of the load point in steady sliding", letter="v_0")
+    velocity: float = parameter("rad/s", turning, "speed of the load point in steady sliding", letter="v_0")
 
 
 class _Controller(Holding, MachineDrive):

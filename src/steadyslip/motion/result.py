@@ -20,7 +20,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
 from steadyslip.motion.events import AnySlip, ContactSlip, Event, SlipEvent, slip_events
 from steadyslip.motion.history import HistoryData
-from steadyslip.motion.sentence import joined, oscillations, sentences
+from steadyslip.motion.sentence import drop_of, joined, oscillations, sentences
 from steadyslip.motion.status import remedy
 
 NUDGED, FASTER = 0.1, 1.1  # when (share of a run) and by what factor a step of the drive's velocity is suggested
@@ -81,7 +81,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             lines.append(f"left out        {', '.join(late)}: the run is to end at {format_quantity(until, 's')}")
         lines += self._caveats()
         arrests = sum(event.kind == "arrest" for event in self.events)
-        if arrests:
+        if arrests and not self.slip_events:  # between slips a contact that rings is arrested many times
             lines.append(f"arrests         {arrests}")
         lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
         if other := of_another(self.version):
@@ -143,7 +143,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
                 lines.append(f"{'':<15} {self._sentences[name]}")
             slips = [one for one in self.slip_events if isinstance(one, ContactSlip) and one.contact == name]
             if slips:
-                last = slips[-1]
+                last, lever = slips[-1], self.rig.lever_at(name)
                 again = (
                     f", {format_quantity(last.recurrence, 's')} after the one before"
                     if np.isfinite(last.recurrence)
@@ -151,8 +151,8 @@ class History(HistoryData):  # noqa: D101 -- its base has it
                 )
                 lines.append(
                     f"{'':<15} {len(slips)} slip events; the last: peak "
-                    f"{format_quantity(last.peak_velocity, 'm/s')}, force drop "
-                    f"{format_quantity(last.force_drop, 'N')}, slip {format_quantity(last.slip, 'm')}, lasting "
+                    f"{format_quantity(last.peak_velocity, 'm/s')}, {'force' if lever is None else 'torque'} drop "
+                    f"{format_quantity(*drop_of(last, lever))}, slip {format_quantity(last.slip, 'm')}, lasting "
                     f"{format_quantity(last.duration, 's')}{again}"
                 )
         return lines

@@ -19,7 +19,7 @@ JUDDERS = {
     "alone": "slips {slip} within {within}, a drop of {drop}",
     "sticks": "sticks",
     "lags": "lags",
-    "pull": "{drop} in the pull of {links}",
+    "of": "{drop} in {pull}",
     "rings": "; rings {rings} times at {often}",
     "backward": "; backward strokes {backward}, the last {back} within {during}",
 }
@@ -43,9 +43,25 @@ OVER = 2.0  # recurrences without another event after which events have come to 
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
+def pull_words(rig: Slider | Machine, contact: str) -> str:
+    """What pulls at a contact, as "the pull of belt" or "the torque of worm on mount"; empty for a slider."""
+    links = " and ".join(rig.pulls_at(contact))
+    turns = rig.lever_at(contact) is not None
+    return (
+        f"the torque of {links} on {rig.contacts[contact].body}"
+        if links and turns
+        else links and f"the pull of {links}"
+    )
+
+
+def drop_of(slip: ContactSlip, lever: float | None) -> tuple[float, str]:
+    """Fall of what pulls at a contact and its unit: a torque where the body turns, at a radius of `lever` (m)."""
+    return (slip.force_drop, "N") if lever is None else (slip.force_drop * lever, "N m")
+
+
 def sentence(
-    events: Sequence[AnyEvent], slips: Sequence[AnySlip], area: float | None = None, pulls: Sequence[str] = (),
-    since: float = math.inf, end: float = math.nan,
+    events: Sequence[AnyEvent], slips: Sequence[AnySlip], area: float | None = None, pull: str = "",
+    since: float = math.inf, end: float = math.nan, lever: float | None = None,
 ) -> str:  # fmt: skip
     """Sentence on the slip events of a block or contact; empty if there are none.
 
@@ -60,12 +76,14 @@ def sentence(
         Of one block or contact.
     area : float, optional
         Of a slider's contact, m², if forces are told.
-    pulls : sequence of str
-        Names of what pulls at a machine's contact, which sheds the force (`Rig.pulls_at`).
+    pull : str
+        What pulls at a machine's contact and sheds the force (`pull_words`).
     since : float
         Time from which forward events are told by their ranges, s; the last alone by default.
     end : float
         Of the run, s; events may go on by default.
+    lever : float, optional
+        `Rig.lever_at` of a machine's contact, m.
     """
     if not slips:
         return ""
@@ -73,8 +91,9 @@ def sentence(
     last = next((one for one in reversed(slips) if one.slip > 0), back[-1] if back else slips[-1])
     told = [one for one in slips if one.slip > 0 and one.begin > since] or [last]
     if isinstance(last, ContactSlip):
-        drop = _told([one.force_drop for one in told if isinstance(one, ContactSlip)], "N")
-        drop = JUDDERS["pull"].format(drop=drop, links=" and ".join(pulls)) if pulls else drop
+        drops = [drop_of(one, lever) for one in told if isinstance(one, ContactSlip)]
+        drop = _told([value for value, _ in drops], drops[0][1])
+        drop = JUDDERS["of"].format(drop=drop, pull=pull) if pull else drop
     else:
         drop = _told([one.stress_drop for one in told if not isinstance(one, ContactSlip)], "Pa", area)
     holes = {
@@ -107,7 +126,7 @@ def sentences(
     found = {}
     for name in dict.fromkeys(one.contact for one in slips):
         own = [one for one in events if one.contact == name], [one for one in slips if one.contact == name]
-        found[name] = sentence(*own, rig.area, rig.pulls_at(name), since, end)
+        found[name] = sentence(*own, rig.area, pull_words(rig, name), since, end, rig.lever_at(name))
     return found
 
 

@@ -28,6 +28,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
 from steadyslip.motion.events import ContactSlip
+from steadyslip.motion.sentence import drop_of
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.cycle_commands import Thresholds
 from steadyslip.nonlinear.hunting.hunt import hunt
@@ -296,11 +297,12 @@ def _slip_table(result: History) -> Iterator[str]:
     rows = [
         (one.contact if isinstance(one, ContactSlip) else i, format_quantity(one.begin, "s"),
          format_quantity(one.duration, "s"), format_quantity(one.slip, "m"), format_quantity(one.peak_velocity, "m/s"),
-         format_quantity(one.force_drop, "N") if isinstance(one, ContactSlip)
+         format_quantity(*drop_of(one, result.rig.lever_at(one.contact))) if isinstance(one, ContactSlip)
          else format_quantity(one.stress_drop, "Pa", area=area))
         for i, one in enumerate(slips, start=1)
     ]  # fmt: skip
-    drop = "force drop" if isinstance(slips[0], ContactSlip) else "stress drop"
+    turning = {result.rig.lever_at(name) is not None for name in result.rig.contacts}
+    drop = ("torque drop" if min(turning) else "drop" if max(turning) else "force drop") if turning else "stress drop"
     if len(rows) > MAX_ROWS:
         yield paragraph(f"The last {MAX_ROWS} of {len(rows)}.", "small")
     yield table(

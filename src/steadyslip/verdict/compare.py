@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_growth, format_percent, format_quantity
+from steadyslip.core.format import enumerated, format_growth, format_percent, format_quantity
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -26,7 +26,7 @@ from steadyslip.verdict.between import Between, Place, comparable, ones_and_othe
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.findings import Findings
 from steadyslip.verdict.support import support_stiffness
-from steadyslip.verdict.tolerances import Tolerated, format_chance, tolerate
+from steadyslip.verdict.tolerances import Tolerated, differing_tolerances, format_chance, tolerate
 from steadyslip.verdict.words import edge_rows, headline, told
 
 PAIR = Tested("two of them, for the first and the second rig", lambda v: isinstance(v, (tuple, list)) and len(v) == 2)
@@ -106,8 +106,7 @@ class RigComparison(Displayed):
 
     def _differences(self) -> Iterator[str]:
         if not self.differences:
-            same = "The rigs have the same equations and numbers"
-            yield f"{same}; their tolerances may differ" if any(self.within) else same
+            yield self._alike()
             return
         wide = 2 + max(len(one.parameter) for one in self.differences)
         values = [f"{one.first} -> {one.second}" for one in self.differences]
@@ -125,6 +124,15 @@ class RigComparison(Displayed):
                 else [text.rstrip()]
             )
         yield from self.decisive()
+
+    def _alike(self) -> str:
+        """Sentence on rigs with the same equations and numbers."""
+        first, second = self.within
+        if first is None and second is None:
+            return "The rigs have the same equations and numbers"
+        if apart := differing_tolerances(first, second):
+            return f"The rigs have the same equations and numbers, but other tolerances of {enumerated(apart)}"
+        return "The rigs have the same equations, numbers and tolerances"
 
     @property
     def of(self) -> str:

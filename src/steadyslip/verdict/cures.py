@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core import domains
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_percent
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.roles import Parameter
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances
 from steadyslip.linear.boundary import REMOTE, boundary, searched
 from steadyslip.linear.nearness import doublings, ends_about
@@ -47,7 +49,7 @@ OWN_VALUES = (
     'its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"'
 )
 SURE = Tested(
-    "a chance between 0 and 1, or text such as '95 %'",
+    f"{domains.chance.text}, or text such as '95 %'",
     lambda v: isinstance(v, str) or (isinstance(v, (int, float)) and not isinstance(v, bool) and 0 < v <= 1),
 )
 
@@ -219,16 +221,10 @@ def cure(
 
 
 def _share(sure: float | str) -> float:
-    from steadyslip.core.domains import share
-    from steadyslip.core.roles import Parameter
-
     try:
-        found = Parameter("1", share, "chance").checked(sure)
+        return Parameter("1", domains.chance, "chance").checked(sure)
     except ParameterError as error:
         raise ParameterError([one.under("sure") for one in error.problems]) from error
-    if not found > 0:
-        raise ParameterError([Problem("sure", "got 0; allowed: a chance above 0, such as '95 %'")])
-    return found
 
 
 def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:

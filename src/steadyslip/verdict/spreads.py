@@ -135,6 +135,21 @@ class Spreads:
             high[0], high[1] = 0.0, 1.0
         return {name: high[:, bounded.index(name)] if name in bounded else np.full(len(high), 0.5) for name in self.of}
 
+    def shapes(self) -> dict[str, tuple[float, ...]]:
+        """Ends over the value and whether they are of a normal distribution, by parameter; correlations, by pair.
+
+        They are the same for totals of a contact and for stresses; of a value that is zero the ends are as they are.
+        """
+        found: dict[str, tuple[float, ...]] = {
+            name: (one.low / (one.value or 1.0), one.high / (one.value or 1.0), float(one.normal))
+            for name, one in self.of.items()
+        }
+        together = self.mixing @ self.mixing.T
+        for (i, first), (j, second) in itertools.combinations(enumerate(self.of), 2):
+            if together[i, j]:
+                found[" with ".join(sorted((first, second)))] = (float(together[i, j]),)
+        return found
+
     def possible(self, varied: Mapping[str, Array]) -> Any:
         """Mask of the rigs whose numbers do not contradict each other (bool or array of bool)."""
         return valid_together(self.rig, "", varied)

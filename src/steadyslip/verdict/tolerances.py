@@ -34,6 +34,7 @@ VALUES_SOUGHT = 17  # of each parameter in turn, in the search for a rig judged 
 REACHES = (1.0, 0.1, 0.01, 0.001)  # shares of the range looked at in rounds of that search
 BINS = 32  # of equally many rigs each, between which the verdict's variance is counted as a parameter's own
 LEAST = 0.01  # share of the variance below which a parameter is not worth naming
+ALIKE = 1e-12  # difference of deviations, as shares of the value, that roundings of a conversion of units explain
 STUDENT = 2.131  # quantile for 95 % of Student's distribution with GROUPS - 1 degrees of freedom
 GIVEN = Tested(
     "names and their tolerances, or what read_tolerances gives", lambda v: isinstance(v, (Mapping, Tolerances))
@@ -273,6 +274,16 @@ def chance_of(stable: Array, possible: Array) -> tuple[float, float]:
     table[possible] = stable
     spread = float(np.std(np.nanmean(table, axis=1), ddof=1))
     return float(np.mean(stable)), STUDENT * spread / GROUPS**0.5 if spread else 3.0 / len(stable)
+
+
+def differing_tolerances(first: Tolerated | None, second: Tolerated | None) -> list[str]:
+    """Parameters whose tolerances, and pairs whose correlations, are not those of the other, tolerances as shares."""
+    one, other = ({} if it is None else spreads_of(it.rig, it.tolerances).shapes() for it in (first, second))
+    none = (np.nan,)
+    return [
+        name for name in {**one, **other}
+        if not np.allclose(one.get(name, none), other.get(name, none), rtol=ALIKE, atol=ALIKE)
+    ]  # fmt: skip
 
 
 def format_chance(share: float, error: float) -> str:

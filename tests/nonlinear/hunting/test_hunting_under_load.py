@@ -112,3 +112,29 @@ def test_an_axis_that_nothing_presses_at_first_moves(law, sampled):
     found = ss.hunt(free, VelocityStep(at=0, to=0.1), until=60.0)
     assert np.abs(found.error).max() > 0.01
     assert abs(found.error[-1]) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("inclined-spring.toml", "drive.velocity: got .*: write velocity = 0, and control = 'pid' with gains$"),
+        ("machines/feed-axis.toml", "drive.velocity: got .*: write velocity = 0$"),  # has a controller
+        ("machines/geared-servo.toml", "drive.velocity: got .*: write velocity = 0$"),
+    ],
+)
+def test_an_axis_that_slides_is_told_the_controller_of_its_motion(name, words):
+    with pytest.raises(ss.ParameterError, match=words):
+        ss.hunt(ss.read_rig(EXAMPLES / name))
+
+
+def test_a_shaft_at_constant_speed_is_told_the_rotary_controller():
+    with pytest.raises(ss.ParameterError, match="0 to hold a place with control = 'rotary-pid'"):
+        ss.machine.RotaryPull(velocity=0.0)
+    m = ss.machine
+    surface = m.Surface(body="arm", radius=1.0, friction=ss.laws.Coulomb(mu_coulomb=0.5),
+                        contact=ss.laws.ConstantNormalStress(preload=1.0))  # fmt: skip
+    arm = ss.Machine(bodies={"arm": m.RotatingBody(inertia=1.0)}, contacts={"seal": surface},
+                     links={"shaft": m.Shaft(between=("drive", "arm"), stiffness=1e4)},
+                     drive=m.RotaryPull(velocity=1.0))  # fmt: skip
+    with pytest.raises(ss.ParameterError, match="and control = 'rotary-pid' with gains"):
+        ss.hunt(arm)

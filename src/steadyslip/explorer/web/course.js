@@ -6,7 +6,7 @@ import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
 import { shown, unitIn } from "./quantities.js";
 import { MachineSketch, Sketch } from "./sketch.js";
-import { outcome, quantity, slow } from "./words.js";
+import { outcome, shed, slow } from "./words.js";
 
 /** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; indices of those of the phase plane */
 
@@ -85,7 +85,8 @@ export class Course {
     this.events = make("tbody", {});
     const mark = (className, words) => make("span", {}, svg("svg", { class: "chart", viewBox: "0 0 14 14", "aria-hidden": "true" }, svg("circle", { class: className, cx: 7, cy: 7, r: 4 })), words);
     const key = make("p", { className: "key" }, mark("begin", "where it begins"), mark("at", "at the time chosen"));
-    const { area, phrases } = this.page.rig.data, drop = phrases || area !== null ? "drop of force" : "stress drop";
+    const { area, phrases, levers } = this.page.rig.data, torques = levers?.filter((at) => at >= 0).length ?? 0;
+    const drop = torques ? (torques < levers.length ? "drop" : "drop of torque") : phrases || area !== null ? "drop of force" : "stress drop";
     const heads = [...(phrases ? ["contact"] : []), "begins", "lasts", "peak velocity", drop, "since the last"];
     this.list = make("details", { className: "events" }, make("summary", { textContent: "Slip events" }),
       make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "slip events" }, make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", { textContent: text, scope: "col" })))), this.events)));
@@ -160,7 +161,7 @@ export class Course {
       const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(wanted.until, "s", 3)} so far; curves are those of before.`);
       const found = await this.mover.run(this.model, this.page.answer.sigmas, wanted, told);
       clearTimeout(this.late);
-      this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own }));
+      this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own, lever: this.model[this.page.rig.data.levers?.[n] ?? -1] ?? null }));
       this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
       const { at, until } = this.course;
       this.course.since = until - at > BRIEF * at ? Math.max(0, at - LEAD * (until - at)) : 0; // the curves begin just before the disturbance
@@ -250,7 +251,7 @@ export class Course {
     this.list.firstChild.textContent = `${events.length} slip event${events.length === 1 ? "" : "s"}${from ? `, the last ${LISTED} of them` : ""}`;
     this.events.replaceChildren(...events.slice(from).map((one) => {
       const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show((one.begin - this.course.since) / (this.course.until - this.course.since)));
-      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? shown(one.drop, "N") : quantity(one.drop, "Pa", area), one.every !== null ? shown(one.every, "s", 3) : ""];
+      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), shed(one.drop, this.course.contacts.find(({ name }) => name === one.contact), { area, phrases }), one.every !== null ? shown(one.every, "s", 3) : ""];
       return make("tr", {}, ...cells.map((cell) => make("td", {}, cell)));
     }));
   }

@@ -116,6 +116,12 @@ const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math
 /** Text of a velocity; "0 (stuck)" below the floor. @param {number} v @param {number} floor */
 export const slow = (v, floor) => (Math.abs(v) < floor ? "0 (stuck)" : shown(v, "m/s", 3));
 
+/** Text of what a slip event sheds: a stress or force, of a contact at a radius (`lever`) a torque. @param {number} value @param {any} contact @param {any} data */
+export function shed(value, contact, { area, phrases }, many = 4) {
+  if (!phrases) return quantity(value, "Pa", area, many);
+  return contact?.lever ? shown(value * contact.lever, "N m", many) : shown(value, "N", many);
+}
+
 /** Sentence on the result of a motion. @param {any} course @param {any} data */
 export function outcome({ events, status, end, contacts, at }, { area, phrases, judders, ends, pulls }) {
   const cause = `${ends[status] ?? status}${status === "too many steps" ? "; ask for a shorter time, or steadyslip simulate, which takes more" : ""}`;
@@ -133,8 +139,9 @@ export function outcome({ events, status, end, contacts, at }, { area, phrases, 
   const every = last.every !== null ? before : "";
   const counts = contacts.map(({ name }) => [events.filter((one) => one.contact === name).length, name]).filter(([many]) => many);
   const where = phrases ? ` (${counts.map(([many, name]) => (counts.length > 1 ? `${many} of ${name}` : name)).join(", ")})` : "";
-  const drop = `${phrases || area !== null ? "force" : "stress"} drop ${phrases ? shown(last.drop, "N") : quantity(last.drop, "Pa", area)}`;
-  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => (phrases ? fill(judders.pull, { drop: shown(value, "N", 3), links: pulls[name] }) : quantity(value, "Pa", area, 3)), end)).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
+  const of = (name) => contacts.find((one) => one.name === name), dropped = (value, name, many) => shed(value, of(name), { area, phrases }, many);
+  const drop = `${phrases && of(last.contact)?.lever ? "torque" : phrases || area !== null ? "force" : "stress"} drop ${dropped(last.drop, last.contact)}`;
+  const told = counts.map(([, name]) => sentence(events.filter((one) => one.contact === name), judders, (value) => fill(pulls?.[name] ? judders.of : "{drop}", { drop: dropped(value, name, 3), pull: pulls?.[name] }), end)).map((text, i) => `${phrases ? counts[i][1] : "it"} ${text}`);
   return `${events.length} slip event${events.length > 1 ? "s" : ""}${where}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, ${drop}; ${told.join("; ")}.${ended}`;
 }
 

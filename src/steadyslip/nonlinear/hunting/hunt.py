@@ -12,6 +12,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import DURATION, checked
 from steadyslip.core.version import version
+from steadyslip.machine.holding import Holding
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -88,9 +89,9 @@ def hunt(
     """
     if not rig.holds:
         now = format_quantity(*rig.told("drive.velocity", float(rig.drive.velocity)))
-        message = (
-            f"got {now}; hunting is of a drive that holds a place: write velocity = 0, and control = 'pid' with gains"
-        )
+        control = "rotary-pid" if rig.drive.turns else "pid"
+        gains = "" if isinstance(rig.drive, Holding) else f", and control = '{control}' with gains"
+        message = f"got {now}; hunting is of a drive that holds a place: write velocity = 0{gains}"
         raise ParameterError([Problem("drive.velocity", message)])
     given = _target(in_units_of(rig, Protocol.of(protocol)))
     plant = plant_of(rig)

@@ -22,6 +22,7 @@ from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 
+SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a less all b, or its negative
 
 
@@ -65,6 +66,12 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         """Root mean square of the residuals, in friction."""
         return float(np.sqrt(np.mean(self.residuals**2)))
 
+    @property
+    def nearly(self) -> float:
+        """Ratio of sums of squares below which two minima fit nearly as well."""
+        worth = self.samples / float(np.mean([max(noise.inflation, 1.0) for noise in self.noise]))
+        return 1 + SIGNIFICANT_GAIN / worth
+
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
         """What follows from them, with errors: ``a - b``, critical stiffness ``k_c`` (Pa/m), ``k/k_c``, ``k/k_cal``."""
@@ -89,7 +96,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     @cached_property
     def as_ramps(self) -> tuple[RampFit, ...]:
         """Fits with ramps in place of velocity steps that the displacement does not distinguish from ramps."""
-        return with_ramps(self.plan, self.values, self._ends)
+        return with_ramps(self.plan, self.values, self._ends, self.ssq * self.nearly)
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:

@@ -12,7 +12,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.effort import Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
-from steadyslip.experiments.numerics.least_squares import Minima, minimise
+from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, Minima, minimise
 
 RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
 
@@ -69,7 +69,8 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
     samples = sum(len(record) for record in plan.records)
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.comparison(Effort(budget=budget))
-    return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, **options)
+    near = DAMPING_NEAR
+    return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, damping=near, **options)
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:
@@ -78,12 +79,13 @@ def may_be_ramp(channel: str, change: Change) -> bool:
 
 
 def with_ramps(
-    plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+    plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], wanted: float
 ) -> tuple[RampFit, ...]:
     """Minima with ramps in place of steps that may be ramps, the shortest first; empty if there are none.
 
-    Parameters are those of `driven_as_measured`. Several durations are tried, as shares of the longest possible ones;
-    the middle of a ramp stays within the window of the step.
+    Parameters are those of `driven_as_measured`, and the sum of squares `wanted`: searches that will not get there end
+    early. Several durations are tried, as shares of the longest possible ones; the middle of a ramp stays within the
+    window of the step.
     """
     if not plan.follows or not any(may_be_ramp(c, change) for one in plan.loading for c, _, change in one.changes):
         return ()
@@ -102,7 +104,8 @@ def with_ramps(
     held[:, lengths] = True
     z = space.coordinates(begin)
     lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
-    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8)  # less ends along flat valleys
+    # with a larger tolerance searches end along flat valleys
+    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8, known=wanted)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
     return tuple(
         RampFit(share, float(ssq), dict(zip(names, map(float, row), strict=True)))

@@ -33,7 +33,6 @@ from steadyslip.model.sliding import steady_state
 
 MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
 END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
-SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
@@ -298,9 +297,8 @@ def _drained_at_once(fit: FitNumbers) -> list[str]:
 
 def _alike(fit: FitNumbers, tried: tuple[RampFit, ...]) -> list[RampFit]:
     """Those that fit nearly as well as the best."""
-    worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
     least = min(one.ssq for one in tried)
-    return [one for one in tried if one.ssq < least * (1 + SIGNIFICANT_GAIN / worth)]
+    return [one for one in tried if one.ssq < least * fit.nearly]
 
 
 def _lengths(fit: FitNumbers, ramped: RampFit) -> str:

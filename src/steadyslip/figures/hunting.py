@@ -31,7 +31,10 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
     """
     panels = given_panels(new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0] if ax is None else ax, (2,), "two Axes")
     across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)
-    series = (("target less place", result.error, result.unit), ("force of the drive", result.force, result.force_unit))
+    series = (
+        (f"target less place{result.at_body}", result.error, result.unit),
+        ("force of the drive", result.force, result.force_unit),
+    )
     for axes, (name, values, si) in zip(panels, series, strict=True):
         area = result.rig.area if si == "Pa" else None
         factor, unit = display_unit(si, float(np.max(np.abs(values), initial=0.0)) or 1.0, area)

@@ -100,6 +100,11 @@ class Machine(Rig):
         pace = 1.0 if self.holds else float(self.drive.velocity)
         return float(self._speeds()[0][self.fed]) / pace, bool(self._turns(self.fed))
 
+    def ratios(self) -> dict[str, float]:
+        """Steady motion of every body for one of the drive."""
+        speeds, pace = self._speeds()[0], 1.0 if self.holds else float(self.drive.velocity)
+        return {name: float(speeds[name]) / pace for name in self.bodies if name in speeds}
+
     def seen(self) -> tuple[float, bool]:
         driven = self.drive.driven()
         if driven is None:

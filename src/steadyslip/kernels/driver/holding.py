@@ -114,14 +114,14 @@ def least_of(row: Array, way: int) -> float:
 
 
 def keep_values(values: Array, clock: Array, rows: Array, length: float) -> None:
-    """Keep values of error, speed and force at the nodes of a step that begins now, and the extremes of the stroke."""
+    """Keep values (error, speed, force, others) at the nodes of a step that begins now, and extremes of the stroke."""
     now, row = clock[Held.TIME], int(clock[Held.ROWS])
     clock[Held.STEPS] += 1.0
     if clock[Held.RESTS] == 0.0 or now - clock[Held.LAST_ROW] >= RESTED * (now - clock[Held.SINCE]):
         clock[Held.LAST_ROW] = now
         for i in range(0, NODES, int(clock[Held.EVERY])):
             rows[row, 0] = now + length * i / (NODES - 1.0)
-            for k in range(3):
+            for k in range(values.shape[0]):
                 rows[row, 1 + k] = values[k, i]
             row += 1
         clock[Held.ROWS] = row
@@ -181,7 +181,7 @@ def pass_span(
         for g in range(guards):
             if may_fail(out, size + degrees * g, degrees):
                 return Turn.STEP
-        for k in range(3):
+        for k in range(values.shape[0]):
             for i in range(NODES):
                 values[k, i] = out[size + degrees * guards + NODES * k + i]
         keep_values(values, clock, rows, length)
@@ -215,7 +215,7 @@ def step_span(
             if may_fail(out, 0, orders):
                 clock[Held.LENGTH] = wished
                 return Turn.STEP
-        for k in range(3):
+        for k in range(watched.shape[0]):
             for m in range(orders):
                 total = 0.0
                 for i in range(size):
@@ -265,8 +265,8 @@ def follow_held(
         np.zeros((size, size)), np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size),
         np.zeros(count + outputs + count * outputs), np.zeros((tableau.shape[1], size)),
     )  # fmt: skip
-    found, values, out = np.zeros((5, size)), np.zeros((3, NODES)), np.zeros(passages.shape[1] + 5)
-    degrees = (passages.shape[1] - size - 3 * NODES) // number if number > 0 else 0
+    found, values, out = np.zeros((5, size)), np.zeros((watched.shape[0], NODES)), np.zeros(passages.shape[1] + 5)
+    degrees = (passages.shape[1] - size - watched.shape[0] * NODES) // number if number > 0 else 0
     while clock[Held.TIME] < clock[Held.END] and clock[Held.STEPS] < clock[Held.MOST_STEPS]:
         clock[Held.STOP] = clock[Held.END]
         if control[Control.PERIOD] > 0.0:

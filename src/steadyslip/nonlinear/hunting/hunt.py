@@ -17,6 +17,7 @@ from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
+from steadyslip.nonlinear.hunting.other_bodies import rows_of, swings_of
 from steadyslip.nonlinear.hunting.plant import Plant, plant_of
 from steadyslip.nonlinear.hunting.stick_and_slip import Motion, Stroke, friction_at_rest, swings
 from steadyslip.protocol import Protocol
@@ -101,7 +102,7 @@ def hunt(
         step = DisplacementStep(at=0.0, by=_usual_step(plant, "deg" if rig.drive.turns else "mm"))
         given = Protocol(pieces=(step,), until=given.until)
     end = until if until is not None else given.until
-    motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol)
+    motion = Motion(plant, pack(given, 0.0, LONGEST if end is None else end), rtol, rows_of(rig, plant))
     last_change = max((float(t) for t in motion.segments.start[0]), default=0.0)
     close = EXACT if motion.exact else 100 * rtol
     at_rest, used_up, judged = False, False, 0
@@ -188,6 +189,7 @@ def _result(
     own = swings(one for one in strokes if one.start >= since)
     count = 0 if at_rest or motion.runs_away else cycle_length(own, close)
     period = own[-1].start - own[-1 - count].start if count else np.nan
+    scatter, begin, after = 0.0, 0.0, np.inf
     hunts: bool | None = False if at_rest else True if count or motion.runs_away else _trend(own)
     rested = max([since, *(one.end for one in strokes if np.isfinite(one.end))])
     creeps = any(motion.mode.contacts) or bool(motion.plant.memory)
@@ -197,12 +199,15 @@ def _result(
     elif motion.runs_away:
         seen = motion.farthest * np.array([-1.0, 1.0])
     elif own:
-        recent = own[-max(2, count) :] if count or hunts is False else own[-max(2, len(own) // 3) :]
+        recent = _recent(own, count, hunts is False)
         seen = -np.array([value for one in recent for value in (one.lowest, one.highest)])
         if hunts and not count and len(recent) > 2:
-            period = _average_period(recent)
+            period, scatter = _average_period(recent), _scatter(recent)
+        begin = recent[0].start
+        after = next((one.start for one in own if one.start > recent[-1].start), np.inf)
     else:
         seen = -table[-1:, 1] if len(table) else np.zeros(1)
+    late = table[-1:] if at_rest else table[(table[:, 0] >= begin) & (table[:, 0] <= after)]
     ratio, turns = rig.feed()
     force = "N m" if rig.drive.turns else rig.result_unit("Pa")
     return Hunt(
@@ -210,8 +215,25 @@ def _result(
         period=float(period), repeats=bool(count), runs_away=motion.runs_away,
         strokes=tuple(_told(one, ratio) for one in strokes), time=table[:, 0], error=ratio * table[:, 1],
         velocity=ratio * table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol, settled_at=float(settled),
-        unit="rad" if turns else "m", force_unit=force, version=version(),
+        unit="rad" if turns else "m", force_unit=force, version=version(), scatter=ratio * scatter,
+        others=() if motion.runs_away else swings_of(rig, late[:, 0], late[:, 4:]),
     )  # fmt: skip
+
+
+def _recent(strokes: Sequence[Stroke], count: int, shrinks: bool) -> Sequence[Stroke]:
+    """Strokes that are told: of a cycle of `count`, the last two that shrink, or the last third.
+
+    Where others are left, not the last one, after which the motion ended: its bristles and springs had no time to give.
+    """
+    if shrinks or len(strokes) < 3:
+        return strokes[-2:]
+    return strokes[-1 - max(2, count or len(strokes) // 3) : -1]
+
+
+def _scatter(strokes: Sequence[Stroke]) -> float:
+    """Largest difference between ends of strokes in one direction (m or rad)."""
+    ends = [[one.ends for one in strokes if (one.ends > one.begins) is way] for way in (True, False)]
+    return max(float(np.ptp(own)) for own in ends if own)
 
 
 def _told(stroke: Stroke, ratio: float) -> Stroke:

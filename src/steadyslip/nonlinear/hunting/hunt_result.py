@@ -18,6 +18,7 @@ from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.free_loop import unstable_by_itself
+from steadyslip.nonlinear.hunting.other_bodies import BodySwing, measured_body, other_bodies, told_body
 from steadyslip.nonlinear.hunting.plant import Array
 from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke, swings
 from steadyslip.protocol import Protocol
@@ -57,6 +58,10 @@ class Hunt(ReadOnly):
         Time from which on it rests (s); NaN if it does not.
     unit, force_unit : str
     version : str
+    scatter : float
+        How far the ends of strokes in one direction differ that `lowest` and `highest` are of (m or rad); 0 of a cycle.
+    others : tuple of BodySwing
+        The same of other bodies with friction, each in its own motion; empty if it runs away.
     stopped : bool
         True if the motion was ended by the number of its steps.
     """
@@ -80,6 +85,8 @@ class Hunt(ReadOnly):
     unit: str
     force_unit: str
     version: str
+    scatter: float = 0.0
+    others: tuple[BodySwing, ...] = ()
     stopped: bool = False
 
     @property
@@ -100,15 +107,11 @@ class Hunt(ReadOnly):
     def sentence(self) -> str:
         """Answer in a line, such as "HUNTS ±63.9 mm about the target every 24.4 s"."""
         far = max(abs(self.lowest), abs(self.highest))
-        size = format_quantity(far, self.unit)
+        size = self._sizes(both=False)
         if self.runs_away:
             return f"RUNS AWAY: {size} from the target after {format_quantity(self._end, 's')}, and ever farther"
         if self.hunts:
-            if abs(self.highest + self.lowest) > SYMMETRIC * far:
-                low, high = (format_quantity(value, self.unit) for value in (self.lowest, self.highest))
-                size = f"from {low} to {high}"
-            else:
-                size = f"±{size}"
+            size = self._sizes(both=True)
             often = f"every {format_quantity(self.period, 's')}" if np.isfinite(self.period) else "without a period"
             often += "" if self.repeats or np.isnan(self.period) else " on average"
             return f"HUNTS {size} about the target {often}"
@@ -116,11 +119,47 @@ class Hunt(ReadOnly):
             return f"NOT DECIDED by {format_quantity(self._end, 's')}: {self._so_far}{self._of_late}"
         if np.isfinite(self.settled_at):
             there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # the rest is when it was stopped
-            where = "on the target" if there else f"within {size} of the target"
+            where = f"on the target{self._beside}" if there else f"within {size} of the target"
             if not self.strokes and not there:
                 return f"DOES NOT MOVE: friction at rest holds it {size} from the target"
             return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
+
+    @property
+    def at_body(self) -> str:
+        """Name of the body of `error`, as " at motor"; empty for a rig with one body."""
+        return f" at {name}" if (name := told_body(self.rig)) else ""
+
+    def _sizes(self, both: bool) -> str:
+        """How far the bodies are from their targets, to `both` sides or the larger of them, with their names."""
+        own = self._size(self.lowest, self.highest, self.unit, both)
+        if not (name := told_body(self.rig)):
+            return own
+        measured = measured_body(self.rig)
+        seen = "" if measured == name else f" by the place of {measured}"
+        beside = [(self._size(one.lowest, one.highest, one.unit, both), one.body) for one in self.others]
+        words = [f"itself {size}" if body == name else f"{size} at {body}" for size, body in beside]
+        return f"{own} at {name}{seen}" + (f" ({', '.join(words)})" if words else "")
+
+    @property
+    def _beside(self) -> str:
+        """Bodies that rest off their targets where the one that is told is on its own; empty if there are none."""
+        ratios, way = other_bodies(self.rig), float(np.max(np.abs(self.error), initial=0.0)) / self.rig.feed()[0]
+        off = [
+            f"{self._size(one.lowest, one.highest, one.unit, False)} off it at {one.body}" for one in self.others
+            if max(abs(one.lowest), abs(one.highest)) > SYMMETRIC * abs(ratios[one.body] * way)
+        ]  # fmt: skip
+        return f"{self.at_body} ({', '.join(off)})" if off else ""
+
+    def _size(self, low: float, high: float, unit: str, both: bool) -> str:
+        """One ± where both sides agree in the digits that are told, or as far as strokes of one side do."""
+        far = max(abs(low), abs(high))
+        if not both:
+            return format_quantity(far, unit)
+        share = self.scatter / max(abs(self.lowest), abs(self.highest))
+        if abs(high + low) <= max(SYMMETRIC, share) * far:
+            return f"±{format_quantity(far, unit)}"
+        return f"from {format_quantity(low, unit)} to {format_quantity(high, unit)}"
 
     @cached_property
     def unstable_loop(self) -> str:
@@ -142,7 +181,7 @@ class Hunt(ReadOnly):
     def _so_far(self) -> str:
         """What an axis has done by the end of its motion that neither rests nor hunts by then."""
         own, now = self._swings, abs(float(self.error[-1])) if len(self.error) else 0.0
-        off = f"is {format_quantity(now, self.unit)} from the target"
+        off = f"is {format_quantity(now, self.unit)} from the target{self.at_body}"
         if not own:
             return f"it {off}" + (", still on its first stroke" if self.strokes else ", and has not moved")
         long = format_quantity(abs(own[-1].ends - own[-1].begins), self.unit)
@@ -197,6 +236,8 @@ class Hunt(ReadOnly):
             "unstable_loop": self.unstable_loop or None,
             "lowest": self.lowest,
             "highest": self.highest,
+            "body": told_body(self.rig) or None,
+            "others": [asdict(one) for one in self.others],
             "runs_away": self.runs_away,
             "period": _finite(self.period),
             "repeats": self.repeats,
@@ -218,7 +259,7 @@ class Hunt(ReadOnly):
         factor, force = outside(self.force_unit, self.rig.area)
         columns = {
             "time (s)": self.time,
-            f"target less place ({self.unit})": self.error,
+            f"target less place{self.at_body} ({self.unit})": self.error,
             f"speed ({self.unit}/s)": self.velocity,
             f"force of the drive ({force})": factor * self.force,
         }

@@ -72,8 +72,8 @@ class CompiledMotion:
         Parameters
         ----------
         piece : HeldPiece
-        watched : ndarray (3, width)
-            Rows of error, speed and force.
+        watched : ndarray (values, width)
+            Rows of error, speed and force, and of errors of other bodies.
         state : ndarray (width,)
         fresh : bool
             True if only the sample that is due shall be taken.
@@ -82,8 +82,8 @@ class CompiledMotion:
         -------
         bool
             True if the mode may change before `Held.STOP`: the end, or the next sample or change of force.
-        ndarray (times, 4)
-            Time, error, speed, force on the way.
+        ndarray (times, 1 + values)
+            Time and these values on the way.
         """
         clock, bristles = self.clock, self.bristles
         guards, _ = piece.guards
@@ -93,7 +93,7 @@ class CompiledMotion:
         clock[Held.ROWS], clock[Held.MOST_STEPS] = 0, clock[Held.STEPS] + AT_ONCE
         lengths, passages = self.passages.get(piece, NONE)
         parts = int(lengths[:, 1].max(initial=1))
-        rows = np.empty(((AT_ONCE + parts) * (1 + (NODES - 1) // int(clock[Held.EVERY])), 4))
+        rows = np.empty(((AT_ONCE + parts) * (1 + (NODES - 1) // int(clock[Held.EVERY])), 1 + len(watched)))
         turn = bristles.code.follow_held(
             *bristles.arrays, piece.matrix, *bristles.maps(piece), bristles.scale, guards, watched, lengths, passages,
             self.loops, self.late, state, clock, self.control, rows, int(fresh),

@@ -71,7 +71,7 @@ def passage(piece: HeldPiece, watched: Array, length: float) -> Array:
     Parameters
     ----------
     piece : HeldPiece
-    watched : ndarray (3, width)
+    watched : ndarray (values, width)
         Rows whose values at `NODES` are wanted.
     length : float
 

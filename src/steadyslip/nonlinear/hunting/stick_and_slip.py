@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,7 +65,7 @@ def swings(strokes: Iterable[Stroke]) -> list[Stroke]:
 
 @dataclass
 class Trace:
-    """Values at times of a motion: time, error, velocity of the measured place, force of the controller."""
+    """Values at times of a motion: time, error, velocity of the measured place, force of the controller, others."""
 
     rows: list[Array] = field(default_factory=list)
     strokes: list[Stroke] = field(default_factory=list)
@@ -81,6 +81,8 @@ class Motion:
         Target of one lane, to the end of the motion.
     rtol : float
         For contacts with memory.
+    besides : sequence of ndarray (width,)
+        Rows of further values that are kept.
 
     Attributes
     ----------
@@ -88,7 +90,7 @@ class Motion:
         Changes of the target that are still to come.
     """
 
-    def __init__(self, plant: Plant, segments: Segments, rtol: float) -> None:
+    def __init__(self, plant: Plant, segments: Segments, rtol: float, besides: Sequence[Array] = ()) -> None:
         self.plant, self.segments = plant, segments
         self.state = np.zeros(plant.width)
         self.state[-1] = 1.0
@@ -109,7 +111,7 @@ class Motion:
         self.core = CompiledMotion(plant, self._bristle_steps)
         self.fresh: frozenset[tuple[str, int]] = frozenset()
         self.at_once = 0
-        self.watched = np.array([plant.error(), plant.row(None, plant.places[0]), plant.row()])
+        self.watched = np.array([plant.error(), plant.row(None, plant.places[0]), plant.row(), *besides])
 
     # -- the run
 
@@ -133,11 +135,11 @@ class Motion:
                 yield from self._to(float(end))
 
     def table(self) -> Array:
-        """Time, error, velocity of the measured place and force so far, (times, 4)."""
+        """Time, error, velocity of the measured place, force and further values so far, (times, 4 or more)."""
         self.watched[2] = self._piece().force
         now = np.array([[self.time, *(self.watched @ self.state)]])
         kept = [*self.trace.rows, *([now] if self.time > 0 else [])]
-        return np.concatenate(kept) if kept else np.zeros((0, 4))
+        return np.concatenate(kept) if kept else np.zeros((0, 1 + len(self.watched)))
 
     def _to(self, end: float) -> Iterator[Stroke | None]:
         """Go on to the end, or in the compiled core until the mode may change, and by a step or to a sample then."""
@@ -287,7 +289,7 @@ class Motion:
         self._keep(self.time + share * length * NODES, values)
 
     def _keep(self, times: Array, values: Array) -> None:
-        """Keep values (3, nodes) of a step at its times, and the extremes of the stroke."""
+        """Keep values (rows, nodes) of a step at its times, and the extremes of the stroke."""
         self.trace.rows.append(np.array([times[KEPT], *values[:, KEPT]]).T)
         if self.trace.strokes:
             self._widen(_least(values[0]), -_least(-values[0]), -_least(-np.abs(values[1])))

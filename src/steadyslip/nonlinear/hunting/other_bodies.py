@@ -1,0 +1,85 @@
+"""Bodies of a held machine besides that by which it is told: how far they are from their targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.core.pages import Displayed
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.hunting.plant import Array, Plant
+
+
+@dataclass(frozen=True)
+class BodySwing(Displayed):
+    """How far another body with friction is over its target, that of the drive as steady motion converts it.
+
+    Attributes
+    ----------
+    body : str
+    lowest, highest : float
+        Extremes of its place over its target in the same time as those of the answer; m or rad.
+    unit : str
+    """
+
+    body: str
+    lowest: float
+    highest: float
+    unit: str
+
+
+def told_body(rig: Slider | Machine) -> str:
+    """Body of a machine by which a held place is told: whose feed is given, or that of the drive; of several only."""
+    if not isinstance(rig, Machine) or len(rig.bodies) < 2:
+        return ""
+    return rig.fed or rig.drive.driven() or ""
+
+
+def measured_body(rig: Slider | Machine) -> str:
+    """Body of a machine whose place the controller measures; empty for a rig with one body."""
+    return rig.drive.watched()[0] if told_body(rig) and isinstance(rig, Machine) else ""
+
+
+def other_bodies(rig: Slider | Machine) -> dict[str, float]:
+    """Bodies with contacts besides the one that is told by its own place, and their motion for one of the drive."""
+    own = told_body(rig)
+    if not own or not isinstance(rig, Machine):
+        return {}
+    speeds, measured = rig.ratios(), measured_body(rig)
+    held = dict.fromkeys(surface.held for surface in rig.contacts.values())
+    return {name: speeds[name] for name in held if speeds.get(name) and not name == own == measured}
+
+
+def rows_of(rig: Slider | Machine, plant: Plant) -> list[Array]:
+    """Rows of the errors of the other bodies, target less place."""
+    names = [one.name for one in rig.mechanism().coordinates]
+    return [
+        plant.row(-np.eye(plant.size)[names.index(body)], target=ratio) for body, ratio in other_bodies(rig).items()
+    ]
+
+
+def swings_of(rig: Slider | Machine, times: Array, errors: Array) -> tuple[BodySwing, ...]:
+    """Swings of the other bodies from their errors (times, bodies) at some times (s)."""
+    if not len(times):
+        return ()
+    return tuple(
+        BodySwing(body, -_largest(times, own), _largest(times, -own), "rad" if rig.turns_on(body) else "m")
+        for body, own in zip(other_bodies(rig), np.transpose(errors), strict=True)
+    )
+
+
+def _largest(times: Array, values: Sequence[float] | Array) -> float:
+    """Largest of the values of a smooth function, by a parabola through it and its neighbours."""
+    i = int(np.argmax(values))
+    if not 0 < i < len(values) - 1:
+        return float(values[i])
+    left, right = times[i] - times[i - 1], times[i + 1] - times[i]
+    if not (left > 0 and right > 0):
+        return float(values[i])
+    falls, rises = (values[i] - values[i - 1]) / left, (values[i + 1] - values[i]) / right
+    bend = (falls - rises) / (left + right)
+    slope = (falls * right + rises * left) / (left + right)
+    return float(values[i] + slope**2 / (4 * bend)) if bend > 0 else float(values[i])

@@ -13,7 +13,7 @@ import { outcome, shed, slow } from "./words.js";
 const LEAD = 0.08, BRIEF = 1e-6; // LEAD: part of the time after the disturbance that is drawn before it; BRIEF: time after the disturbance over that before it, below which the whole run is drawn
 const AWAY = 1e6; // velocity over that of steady sliding above which a run-away is not drawn
 const STILL = 1e-15, LOOSE = 1e-3; // slip rate and normal force over those of steady sliding below which the contact counts as stuck and as open
-const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // HIGH: height of a strip and PLANE: box of the phase plane, SVG units; LISTED: most events in the list; FILM: duration of replay, ms
+const HIGH = 105, PLANE = { left: 70, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // HIGH: height of a strip and PLANE: box of the phase plane, SVG units; LISTED: most events in the list; FILM: duration of replay, ms
 
 /** Place of a point of the phase plane. @param {any} phase @param {number} x @param {number} y */
 const spot = ({ across, up }, x, y) => ({ cx: PLANE.left + across.of(x) * PLANE.width, cy: PLANE.top + (1 - up.of(y)) * PLANE.height });

@@ -16,7 +16,7 @@ import { all, choose, chosen, chosenIn } from "./view.js";
 import { kindOf, kindWords } from "./words.js";
 
 /** Boxes of the chart axes on a narrow and a wide page, SVG units; letters have one size on both. */
-const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
+const NARROW = { left: 66, top: 8, width: 270, height: 250 }, WIDE = { left: 72, top: 10, width: 560, height: 400 };
 const MIDDLE = 720, WIDE_FROM = 1280; // page widths (px) from which there are two and three columns
 const OTHERS = 40; // values of the bar parameter at which eigenvalues are drawn
 const SOUGHT = 1e3; // factor beyond a slider range within which it is widened to reach a change of status

@@ -9,7 +9,7 @@ import { NEW } from "./rig.js";
  * @typedef {{scale: Scale, range: [number, number], logarithmic: boolean}} Span
  */
 
-const LETTER = 7.5, MARGIN = 40; // LETTER: width of a letter of a label; MARGIN: how much a label may be longer than its axis, SVG units
+const LETTER = 7.5, MARGIN = 40, DIGIT = 7.8, LABELLED = 24; // LETTER, DIGIT: width of a letter of a label and of a figure of a number; MARGIN: how much a label may be longer than its axis; LABELLED: width of an upright label with its gaps, SVG units
 
 /** Round numbers between two numbers, for ticks. */
 export function ticks(low, high, logarithmic, most) {
@@ -52,9 +52,11 @@ export function axis(box, scale, [low, high], one, label, upright) {
     const at = scale.of(value * factor);
     if (at < -1e-9 || at > 1 + 1e-9) continue;
     const x = box.left + (upright ? 0 : at * box.width), y = box.top + (upright ? (1 - at) * box.height : box.height);
+    const number = powers ? inPowers(value) : digits(value, logarithmic ? 3 : many), room = box.left - LABELLED;
+    const narrow = upright && number.length * DIGIT > room ? { textLength: room, lengthAdjust: "spacingAndGlyphs" } : {};
     group.append(
       svg("line", { x1: x, y1: y, x2: upright ? box.left + box.width : x, y2: upright ? y : box.top, class: "grid" }),
-      svg("text", { x: upright ? x - 6 : x, y: upright ? y + 4 : y + 16, "text-anchor": upright ? "end" : "middle" }, powers ? inPowers(value) : digits(value, logarithmic ? 3 : many)),
+      svg("text", { x: upright ? x - 6 : x, y: upright ? y + 4 : y + 16, "text-anchor": upright ? "end" : "middle", ...narrow }, number),
     );
   }
   let own = label;

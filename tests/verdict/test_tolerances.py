@@ -1,5 +1,6 @@
 """Verdicts within tolerances: what lies inside them is looked at, and said."""
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -12,6 +13,7 @@ import steadyslip as ss
 from command import run
 from machines import leading, same_block, two_mass
 from rigs_of_theory import SIGMA, rate_state, rig
+from steadyslip.core.format import format_growth, format_range
 from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.verdict import Tolerances
@@ -29,6 +31,48 @@ def test_tolerances_that_leave_the_edge_outside_leave_the_verdict():
         assert found.share == share
         assert found.alone[0].stable is bool(share)
         assert found.alone[0].safety == pytest.approx((0.9 * factor, 1.1 * factor), rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ranges_reach_as_far_as_the_corners_that_were_tried(seed):
+    """Those of 65536 draws end before: none of them is at a corner."""
+    chance = np.random.default_rng(seed)
+    block = OWN.with_values({"stiffness": float(chance.uniform(0.3, 2.0)) * EDGE})
+    given = {"stiffness": "10 %", "contact.preload": "15 %", "friction.a": "2 %", "friction.d_c": "20 %"}
+    found = ss.tolerate(block, given)
+    spread = {name: block.value(name) * (1 + np.array([-1, 1]) * float(by[:-1]) / 100) for name, by in given.items()}
+    corners = [block.with_values(dict(zip(spread, at, strict=True))) for at in itertools.product(*spread.values())]
+    edges = [float(ss.critical_stiffness(one)) for one in corners]
+    ratios = [one.stiffness / edge for one, edge in zip(corners, edges, strict=True)]
+    for of, corner, drawn in (("edge", edges, found.edge), ("safety", ratios, found.safety)):
+        assert found.ranges[of] == pytest.approx((min(corner), max(corner)), rel=1e-12)
+        assert min(corner) < drawn.min() < drawn.max() < max(corner)
+    assert f"critical stiffness        {format_range(*found.ranges['edge'], 'Pa/m')}" in str(found)
+    assert json.loads(json.dumps(found.to_dict()))["ranges"]["edge"] == list(found.ranges["edge"])
+
+
+def test_a_range_has_the_corner_at_which_the_verdict_is_another():
+    """Stable in all rigs that were drawn, unstable at one corner: the ratio ranges from below 1."""
+    part = 0.04
+    block = OWN.with_values({"stiffness": 0.999 * EDGE * (1 + part) / (1 - part) ** 2})
+    found = ss.tolerate(block, dict.fromkeys(("stiffness", "contact.preload", "friction.d_c"), f"{100 * part} %"))
+    assert (found.share, bool(found.otherwise)) == (1.0, True)
+    low, high = found.ranges["safety"]
+    assert low == pytest.approx(0.999, rel=1e-12) == ss.safety_factor(block.with_values(found.otherwise))
+    assert 1 < found.safety.min() < found.safety.max() < high
+
+
+def test_growth_rates_of_a_machine_range_over_its_corners():
+    machine = two_mass(kp=4.0)
+    given = {"drive.kp": "20 %", "bodies.table.mass": "10 %"}
+    found = ss.tolerate(machine, given)
+    mass = machine.value("bodies.table.mass")
+    corners = [{"drive.kp": 4.0 * kp, "bodies.table.mass": mass * m} for kp in (0.8, 1.2) for m in (0.9, 1.1)]
+    ends = [leading(machine.with_values(corner)).real for corner in corners]
+    low, high = found.ranges["growth"]
+    assert low <= min(ends) * (1 + 1e-9) or low == pytest.approx(min(ends), rel=1e-9)
+    assert high >= max(ends) or high == pytest.approx(max(ends), rel=1e-9)
+    assert f"growth rate               {format_growth(low, high)}" in str(found)
 
 
 def test_half_of_the_rigs_about_the_edge_are_stable():

@@ -46,8 +46,7 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
         low, high = spans[one.parameter]
         label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: row - 1]] else None
         ax.barh(row, high - low, 0.55, left=low, color=COLOURS[one.stable], edgecolor=BLACK, label=label)
-    values = found.safety if edges else found.growth
-    known = values[np.isfinite(values)]
+    known = np.array(found.ranges.get("safety" if edges else "growth", ()))
     if len(known):
         ax.barh(
             0,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -96,6 +96,9 @@ class Tolerated(ReadOnly):
         Nearest edge of stability in the parameter `along`, SI units; NaN where there is none.
     safety : ndarray (m,)
         Value of the parameter `along` over its nearest edge.
+    ranges : dict of str to (float, float)
+        Least and largest ``edge``, ``safety`` and ``growth`` of the drawn rigs, of those at the corners and of
+        `otherwise`; without those that none of them has.
     error : float
         Half-width of the 95 % interval of `share`.
     corners : int
@@ -114,6 +117,7 @@ class Tolerated(ReadOnly):
     along: str
     edge: Array = field(repr=False)
     safety: Array = field(repr=False)
+    ranges: Mapping[str, tuple[float, float]] = field(repr=False)
     error: float
     corners: int
     otherwise: Mapping[str, float]
@@ -132,11 +136,11 @@ class Tolerated(ReadOnly):
         edge, over = (
             ("critical stiffness", "stiffness over critical") if own else (f"edge in {self.along}", "over its edge")
         )
-        ranges = [(edge, self.edge, self.unit), (over, self.safety, "1")] if self.along else []
-        if not self.along or not np.any(np.isfinite(self.edge)):
-            ranges.append(("growth rate", self.growth, ""))
-        for label, values, unit in ranges:
-            if (span := _finite_range(values)) is not None:
+        ranges = [(edge, "edge", self.unit), (over, "safety", "1")] if self.along else []
+        if "edge" not in self.ranges:
+            ranges.append(("growth rate", "growth", ""))
+        for label, of, unit in ranges:
+            if (span := self.ranges.get(of)) is not None:
                 text = format_range(*span, unit, self.area) if unit else format_growth(*span)
                 lines.append(f"{label:<{wide}}{text}")
         for one in self.alone:
@@ -182,7 +186,9 @@ class Tolerated(ReadOnly):
         found: dict[str, Any] = finite(
             {
                 "chance": self.share, "error": self.error, "rigs": len(self.stable), "corners": self.corners,
-                "otherwise": dict(self.otherwise), "exists": float(np.mean(self.exists)), "along": self.along,
+                "otherwise": dict(self.otherwise),
+                "ranges": {of: list(ends) for of, ends in self.ranges.items()},
+                "exists": float(np.mean(self.exists)), "along": self.along,
                 "parameters": parameters,
             }
         )  # fmt: skip
@@ -251,7 +257,7 @@ def tolerate(
     share, error = chance_of(every.stable, possible)
     uniform = any(not one.normal for one in spreads.of.values())
     corners = spreads.corners() if uniform else {}
-    otherwise = {} if 0 < share < 1 else _otherwise(spreads, corners, varied, every)
+    rare = {} if 0 < share < 1 else _otherwise(spreads, corners, varied, every)
     target = every.stable.astype(float) if 0 < share < 1 else every.growth
     alone = [
         _alone(rig, one, *spread.ends, name, _share_of_variance(varied[one], target))
@@ -259,9 +265,11 @@ def tolerate(
     ]
     alone.sort(key=lambda one: -one.share)
     count = len(next(iter(corners.values()))) if corners else 0
+    beside = [{key: np.array([value]) for key, value in rare.items()}, _possible(spreads, corners)]
+    judged = [every, *(_outcomes(rig, rigs, name) for rigs in beside if any(map(len, rigs.values())))]
     return Tolerated(
-        rig, tolerances, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety, error,
-        count, otherwise,
+        rig, tolerances, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety,
+        _ranges(judged), error, count, rare,
     )  # fmt: skip
 
 
@@ -294,6 +302,22 @@ def format_chance(share: float, error: float) -> str:
     """
     digits = max(0, 1 - int(np.floor(np.log10(100 * error)))) if error else 2
     return f"{100 * share:.{digits}f} ± {100 * error:.{digits}f} %"
+
+
+def _possible(spreads: Spreads, rigs: Mapping[str, Array]) -> dict[str, Array]:
+    """Those of several rigs whose numbers do not contradict each other."""
+    if not rigs:
+        return {}
+    mask = np.broadcast_to(spreads.possible(rigs), next(iter(rigs.values())).shape)
+    return {name: values[mask] for name, values in rigs.items()}
+
+
+def _ranges(judged: Sequence[_Outcomes]) -> dict[str, tuple[float, float]]:
+    """Least and largest edge, safety factor and growth rate of several sets of rigs, of what any of them has."""
+    found = {
+        of: _finite_range(np.concatenate([getattr(one, of) for one in judged])) for of in ("edge", "safety", "growth")
+    }
+    return {of: ends for of, ends in found.items() if ends is not None}
 
 
 def _otherwise(

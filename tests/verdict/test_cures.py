@@ -149,6 +149,16 @@ def test_both_ends_of_a_window_are_in_one_unit():
         assert str(window) == "0.0009756 to 0.02296 Nm/deg"
 
 
+def test_values_of_one_line_are_in_one_unit():
+    """A worm in N m/arcsec beside gains in N m/rad: its limits are told in its own unit, also the small one."""
+    names = ["N m/arcsec", "N m/rad", "kN"]
+    with display_units(names):
+        worm = Window("links.worm.stiffness", "N m/rad", 928200.0, (), (928.2, 4125300.0), 0.0)
+        load = Window("contact.preload", "N", 28e3, ((0.0, 366.6),), (0.0, 28e6), 0.0)
+        assert str(worm) == "not reached from 0.0045 N m/arcsec to 20 N m/arcsec"
+        assert str(load) == "up to 0.3666 kN"
+
+
 def test_growth_rates_are_not_told_in_the_unit_of_a_gain():
     axis = ss.read_rig("examples/machines/feed-axis.toml", ["drive.kv=1.8 m/min/mm", "links.screw.stiffness=8 N/um"])
     text = str(ss.tolerate(axis, {"drive.kv": "5 %"}))
@@ -224,7 +234,17 @@ def test_a_cure_holds_for_all_that_is_not_known(tmp_path):
     assert found.best.nearest == pytest.approx(needed, rel=1e-9)
     assert ss.cure(own, adjust={"stiffness": Adjustment()}).best.nearest < 0.9 * needed
     told = run("cure", tmp_path / "rig.toml").stdout
-    assert "at every value of friction.b from 0.0155 to 0.0175" in told
+    assert told.startswith(
+        "To be stable (now unstable)\nat every value of friction.b from 0.0155 to 0.0175, 5 of them tried"
+    )
+    assert "of the rig's own values for all else" in told
+    between = own.with_values({"stiffness": 0.5 * (needed + float(ss.critical_stiffness(own)))})
+    text = str(ss.cure(between, adjust={"stiffness": Adjustment()}, unknown=interval))
+    assert text.startswith("To be stable (now stable at some of these values only)")
+    tolerated = str(ss.cure(own, {"friction.a": "1 %"}, adjust={"stiffness": Adjustment()}, unknown=interval))
+    assert re.match(
+        r"To be stable with a chance of 95 % \(now [\d.]+ ± [\d.]+ % where least\)\nat every value", tolerated
+    )
     assert f"{needed / 1e9:.4g} GPa/m" in told
     run("report", tmp_path / "rig.toml", "-o", tmp_path / "rig.html")
     page = (tmp_path / "rig.html").read_text(encoding="utf-8")
@@ -247,6 +267,34 @@ def test_a_cure_with_tolerances_holds_for_all_that_is_not_known(seed):
         chances.append(one.share)
         assert one.share > 0.9 - 0.01
     assert min(chances) == pytest.approx(0.9, abs=0.01)
+
+
+def test_what_is_not_listed_and_would_do_alone_is_named(axis):
+    """With the windows of a cure that may change anything; where something listed does, nothing else is asked."""
+    block, within = rig_and_tolerances(axis)
+    listed = {"drive.velocity": Adjustment(low=4e-6, high=9e-6), "friction.viscous": Adjustment(high=2.0)}
+    found, free = ss.cure(block, within, adjust=listed), ss.cure(block, within)
+    assert not any(one.windows for one in found.windows)
+    besides = [one for one in free.windows if one.parameter not in listed]
+    assert [(one.parameter, one.windows) for one in found.unlisted] == [(one.parameter, one.windows) for one in besides]
+    rows = str(found).partition("nor does any pair of changes\n")[2].splitlines()
+    assert rows[2] == "not listed as adjustable, but enough alone:"
+    assert [row.split()[0] for row in rows[3:]] == [one.parameter for one in besides if one.windows]
+    assert [one["parameter"] for one in found.to_dict()["unlisted"]] == [one.parameter for one in besides]
+    enough = ss.cure(block, within, adjust={"stiffness": Adjustment()})
+    assert (enough.unlisted, free.unlisted) == ((), ())
+
+
+def test_gains_come_first_of_what_is_not_listed():
+    """The telescope as in its file is stable with a derivative gain of 0.02 N m s/rad."""
+    machine = ss.read_rig(EXAMPLES / "machines/telescope.toml", ["drive.kd=0.01 N m s/rad"])
+    worm = machine.value("links.worm.stiffness")
+    found = ss.cure(machine, adjust={"links.worm.stiffness": Adjustment(high=1.01 * worm)})
+    costs = [unit_cost(one.parameter) for one in found.unlisted]
+    assert costs == sorted(costs)
+    (gain,) = (one for one in found.unlisted if one.parameter == "drive.kd")
+    assert any(low < 0.02 < high for low, high in gain.windows)
+    assert f"{gain.parameter} " in str(found).partition("not listed as adjustable, but enough alone:")[2]
 
 
 def test_a_chance_of_one_holds_at_the_corners_of_the_ranges():

@@ -149,6 +149,20 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     return f"{_few(value / factor, digits)} {prefix}{si_unit}"
 
 
+def format_like(value: float, like: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
+    """Format a value in the unit in which another value of the same quantity is told, unless it is too long in that.
+
+    >>> format_like(800.0, 28e3, "N"), format_like(2.0, 28e3, "N"), format_like(0.0, 28e3, "N")
+    ('0.8 kN', '2 N', '0 kN')
+    """
+    factor, si_unit = outside(si_unit, told_area(si_unit, area))
+    name = format_quantity(like * factor, si_unit).partition(" ")[2]
+    size = unit(name)[0] if name and like and math.isfinite(like) else 0.0
+    if size and (value == 0 or 0.1 * _SHORTEST <= abs(value * factor / size) < _LONGEST):
+        return f"{_few(value * factor / size, digits)} {name}"
+    return format_quantity(value * factor, si_unit, digits)
+
+
 def digits_apart(value: float, other: float) -> int:
     """Digits with which two values read differently: four, or for close ones as many as it takes, up to twelve.
 

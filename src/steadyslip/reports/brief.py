@@ -60,7 +60,7 @@ _BY_UNIT = {
 }
 _RATES = frozenset(f"{_BY_UNIT['rad/s']} {_BY_UNIT['1/s']}".split())
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
-RESULT_UNIT = frozenset("value error low high amount absolute values lowest highest".split())  # noqa: SIM905 -- a list of words
+RESULT_UNIT = frozenset("value error low high amount absolute values lowest highest scatter".split())  # noqa: SIM905 -- a list of words
 DIMENSIONLESS = frozenset(
     """relative size bracket searched damping_ratio amplitude trivial multipliers ratio share ssq rtol steps rejected
     routh characteristic_polynomial characteristic_terms growth_slope f1 mu B0 B2 B3 friction precision rise scale noise

@@ -141,10 +141,21 @@ def chances_of(
     whole = log2_of(rig)
     few = {LOG2_CLOSED: (LOG2_FEW, LOG2_FEWEST), LOG2_OTHERS: (LOG2_FEW - 1, LOG2_FEWEST - 2)}.get(whole, (1, 0))
     sizes = (whole, *few)
-    places = [spread_over(*ends, np.linspace(0.0, 1.0, PLACES if len(unknown or {}) < 3 else 2))
-              for ends in (unknown or {}).values()]  # fmt: skip
-    values = tuple(dict(zip(unknown or {}, map(float, row), strict=True)) for row in itertools.product(*places))
-    return Chances(rig, spreads_of(rig, tolerances) if tolerances else None, sizes, values, certain)
+    return Chances(
+        rig, spreads_of(rig, tolerances) if tolerances else None, sizes, values_tried(unknown or {}), certain
+    )
+
+
+def places(count: int) -> int:
+    """Number of values of each of several unknown parameters that are tried."""
+    return PLACES if count < 3 else 2
+
+
+def values_tried(unknown: Mapping[str, tuple[float, float]]) -> tuple[dict[str, float], ...]:
+    """Values of unknown parameters that are tried, every one with every other; a single empty one without any."""
+    share = np.linspace(0.0, 1.0, places(len(unknown)))
+    rows = itertools.product(*(spread_over(*ends, share) for ends in unknown.values()))
+    return tuple(dict(zip(unknown, map(float, row), strict=True)) for row in rows)
 
 
 def spread_over(low: float, high: float, share: Array) -> Array:

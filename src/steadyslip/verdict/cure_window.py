@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from steadyslip.core.format import digits_apart, format_quantity, format_range
+from steadyslip.core.format import digits_apart, format_like
 from steadyslip.core.pages import Displayed
 from steadyslip.core.written import of_load
 from steadyslip.linear.nearness import doublings, ends_about
@@ -82,16 +82,15 @@ class Window(Displayed):
             )
         if high == self.limits[1]:
             return f"from {self.written(low)} up"
-        factor, unit = self.told or (1.0, self.unit)
-        if not self.limits[0]:  # of what was zero the low end may be, too
-            return f"{self.written(low)} to {self.written(high)}"
-        with of_load(self.load):
-            return format_range(low * factor, high * factor, unit, area=self.area)
+        first, last = self.written(low, high), self.written(high, low)
+        name = last.partition(" ")[2]
+        return f"{first.removesuffix(f' {name}') if name else first} to {last}"
 
-    def written(self, value: float) -> str:
-        """Format a value of the parameter."""
+    def written(self, value: float, beside: float | None = None) -> str:
+        """Format a value in the unit of the rig's own, with digits that tell it from that, or from one `beside` it."""
         if 0 == self.limits[0] < value < LEAST * self.limits[1]:
             return "anything above 0"  # the edge is zero itself, as of what damps an undamped machine
         factor, unit = self.told or (1.0, self.unit)
         with of_load(self.load):
-            return format_quantity(value * factor, unit, digits_apart(value, self.value), area=self.area)
+            digits = digits_apart(value, self.value if beside is None else beside)
+            return format_like(value * factor, self.value * factor, unit, digits, self.area)

@@ -23,7 +23,7 @@ from steadyslip.linear.nearness import doublings, ends_about
 from steadyslip.linear.status import stability
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.verdict.chances import Chances, chances_of
+from steadyslip.verdict.chances import Chances, chances_of, places
 from steadyslip.verdict.change_costs import SPEED, unit_cost
 from steadyslip.verdict.cure_window import LEAST, Window
 from steadyslip.verdict.export import finite
@@ -45,7 +45,7 @@ DESIGN = (
 )  # fmt: skip
 """What a designer chooses, in the order of asking: stiffness, damping, mass, preload, lubricant, speed."""
 OWN_VALUES = (
-    "without tolerances this is of the rig's own values, whatever chance is asked for;\n"
+    "without tolerances this is of the rig's own values{}, whatever chance is asked for;\n"
     'its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"'
 )
 SURE = Tested(
@@ -75,6 +75,9 @@ class Cures(ReadOnly):
     fails : tuple of Window
         For a rig with enough chance as it is: of every parameter whose change would lose it, that first which needs the
         smallest.
+    unlisted : tuple of Window
+        Where nothing that is listed reaches the chance: of what a designer chooses besides, in the order of
+        `default_adjust`.
     without_tolerances : bool
         True if nothing of the rig varies: what is told is then of the rig itself, whatever chance is asked for.
     unknown : tuple of ValuesWithin
@@ -89,6 +92,7 @@ class Cures(ReadOnly):
     pair: Mapping[str, float]
     pair_cost: float
     fails: tuple[Window, ...]
+    unlisted: tuple[Window, ...] = ()
     without_tolerances: bool = False
     unknown: tuple[ValuesWithin, ...] = ()
 
@@ -99,11 +103,12 @@ class Cures(ReadOnly):
         return min(found, key=lambda one: one.cost, default=None)
 
     def __str__(self) -> str:
-        wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails))
-        now = format_chance(self.chance, self.error) if self.error else stability(self.rig)
+        wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails, *self.unlisted))
+        now = self._now()
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
-        alone = [f"at every value of {one.parameter} from {one.given}" for one in self.unknown]
-        alone += [OWN_VALUES] if self.without_tolerances else []
+        tried = places(len(self.unknown))
+        alone = [f"at every value of {one.parameter} from {one.given}, {tried} of them tried" for one in self.unknown]
+        alone += [OWN_VALUES.format(" for all else" if alone else "")] if self.without_tolerances else []
         if self.chance >= self.sure:
             already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
             near = {one: [end for end in one.edges_around if one.doublings(end) <= FAR] for one in self.fails}
@@ -124,8 +129,22 @@ class Cures(ReadOnly):
             lines.append(f"cheapest pair: {both}, cost {self.pair_cost:.3g}")
         else:
             lines.append("no pair is cheaper" if best is not None else "nor does any pair of changes")
-        lines += [f"{one.parameter:<{wide}}{one.written(one.value)} now; {one}" for one in self.windows]
-        return "\n".join(lines)
+        enough = [one for one in self.unlisted if one.windows]
+        rows = [f"{one.parameter:<{wide}}{one.written(one.value)} now; {one}" for one in (*self.windows, *enough)]
+        if self.unlisted:
+            names = ", ".join(one.parameter for one in self.unlisted)
+            words = (
+                "not listed as adjustable, but enough alone:" if enough else f"nor would do alone, not listed: {names}"
+            )
+            rows.insert(len(self.windows), words)
+        return "\n".join([*lines, *rows])
+
+    def _now(self) -> str:
+        """Chance or verdict of the rig as it is, of unknown values the least."""
+        if self.error:
+            return format_chance(self.chance, self.error) + (" where least" if self.unknown else "")
+        own = stability(self.rig)
+        return "stable at some of these values only" if self.unknown and self.chance < 1 and own == "stable" else own
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``--json`` prints it."""
@@ -144,6 +163,7 @@ class Cures(ReadOnly):
                 "unknown": {one.parameter: [one.low, one.high] for one in self.unknown},
                 "best": None if self.best is None else self.best.parameter,
                 "pair": dict(self.pair), "pair_cost": self.pair_cost,
+                "unlisted": [data(one) for one in self.unlisted],
                 "windows": [data(one) for one in self.windows], "fails": [data(one) for one in self.fails],
             }
         )  # fmt: skip
@@ -217,7 +237,9 @@ def cure(
         least = min((one.cost for one in windows), default=math.inf)
         pair, cost = _cheapest_pair(chances, windows, given, wanted, least)
     fails = _fails(chances, windows, wanted) if chance >= wanted else ()
-    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, chances.single, within)
+    reached = chance >= wanted or pair or any(one.windows for one in windows)
+    unlisted = () if reached else _unlisted(chances, given, wanted)
+    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, unlisted, chances.single, within)
 
 
 def _share(sure: float | str) -> float:
@@ -237,6 +259,12 @@ def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:
             if last in words and starts and not (one.value == 0 and one.role.adds_state):
                 found[name] = Adjustment()
     return dict(sorted(found.items(), key=lambda one: unit_cost(one[0])))
+
+
+def _unlisted(chances: Chances, listed: Mapping[str, Adjustment], sure: float) -> tuple[Window, ...]:
+    """Windows of what a designer chooses and is not listed, of those that reach the chance alone."""
+    besides = [(name, one) for name, one in default_adjust(chances.rig).items() if name not in listed]
+    return tuple(_windows(chances, name, one, sure) for name, one in besides)
 
 
 def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]:

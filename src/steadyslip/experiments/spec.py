@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
@@ -22,7 +21,7 @@ from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import MOST_STATES, FitSettings, PopulationSettings
 from steadyslip.experiments.machine_spec import MachineSpec, machine_spec
-from steadyslip.experiments.measured.read import read_record
+from steadyslip.experiments.measured.read import checked_option, read_record
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.settings import RecordSettings
 from steadyslip.files.specifications.layout import Section
@@ -250,27 +249,20 @@ def lab_rig(
     >>> rig.friction.evolution, rig.stiffness
     (Aging(), 50000000000.0)
     """
-    rate = _checked("v_ref", "m/s", v_ref)
+    rate = checked_option("v_ref", "m/s", v_ref)
     friction = {"evolution": evolution, "v_ref": rate, "normal_memory": {"law": normal_memory}}
     filled = _Placeholders()
     count = int(states) if isinstance(states, np.integer) else states
-    drive = {} if velocity is None else {"velocity": _checked("velocity", "m/s", velocity)}
+    drive = {} if velocity is None else {"velocity": checked_option("velocity", "m/s", velocity)}
     tables = {"friction": friction, "fit": {"states": count}, "drive": drive}
     rig = _spec(read_tables(tables, {}, "lab_rig", further=TABLES, complete=filled.complete), filled).rig
     rig = with_pores(rig) if pores else rig
-    return rig if stiffness is None else replace(rig, stiffness=_checked("stiffness", "Pa/m", stiffness))
+    return rig if stiffness is None else replace(rig, stiffness=checked_option("stiffness", "Pa/m", stiffness))
 
 
 def with_pores(rig: Slider) -> Slider:
     """Rig with pores in its contact that drain, without dilatancy; the drainage rate is a placeholder."""
     return replace(rig, contact=contact_laws.porous(steady_state(rig).normal_stress))
-
-
-def _checked(name: str, unit: str, value: Any) -> float:
-    try:
-        return Parameter(unit, positive, name).checked(value)
-    except ParameterError as error:
-        raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
 
 class _Placeholders:

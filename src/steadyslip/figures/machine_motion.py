@@ -61,9 +61,7 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
     panels[-1].set_xlabel(axis_label("time", unit))
     add_legend_above(panels[0], 4, 1.0, fontsize="small")
     if run.status != "done":
-        where = f" ({run.contact})" if run.contact else ""
-        title = f"{run.status}{where} at {format_quantity(run.end, 's')}{drawn_up_to(left)}"
-        panels[0].set_title(title, color=VERMILION, fontsize="medium", pad=22)
+        panels[0].set_title(end_title(run, left), color=VERMILION, fontsize="medium", pad=22)
     return panels
 
 
@@ -124,9 +122,12 @@ def leaves(run: History, rates: np.ndarray, steady: float) -> np.ndarray:
     return np.asarray((run.status != "done") & (np.abs(rates) > LEAVES * abs(steady)))
 
 
-def drawn_up_to(left: np.ndarray) -> str:
-    """Words for a title on what is left out of a figure; empty if that is nothing."""
-    return f",\ndrawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
+def end_title(run: History, left: np.ndarray) -> str:
+    """Title of a run that ended early: how, at which contact and when, and what is left out of the figure."""
+    how = "cut short" if run.status == "too many steps" else run.status
+    where = f" ({run.contact})" if run.contact else ""
+    limit = f",\ndrawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
+    return f"{how}{where} at {format_quantity(run.end, 's')}{limit}"
 
 
 def _most_varying_contact(run: History, rig: Machine) -> str:

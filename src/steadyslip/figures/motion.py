@@ -15,7 +15,7 @@ from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREY, ORANGE
 from steadyslip.figures import machine_motion
-from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE, drawn_up_to, leaves
+from steadyslip.figures.machine_motion import MAX_SHADED_EVENTS, MIN_BAND_SHARE, leaves
 from steadyslip.figures.style import (
     WIDTH,
     add_arrowheads,
@@ -108,8 +108,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
             panel.axvline(run.end / factor, color=BLOW_UP, linewidth=1.5, linestyle="--")
     if run.status != "done":
         pad = 36 if "creep" in run.data else 22  # the legend has a second line
-        title = f"{run.status} at {format_quantity(run.end, 's')}{drawn_up_to(left)}"
-        panels[0].set_title(title, color=BLOW_UP, fontsize="medium", pad=pad)
+        panels[0].set_title(machine_motion.end_title(run, left), color=BLOW_UP, fontsize="medium", pad=pad)
     return panels
 
 

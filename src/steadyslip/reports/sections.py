@@ -192,15 +192,21 @@ def input_letter(model: Model | None, rig: Slider | Machine, name: str) -> str:
     return str(model.written(model.parameters[name]))
 
 
-def references(*rigs: Slider | Machine) -> Iterator[str]:
-    """HTML of the laws of rigs with what their descriptions cite, and of the source of the method."""
+def references(*rigs: Slider | Machine, names: Sequence[str] = ()) -> Iterator[str]:
+    """HTML of the laws of rigs, which `names` tell apart, with what their descriptions cite, and of the method."""
     yield heading("References")
-    both = [law for rig in rigs for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
-    laws = [one for law in both for one in (law, *records_in(law)) if one.name]
-    rows = dict.fromkeys((law.family, law.name, (inspect.getdoc(type(law)) or "").partition("\n")[0]) for law in laws)
+    rows: dict[tuple[str, str, str], list[str]] = {}
+    for rig, name in zip(rigs, names or [""] * len(rigs), strict=True):
+        both = [law for own in rig.laws_by_contact().values() for law in (own.friction, own.contact)]
+        for one in (part for law in both for part in (law, *records_in(law)) if part.name):
+            of = (one.family, one.name, (inspect.getdoc(type(one)) or "").partition("\n")[0])
+            whose = rows.setdefault(of, [])
+            whose += [] if name in whose else [name]
+    columns = ("part", "law", "what it is", "of")[: 4 if names else 3]
+    told = [(*of, with_subscripts(words), " and ".join(whose)) for (*of, words), whose in rows.items()]
     yield table(
-        ((*of, with_subscripts(words)) for *of, words in rows),
-        ("part", "law", "what it is"),
+        (row[: len(columns)] for row in told),
+        columns,
         caption="Laws that were used.",
     )
     yield from map(paragraph, dict.fromkeys(one for *_, words in rows for one in cited(words)))

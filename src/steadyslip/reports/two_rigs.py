@@ -37,7 +37,7 @@ def _comparison(result: RigComparison) -> Parts:
         *(part for name, one, _ in of_each
           for part in (heading(f"How far is the edge of {name}?"), *edge_table(one),
                        *motion(one, f"The motion of {name}"), heading(f"Inputs of {name}"), *rig_section(one.rig)[1:])),
-        *references(*rigs),
+        *references(*rigs, names=result.names),
     ]  # fmt: skip
     verdicts = [headline(one, capitals=False).partition(":")[0].lower() for one in result.verdicts]
     question = "Which of the two slides steadily, and which of their differences decides it?"

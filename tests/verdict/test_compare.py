@@ -13,6 +13,7 @@ import steadyslip as ss
 from command import run
 from rigs_of_theory import rate_state, rig
 from steadyslip.core.tolerances import read_tolerance
+from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.verdict import Tolerances, between
 from steadyslip.verdict.compare import compare_files
 from toleranced import AXIS
@@ -230,3 +231,77 @@ def test_one_file_that_is_held_is_refused_once(tmp_path):
     with pytest.raises(ss.ParameterError, match=r"drive\.velocity is 0, and verdicts") as raised:
         compare_files(path, path)
     assert len(raised.value.problems) == 1
+
+
+def unknown(**ends):
+    """Intervals of the friction law's parameters as of a file."""
+    return Tolerances(unknown={f"friction.{name}": own for name, own in ends.items()})
+
+
+def test_what_is_not_known_of_both_alike_is_no_difference():
+    """k/k_cr = k d_c/(σ(b − a)): a ratio of stiffnesses is the same whatever b is."""
+    a = rig()
+    b = a.with_values({"stiffness": 3 * a.value("stiffness"), "friction.b": 1.01 * a.value("friction.b")})
+    ends = (a.value("friction.b"), 1.2 * a.value("friction.b"))
+    found = ss.compare_rigs(a, b, tolerances=(unknown(b=ends), unknown(b=ends)))
+    (one,) = found.differences
+    assert (one.parameter, found.measure) == ("slider.stiffness", "safety")
+    assert (*one.parts, one.part) == pytest.approx((3, 3, 3), rel=EXACT)
+    same = ss.compare_rigs(a, a, tolerances=(unknown(b=ends),) * 2)
+    assert same.differences == ()
+    assert str(same).endswith("The rigs have the same equations, numbers and intervals of what is not known")
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_what_is_not_known_of_one_is_a_difference_over_its_interval(swapped):
+    """Its part is the ratio of b − a, least at one end of the interval and largest at the other."""
+    a = rig()
+    low, b, direct = a.value("friction.b"), 1.1 * a.value("friction.b"), a.value("friction.a")
+    known, ends = a.with_values({"friction.b": b}), (low, 1.3 * a.value("friction.b"))
+    rigs, given = (a, known), (unknown(b=ends), None)
+    found = ss.compare_rigs(*(rigs[::-1] if swapped else rigs), tolerances=given[::-1] if swapped else given)
+    (one,) = found.differences
+    ratios = sorted((end - direct) / (b - direct) for end in ends)
+    assert one.parts == pytest.approx([1 / ratios[1], 1 / ratios[0]] if swapped else ratios, rel=EXACT)
+    assert "somewhere in " in (one.second if swapped else one.first)
+    assert f"x {one.parts[0]:.3g} to {one.parts[1]:.3g} (100 %)" in str(found)
+
+
+def test_verdicts_hold_for_all_that_is_not_known_or_are_not_told():
+    """Of two intervals of b, one on both sides of the edge; verdicts with one value of the other at all values."""
+    a, direct = rig(), rig().value("friction.a")
+    edge = direct + a.stiffness * a.value("friction.d_c") / a.value("contact.preload")  # b at which k = k_cr
+    soft, firm = (edge * 1.01, edge * 1.05), (direct * 1.01, edge * 0.99)
+    both = (direct * 1.01, edge * 1.05)
+    found = ss.compare_rigs(a, a, tolerances=(unknown(b=soft), unknown(b=firm)), names=("soft", "firm"))
+    assert found.alike == ("unstable", "stable")
+    assert "soft becomes stable with that of firm in friction.b" in str(found)
+    found = ss.compare_rigs(a, a, tolerances=(unknown(b=soft), unknown(b=both)), names=("soft", "both"))
+    assert found.alike == ("unstable", "not at every value")
+    assert str(found).endswith("whether both is stable depends on what is not known of it, friction.b")
+    assert found.differences[0].second_with == "unstable"
+    assert found.differences[0].first_with == "not at every value"
+
+
+def test_files_are_compared_with_what_is_not_known(tmp_path):
+    """Chances are the least of rigs at five values; the page has the rows of the text."""
+    paths = [tmp_path / "a.toml", tmp_path / "b.toml"]
+    interval = '[unknown]\nfriction.bristle_damping = ["0 s/m", "3 s/m"]\n'
+    for path, stiffness in zip(paths, ("12", "25"), strict=True):
+        path.write_text(f"{AXIS.replace('12 ±', f'{stiffness} ±')}{interval}")
+    data = json.loads(run("compare", *paths, "--json").stdout)
+    assert [one["parameter"] for one in data["differences"]] == ["slider.stiffness"]
+    own, within = rig_and_tolerances(paths[0])
+    rigs = [own.with_values({"friction.bristle_damping": value}) for value in np.linspace(0, 3, 5)]
+    least = min(ss.tolerate(one, within).share for one in rigs)
+    first, second = data["rigs"]
+    assert first["least_chance"][0] == least < second["least_chance"][0]
+    assert first["unknown"]["parameters"]["friction.bristle_damping"]["interval"] == [0.0, 3.0]
+    for path in paths:
+        path.write_text(re.sub(r" (±|\+-|\+/-) 20 %", "", path.read_text()).replace("2.56..3.84 kN", "3.2 kN"))
+    text = run("compare", *paths, "-o", tmp_path / "page.html").stdout
+    assert re.search(r"friction\.bristle_damping +stable .* in 0 s/m .* to 3 s/m", text)
+    assert "with the file's values of what is not known" in text
+    page = (tmp_path / "page.html").read_text()
+    assert "over values of what is not known" in page
+    assert "bristle damping s₁</th><td>stable nowhere in 0" in page

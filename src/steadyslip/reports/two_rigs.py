@@ -90,7 +90,8 @@ def _differences(result: RigComparison) -> Iterator[str]:
     yield table(rows, head, caption=first)
     if known:
         of = "the factor of k/k_cr" if result.measure == "safety" else "the change of the growth rate"
-        yield paragraph(f"A part is {of} in the mean over all orders of making the changes.", "small")
+        over = "; a range of parts is that over values of what is not known" if any(result.unknown) else ""
+        yield paragraph(f"A part is {of} in the mean over all orders of making the changes{over}.", "small")
 
 
 def _chart(result: RigComparison) -> str:
@@ -102,7 +103,7 @@ def _chart(result: RigComparison) -> str:
 
 def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
     """Cells of a row about two rigs, with a parameter at the beginning in words instead of by its path."""
-    yield cells[0]
+    yield next((said(rig, cells[0]) for rig in rigs if cells[0] in rig.parameters()), cells[0])
     for rig, cell in zip(rigs, cells[1:], strict=True):
         name, _, rest = cell.partition(" ")
         yield f"{said(rig, name)} {rest}" if name in rig.parameters() else cell

@@ -6,9 +6,10 @@ Knows no maps, figures or documents.
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances, read_tolerances
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.analyze import analyze
-from steadyslip.verdict.compare import Difference, RigComparison, compare_rigs
+from steadyslip.verdict.compare import RigComparison, compare_rigs
 from steadyslip.verdict.cure_window import Window
 from steadyslip.verdict.cures import Cures, cure
+from steadyslip.verdict.rig_differences import Difference
 from steadyslip.verdict.tolerances import Tolerated, tolerate
 from steadyslip.verdict.unknown import StableWithin, ValuesWithin, stable_within
 

@@ -131,12 +131,18 @@ class Between:
         return plain and one.name in self.first.parameters() and one.name in self.second.parameters()
 
 
-def shapley(between: Between) -> tuple[str, Array]:
+def shapley(between: Between, measure: str = "") -> tuple[str, Array]:
     """Shapley value of every place in the change of a measure from the first rig to the second.
 
     The value of a place is the mean of what its change adds, over all orders in which the places can be changed (L. S.
     Shapley, A value for n-person games, 1953); with more than `MOST_EXACT` places over drawn orders (J. Castro,
     D. Gómez and J. Tejada, Computers & Operations Research 36, 2009). The values add up to the whole change.
+
+    Parameters
+    ----------
+    between : Between
+    measure : str
+        ``growth`` where parts of several pairs of rigs are to be of the same.
 
     Returns
     -------
@@ -151,23 +157,23 @@ def shapley(between: Between) -> tuple[str, Array]:
     orders = _orders(count, ORDERS if 2**built <= MOST_RIGS else max(1, MOST_RIGS // (2 * count)))
     masks = _all_subsets(count) if exact else _prefixes(orders)
     found = between.outcomes(masks)
-    measure, worth = _measure(found)
-    if not measure:
-        return measure, np.full(count, math.nan)
+    of, worth = _measure(found, measure)
+    if not of:
+        return of, np.full(count, math.nan)
     if exact:
-        return measure, _exact(worth, count)
+        return of, _exact(worth, count)
     steps = np.diff(worth.reshape(len(orders), count + 1), axis=1)
     values = np.zeros((len(orders), count))
     np.put_along_axis(values, orders, steps, axis=1)
-    return measure, values.mean(axis=0)
+    return of, values.mean(axis=0)
 
 
-def _measure(found: Outcomes) -> tuple[str, Array]:
-    """What tells the distance of all these rigs from the edge, and its value for each."""
+def _measure(found: Outcomes, wanted: str) -> tuple[str, Array]:
+    """What tells the distance of all these rigs from the edge, the `wanted` if one is, and its value for each."""
     stable = found.words == WORDS[STABLE]
     if not np.all(stable | (found.words == WORDS[UNSTABLE])):
         return "", found.growth
-    if np.all(found.safety > 0) and np.all((found.safety > 1) == stable):
+    if wanted != "growth" and np.all(found.safety > 0) and np.all((found.safety > 1) == stable):
         return "safety", np.log(found.safety)
     return ("growth" if np.all(np.isfinite(found.growth)) else ""), found.growth
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
 from steadyslip.verdict.tolerances import LOG2_CLOSED, LOG2_OTHERS, chance_of, log2_of
 
+K = TypeVar("K")
 PLACES = 5  # of each interval of one or two unknown parameters, ends among them; of more their corners
 AT_ONCE = 2**20  # rigs judged together; bounds memory
 LOG2_FEW, LOG2_FEWEST = 7, 4  # rigs of one group in searches: of one parameter, of two; fewer without closed form
@@ -151,7 +152,7 @@ def places(count: int) -> int:
     return PLACES if count < 3 else 2
 
 
-def values_tried(unknown: Mapping[str, tuple[float, float]]) -> tuple[dict[str, float], ...]:
+def values_tried(unknown: Mapping[K, tuple[float, float]]) -> tuple[dict[K, float], ...]:
     """Values of unknown parameters that are tried, every one with every other; a single empty one without any."""
     share = np.linspace(0.0, 1.0, places(len(unknown)))
     rows = itertools.product(*(spread_over(*ends, share) for ends in unknown.values()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -10,56 +9,28 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import enumerated, format_growth, format_percent, format_quantity
+from steadyslip.core.format import enumerated, format_growth, format_quantity
 from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.records import FrozenRecord
 from steadyslip.files.specifications.tolerance_tables import Tolerances, rig_and_tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.analyze import analyze
-from steadyslip.verdict.between import Between, Place, comparable, ones_and_others, places, shapley
+from steadyslip.verdict.between import comparable
+from steadyslip.verdict.chances import chances_of
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.findings import Findings
+from steadyslip.verdict.rig_differences import PARTLY, Difference, differences_of, one_word
 from steadyslip.verdict.support import support_stiffness
 from steadyslip.verdict.tolerances import Tolerated, differing_tolerances, format_chance, tolerate
-from steadyslip.verdict.words import edge_rows, headline, told
+from steadyslip.verdict.unknown import StableWithin, stable_within
+from steadyslip.verdict.unknown_in_pairs import Intervals, pairs_of
+from steadyslip.verdict.words import edge_rows, headline
 
 PAIR = Tested("two of them, for the first and the second rig", lambda v: isinstance(v, (tuple, list)) and len(v) == 2)
 NONE = (None, None)
-
-
-@dataclass(frozen=True)
-class Difference(Displayed):
-    """A difference between two rigs, and its part in the change of the verdict.
-
-    Attributes
-    ----------
-    parameter : str
-        Dotted name; of keys that exclude each other joined by ``+``.
-    first, second : str
-        What each rig has.
-    part : float
-        Its Shapley value: of ``measure = "safety"`` the factor by which it changes k/k_cr, of ``"growth"`` its change
-        of the growth rate, 1/s; NaN where that is not known.
-    share : float
-        Size of its Shapley value over the sizes of all (of the logarithm of k/k_cr, or of the growth rate).
-    first_with, second_with : str
-        Verdict on the first rig with the second's value, and on the second rig with the first's: ``stable``,
-        ``unstable``, ``no steady sliding`` or ``not possible``.
-    """
-
-    parameter: str
-    first: str
-    second: str
-    part: float
-    share: float
-    first_with: str
-    second_with: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +43,13 @@ class RigComparison(Displayed):
     verdicts : tuple of Analysis
     within : tuple of Tolerated or None
         Chances of stable sliding, of a rig with tolerances.
+    unknown : tuple of StableWithin or None
+        Values at which a rig is stable, of one with intervals of what is not known.
+    chances : tuple of ((float, float) or None)
+        Chance of a rig with tolerances and half-width of its 95 % interval, the least over what is not known.
+    alike : tuple of (str, str)
+        For every rig whether it is ``stable`` or ``unstable`` at all values of what is not known that were tried, or
+        ``not at every value``.
     differences : tuple of Difference
         The one with the largest part first; empty if the rigs have the same equations and numbers.
     measure : str
@@ -81,11 +59,17 @@ class RigComparison(Displayed):
     names: tuple[str, str]
     verdicts: tuple[Findings, Findings] = field(repr=False)
     within: tuple[Tolerated | None, Tolerated | None] = field(repr=False)
+    unknown: tuple[StableWithin | None, StableWithin | None] = field(repr=False)
+    chances: tuple[tuple[float, float] | None, tuple[float, float] | None]
+    alike: tuple[str, str]
     differences: tuple[Difference, ...]
     measure: str
 
     def __str__(self) -> str:
-        lines = [f"{name}: {headline(one)}" for name, one in zip(self.names, self.verdicts, strict=True)]
+        lines = [
+            f"{name}: {headline(one)}" + (", with the file's values of what is not known" if unknown else "")
+            for name, one, unknown in zip(self.names, self.verdicts, self.unknown, strict=True)
+        ]
         rows = list(self.side_by_side())
         wide = [max(len(row[i]) for row in rows) for i in range(2)]
         lines += ["", *(f"{a:<{wide[0]}}  {b:<{wide[1]}}  {c}".rstrip() for a, b, c in rows)]
@@ -100,19 +84,38 @@ class RigComparison(Displayed):
             first, second = (of(one) for one in self.verdicts)
             if first or second:
                 yield label, first or "none", second or "none"
+        yield from self._unknown()
         if any(self.within):
-            first, second = ("no tolerances" if one is None else _chance(one) for one in self.within)
+            first, second = (
+                "no tolerances" if one is None or chance is None
+                else _chance(one) if unknown is None else f"{_share(*chance)} where least"
+                for one, chance, unknown in zip(self.within, self.chances, self.unknown, strict=True)
+            )  # fmt: skip
             yield "stable in", first, second
+
+    def _unknown(self) -> Iterator[tuple[str, str, str]]:
+        """Rows on what is not known, of every parameter and of all at once."""
+        of = [{} if one is None else {each.parameter: each.told for each in one.each} for one in self.unknown]
+        for name in {**of[0], **of[1]}:
+            yield name, of[0].get(name, "known"), of[1].get(name, "known")
+        at_once = ["" if one is None else one.at_once for one in self.unknown]
+        if any(at_once):
+            first, second = (
+                text or ("known" if one is None else "as above")
+                for text, one in zip(at_once, self.unknown, strict=True)
+            )
+            yield "all these at once", first, second
 
     def _differences(self) -> Iterator[str]:
         if not self.differences:
             yield self._alike()
             return
+        over = ", over values of what is not known" if any(self.unknown) else ""
         wide = 2 + max(len(one.parameter) for one in self.differences)
         values = [f"{one.first} -> {one.second}" for one in self.differences]
         across = 2 + max(map(len, values))
         yield (
-            f"What differs, by its part in the change of {self.of} (Shapley value)"
+            f"What differs, by its part in the change of {self.of} (Shapley value){over}"
             if self.of
             else ("What differs; no parts are told, since some rig between the two has no growth rate")
         )
@@ -128,11 +131,11 @@ class RigComparison(Displayed):
     def _alike(self) -> str:
         """Sentence on rigs with the same equations and numbers."""
         first, second = self.within
-        if first is None and second is None:
-            return "The rigs have the same equations and numbers"
+        same = ["equations", "numbers", *(["intervals of what is not known"] if any(self.unknown) else [])]
         if apart := differing_tolerances(first, second):
-            return f"The rigs have the same equations and numbers, but other tolerances of {enumerated(apart)}"
-        return "The rigs have the same equations, numbers and tolerances"
+            return f"The rigs have the same {enumerated(same)}, but other tolerances of {enumerated(apart)}"
+        same += ["tolerances"] if any(self.within) else []
+        return f"The rigs have the same {enumerated(same)}"
 
     @property
     def of(self) -> str:
@@ -141,15 +144,16 @@ class RigComparison(Displayed):
 
     def part_in_words(self, one: Difference) -> str:
         """Part of a difference as text, with its share of all."""
-        if not self.measure:
-            return ""
-        part = f"x {one.part:.3g}" if self.measure == "safety" else f"{one.part:+.3g} 1/s"
-        return part if math.isnan(one.share) else f"{part} ({format_percent(round(one.share, 2))})"
+        return one.told(self.measure)
 
     def decisive(self) -> Iterator[str]:
         """Sentences on the differences that decide the verdict alone."""
-        first, second = ("stable" if one.stable else "unstable" for one in self.verdicts)
-        if first == second:
+        first, second = self.alike
+        for name, word, unknown in zip(self.names, self.alike, self.unknown, strict=True):
+            if word == PARTLY and unknown is not None:
+                which = enumerated([one.parameter for one in unknown.each])
+                yield f"whether {name} is stable depends on what is not known of it, {which}"
+        if first == second or PARTLY in self.alike:
             return
         makes = [one.parameter for one in self.differences if one.first_with == second]
         undoes = [one.parameter for one in self.differences if one.second_with == first]
@@ -180,13 +184,18 @@ class RigComparison(Displayed):
                     "unit": one.margins[0].unit, "own_value": one.margins[0].value,
                 },
                 "tolerances": None if within is None else within.to_dict(),
+                "least_chance": None if chance is None else list(chance),
+                "unknown": None if unknown is None else unknown.to_dict(), "at_unknown": word,
             }
-            for name, one, within in zip(self.names, self.verdicts, self.within, strict=True)
+            for name, one, within, chance, unknown, word in zip(
+                self.names, self.verdicts, self.within, self.chances, self.unknown, self.alike, strict=True
+            )
         ]  # fmt: skip
         differences = [
             {
                 "parameter": one.parameter, "first": one.first, "second": one.second, "part": one.part,
-                "share": one.share, "first_with": one.first_with, "second_with": one.second_with,
+                "share": one.share, "parts": list(one.parts),
+                "first_with": one.first_with, "second_with": one.second_with,
             }
             for one in self.differences
         ]  # fmt: skip
@@ -206,7 +215,8 @@ def compare_rigs(
     ----------
     first, second : Slider or Machine
     tolerances : (tolerances, tolerances), optional
-        Of the first and the second rig, as for `tolerate`.
+        Of the first and the second rig, as for `tolerate`. Those of files have intervals of what is not known as well:
+        parts and verdicts are then over values tried in these, of intervals that both have the same in both.
     names : (str, str), optional
         What the rigs are called in the text.
 
@@ -237,12 +247,27 @@ def compare_rigs(
         raise ParameterError([Problem("rigs", message)])
     _check_slides((first, second), names)
     a, b = comparable(first, second)
-    found = places(a, b)
-    measure, differences = _differences(Between(a, b, found)) if found else ("", ())
-    within = tuple(tolerate(rig, one) if one else None for rig, one in zip((first, second), tolerances, strict=True))
+    of_first, of_second = map(_intervals, tolerances)
+    pairs = pairs_of((first, second), (a, b), (of_first, of_second))
+    measure, differences = differences_of(pairs)
+    verdicts = [analyze(rig) for rig in (first, second)]
+    alike = [
+        one_word(["stable" if word == "stable" else "unstable" for word in words]) if ends
+        else "stable" if verdict.stable else "unstable"
+        for verdict, words, ends in zip(verdicts, pairs.stability(), (of_first, of_second), strict=True)
+    ]  # fmt: skip
+    each = list(zip((first, second), tolerances, (of_first, of_second), strict=True))
+    within = [tolerate(rig, one) if one else None for rig, one, _ in each]
+    unknown = [stable_within(rig, ends) if ends else None for rig, _, ends in each]
+    chances = [chances_of(rig, one, ends).whole({}) if one else None for rig, one, ends in each]
     return RigComparison(
-        (str(names[0]), str(names[1])), (analyze(first), analyze(second)), (within[0], within[1]), differences, measure
-    )
+        (str(names[0]), str(names[1])), (verdicts[0], verdicts[1]), (within[0], within[1]), (unknown[0], unknown[1]),
+        (chances[0], chances[1]), (alike[0], alike[1]), differences, measure,
+    )  # fmt: skip
+
+
+def _intervals(given: Mapping[str, Any] | Tolerances | None) -> Intervals:
+    return given.unknown if isinstance(given, Tolerances) else {}
 
 
 def compare_files(
@@ -254,7 +279,7 @@ def compare_files(
     _check_slides((a, b), (str(first), str(second)))
     names = (Path(first).stem, Path(second).stem)
     names = names if names[0] != names[1] else (str(first), str(second))
-    return compare_rigs(a, b, tolerances=(of_a or None, of_b or None), names=names)
+    return compare_rigs(a, b, tolerances=(of_a, of_b), names=names)
 
 
 def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> None:
@@ -267,63 +292,6 @@ def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> Non
     problems = [Problem(name, message) for name in held]
     if problems:
         raise ParameterError(problems)
-
-
-def _differences(between: Between) -> tuple[str, tuple[Difference, ...]]:
-    measure, values = shapley(between)
-    size = float(np.sum(np.abs(values)))
-    count = len(between.places)
-    alone = between.outcomes(ones_and_others(count))
-    found = [
-        Difference(
-            _name(place),
-            *_texts(between, place),
-            math.exp(value) if measure == "safety" else value,
-            abs(value) / size if size else math.nan,
-            str(alone.words[j]),
-            str(alone.words[count + j]),
-        )
-        for j, (place, value) in enumerate(zip(between.places, map(float, values), strict=True))
-    ]
-    order = sorted(range(count), key=lambda j: -abs(values[j]) if measure else 0.0)
-    return measure, tuple(found[j] for j in order)
-
-
-def _name(place: Place) -> str:
-    """Name of a place, such as ``slider.stiffness + axial_stiffness``."""
-    first, *others = place
-    return " + ".join([first.name, *(one.name.rpartition(".")[2] for one in others)])
-
-
-def _texts(between: Between, place: Place) -> tuple[str, str]:
-    """What each rig has at a place."""
-    first = [_text(between.first, one.name, one.first, len(place) > 1) for one in place]
-    second = [_text(between.second, one.name, one.second, len(place) > 1) for one in place]
-    return ", ".join(filter(None, first)) or "none", ", ".join(filter(None, second)) or "none"
-
-
-def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
-    """A value with its unit, and its key where `named`; empty for None."""
-    if value is None:
-        return ""
-    if isinstance(value, FrozenRecord):
-        return value.name or type(value).__name__
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, tuple):
-        return "; ".join(_item_text(rig, f"{name}.{i}") for i in range(1, len(value) + 1))
-    known = rig.parameters().get(name)
-    if known is None or not isinstance(value, float):
-        return str(value)
-    words = told(rig, name, value)
-    return f"{name.rpartition('.')[2]} {words}" if named else words
-
-
-def _item_text(rig: Slider | Machine, name: str) -> str:
-    """Parameters of an item of a list, such as ``b 0.006, d_c 4 um``."""
-    own = {key.removeprefix(f"{name}."): address.value for key, address in rig.parameters().items()
-           if key.startswith(f"{name}.") and address.value is not None}  # fmt: skip
-    return ", ".join(f"{key} {told(rig, f'{name}.{key}', value)}" for key, value in own.items())
 
 
 def _factor(one: Findings) -> float | None:
@@ -357,6 +325,8 @@ def _edge(one: Findings) -> str:
 
 
 def _chance(one: Tolerated) -> str:
-    if 0 < one.share < 1:
-        return format_chance(one.share, one.error)
-    return f"{'all' if one.share else 'none'}{' but some' if one.otherwise else ''}"
+    return f"{_share(one.share, one.error)}{' but some' if one.otherwise else ''}"
+
+
+def _share(share: float, error: float) -> str:
+    return format_chance(share, error) if 0 < share < 1 else "all" if share else "none"

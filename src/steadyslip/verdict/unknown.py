@@ -64,12 +64,17 @@ class ValuesWithin(Displayed):
         return f"{self.shown(self.low)} to {self.shown(self.high)}"
 
     def __str__(self) -> str:
+        return f"{self.parameter}: {self.told}"
+
+    @property
+    def told(self) -> str:
+        """The values in words."""
         given = self.given
         if not self.values:
-            return f"{self.parameter}: stable nowhere in {given}"
+            return f"stable nowhere in {given}"
         if self.values == ((self.low, self.high),):
-            return f"{self.parameter}: stable everywhere in {given}"
-        return f"{self.parameter}: stable {' and '.join(map(self._part, self.values))}, in {given}"
+            return f"stable everywhere in {given}"
+        return f"stable {' and '.join(map(self._part, self.values))}, in {given}"
 
     def _part(self, one: tuple[float, float]) -> str:
         if one[0] == self.low:
@@ -109,12 +114,19 @@ class StableWithin(ReadOnly):
 
     def __str__(self) -> str:
         lines = ["Not known, by the table [unknown] of the file:", *(f"  {one}" for one in self.each)]
-        if len(self.each) > 1:
-            share = float(np.mean(self.stable))
-            words = {1.0: f"stable in all {len(self.stable)} rigs", 0.0: f"stable in none of {len(self.stable)} rigs"}
-            part = f"stable in {format_percent(share)} of {len(self.stable)} rigs"
-            lines.append(f"  all at once: {words.get(share, part)} spread over the intervals")
+        if self.at_once:
+            lines.append(f"  all at once: {self.at_once}")
         return "\n".join(lines)
+
+    @property
+    def at_once(self) -> str:
+        """Share of stable rigs over all intervals in words; empty for a single one."""
+        if len(self.each) == 1:
+            return ""
+        share = float(np.mean(self.stable))
+        words = {1.0: f"stable in all {len(self.stable)} rigs", 0.0: f"stable in none of {len(self.stable)} rigs"}
+        part = f"stable in {format_percent(share)} of {len(self.stable)} rigs"
+        return f"{words.get(share, part)} spread over the intervals"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, SI units."""

@@ -11,6 +11,9 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import UnitWarning
 from steadyslip.core.format import format_quantity
 from steadyslip.core.quantities import parse, units_in
+from steadyslip.files.specifications.held_bodies import friction_at_rest, is_of_forces, mass_on
+from steadyslip.files.specifications.other_units import number_of
+from steadyslip.files.specifications.sizes import G, questions_of_size
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
@@ -19,7 +22,6 @@ STIFFNESSES = ("N/m", "Pa/m")
 STRETCHED = 1.0  # m: what friction stretches the softest of real axes and presses by is some 10 mm
 FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
 FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
-G = 9.81  # m/s^2
 
 
 class Largest(NamedTuple):
@@ -50,6 +52,7 @@ LARGEST = {
     ("gear", "1"): Largest(10.0, 10.0),
 }
 """By kind of parameter or last part of its name, and SI unit."""
+WITH_UNIT = 10.0  # times as far as without one is asked about what has a unit, as rings of telescopes are 30 m wide
 REMEDIES = {
     "gear": 'its second body turns faster than the first; a reduction is written "1/{raw:g}", this one "{raw:g}/1"',
     "1": "a number in per cent is written as a share, {share:g}",
@@ -68,7 +71,8 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
     """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
 
     Also of stiffnesses without a unit that friction would stretch far, of numbers far above all in use or far below,
-    of an encoder that is not where its step counts, and of values that a friction law doubts.
+    of an encoder that is not where its step counts, of values that a friction law doubts, and, where all this is in
+    order, of sizes that no machine has.
 
     Parameters
     ----------
@@ -80,19 +84,12 @@ def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iter
     """
     by_programs = all(unit(name)[0] == 1.0 for name in written)
     large = {} if by_programs else dict(_large(rig, read))
-    typed = (
-        ()
-        if by_programs
-        else (
-            *_soft(rig, read),
-            *large.values(),
-            *_light(rig, read),
-            *_pliable(rig, read),
-            *_undamped(rig, read),
-            *_idle(rig),
-        )
-    )
-    for text in (*_questions(rig, read), *typed, *_doubts(rig, large)):
+    found = [*_questions(rig, read)]
+    if not by_programs:
+        found += [*_soft(rig, read), *large.values(), *_light(rig, read), *_pliable(rig, read)]
+        found += [*_undamped(rig, read), *_idle(rig)]
+        found += [] if found else [text for _, text in questions_of_size(rig, read)]
+    for text in (*found, *_doubts(rig, large)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
@@ -140,18 +137,19 @@ def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str, str]]:
-    """Names and questions of numbers without a unit that are far above `LARGEST`."""
+    """Names and questions of numbers that are far above `LARGEST`, without a unit or in another than is meant."""
     parameters = rig.parameters()
     for name, (raw, si) in read.items():
         last, one = name.rpartition(".")[2], parameters.get(name)
         known = LARGEST.get((one.role.kind if one else "", si)) or LARGEST.get((last, si))
-        if known is None or not _is_between(raw, known.questioned, ABSURD * known.questioned):
+        if known is None or (last.startswith("mu_") and is_of_forces(rig, name)):
             continue
-        if last.startswith("mu_") and _is_of_forces(rig, name):
-            continue
-        was, largest = (format_quantity(value, si) for value in (float(raw), known.value))
-        remedy = (REMEDIES.get(last) or REMEDIES.get(si) or REMEDIES[""]).format(raw=raw, share=raw / 100)
-        yield name, f"{name} = {raw:g} is read as {was}; the largest {known.of} are some {largest}: {remedy}"
+        largest = f"the largest {known.of} are some {format_quantity(known.value, si)}"
+        if _is_between(raw, known.questioned, ABSURD * known.questioned):
+            remedy = (REMEDIES.get(last) or REMEDIES.get(si) or REMEDIES[""]).format(raw=raw, share=raw / 100)
+            yield name, f"{name} = {raw:g} is read as {format_quantity(float(raw), si)}; {largest}: {remedy}"
+        elif isinstance(raw, str) and (number_of(raw, si) or 0.0) > WITH_UNIT * known.questioned:
+            yield name, f"{name} = {raw}; {largest}: {REMEDIES['']}"
 
 
 def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
@@ -187,9 +185,8 @@ def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
     """Questions about bristles without a unit that are far softer than all measured."""
     for name in rig.of_kind("bristle stiffness"):
         raw, si = read.get(name, (None, ""))
-        at_rest = rig.parameters().get(f"{name.rpartition('.')[0]}.mu_static")
-        friction = at_rest.value if at_rest and at_rest.value else 0.0
-        if si == "1/m" and _is_between(raw, 0.0, friction / BENT) and not _is_of_forces(rig, name):
+        friction = friction_at_rest(rig, name)
+        if si == "1/m" and _is_between(raw, 0.0, friction / BENT) and not is_of_forces(rig, name):
             bend, load = format_quantity(friction / raw, "m"), format_quantity(rig.load_of(name) or 0.0, "N")
             yield (
                 f"{name} = {raw:g} is read as {raw:g} 1/m, so that friction would bend the bristles by {bend}; "
@@ -201,7 +198,7 @@ def _light(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
     """Questions about loads without a unit that hardly press: far less than a body weighs, or than `LIGHTEST`."""
     for name in rig.of_kind("normal stress"):
         raw, si = read.get(name, (None, ""))
-        load, weight = rig.load_of(name), G * _mass_on(rig, name)
+        load, weight = rig.load_of(name), G * mass_on(rig, name)
         if not _is_between(raw, 0.0, math.inf):
             continue
         if load is not None and load < LIGHT * weight:
@@ -214,20 +211,6 @@ def _light(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
                 f"{name} = {raw:g} has no unit and is read as {raw:g} {si}, less than 10 cm of water press with: write "
                 "the unit that is meant"
             )
-
-
-def _mass_on(rig: Rig, name: str) -> float:
-    """Mass (kg) of the body that slides at the contact whose parameter this is; 0 if it is not known."""
-    mass, area = "slider.mass", rig.area or 0.0
-    if isinstance(rig, Machine):
-        mass, area = f"bodies.{rig.contacts[name.split('.')[1]].body}.mass", 1.0
-    address = rig.parameters().get(mass)
-    return (address.value or 0.0) * area if address else 0.0
-
-
-def _is_of_forces(rig: Rig, name: str) -> bool:
-    """True if the friction of a contact is given as forces, pressed with 1 N, so that no size is unusual."""
-    return rig.load_of(name) == 1.0
 
 
 def _is_between(raw: Any, low: float, high: float) -> bool:

@@ -368,9 +368,152 @@ def test_exchanged_columns_are_noticed_and_others_are_not(tmp_path):
             f"{a!r},{b!r},{c!r}" for a, b, c in zip(*map(np.ndarray.tolist, (speed, force, load)), strict=True)
         )
         file.write_text(f"speed [m/s],force [N],load [N]\n{rows}\n")
-        assert not [note for note in read_speed_table(file).notes if "exchange" in note]
+        assert not [note for note in read_speed_table(file).notes if "names of the two columns" in note]
     force, speed = 100 * np.linspace(1.0, 0.6, 8), np.geomspace(1e-4, 1e-1, 8)
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(force.tolist(), speed.tolist(), strict=True))
     file.write_text(f"speed [mm/min],force [N]\n{rows}\n")
     notes = "; ".join(read_speed_table(file).notes)
     assert "force varies by a factor of 1000 over speeds that vary by 1.7: if the names of the two columns are" in notes
+
+
+QUESTIONS = {
+    "columns exchanged": (
+        "force [N],speed [mm/min]\n1,838\n3,773\n6,706\n12,605\n20,532\n",
+        "force varies by a factor of 20 over speeds that vary by 1.6: .* exchange them in the header",
+    ),
+    "a load in kN": (
+        "speed [mm/min],force [N],load\n1,838,5.5\n3,773,5.5\n25,502,5.5\n200,454,5.5\n",
+        r'force over load of 120, where friction coefficients are 0.001 to 2: is "load \[kN\]" or',
+    ),
+    "load and force exchanged": (
+        "speed [mm/min],force [kN],load [N]\n1,5.5,838\n3,5.5,773\n25,5.5,502\n200,5.5,454\n",
+        "force over load of 9, .* or the columns of force and load exchanged meant",
+    ),
+    "coefficients in per cent": ("speed [mm/s],mu\n1,16\n3,14\n25,10\n60,9\n", r'of 12, .* is "friction \[%\]" meant'),
+    "speeds without a unit": (
+        "v,F [N]\n1,800\n3,700\n10,500\n30,400\n",
+        r"speeds up to 30 m/s\? Write their unit in the header, speed \[mm/min\], or give --set speed=mm/min",
+    ),
+    "speeds in another unit": ("v [m/s],F [N]\n1,800\n30,500\n600,400\n", r"up to 600 m/s\? They are in m/s in the"),
+    "a weight": (
+        "speed [mm/min],force [N]\n10,950\n60,930\n200,920\n-10,350\n-60,370\n-200,380\n",
+        "force is 930 N forward and 370 N backward at like speeds: if a weight .* half their difference, 280 N",
+    ),
+    "a weight less than friction": (
+        "speed [mm/min],force [N]\n10,950\n60,930\n200,920\n-10,-350\n-60,-370\n-200,-380\n",
+        "force is 930 N forward and -370 N backward at like speeds: if a weight .* half their difference, 650 N",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "words"), QUESTIONS.values(), ids=QUESTIONS)
+def test_numbers_that_are_not_of_friction_are_asked_about_once(tmp_path, text, words):
+    """In the answer, and in the rig file that goes on."""
+    (path := tmp_path / "t.csv").write_text(text)
+    (question,) = read_speed_table(path).questions
+    assert re.search(words, question)
+    found = ss.experiments.fit_friction_table(path, "coulomb")
+    assert f"  to check: {question}\n" in str(found)
+    assert f"# To check: {question}\n" in found.rig_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("speed [mm/min],force [N]\n1,-8\n3,-7\n12,-6\n", "force is negative at 3 forward speeds: .* speeds negative"),
+        ("speed [mm/min],force [N]\n-1,8\n-3,7\n-12,6\n", "all speeds are negative: the friction is that of backward"),
+    ],
+)
+def test_signs_that_are_left_out_are_told(tmp_path, text, words):
+    (path := tmp_path / "t.csv").write_text(text)
+    assert re.search(words, "; ".join(read_speed_table(path).notes))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "speed [rpm],force [N]\n1,8\n3,7\n12,6\n",
+            "multiply rpm by the lead of the screw, in mm/rev, or the",
+        ),
+        (
+            "speed,torque [N m]\n1,8\n3,7\n12,6\n",
+            r"the speeds have no unit: write it in the header, such as speed",
+        ),
+        ("speed [mm/s],force [N]\n1,8\n3,7\n12,-6\n", "give rows of the other direction a negative speed or a column"),
+    ],
+)
+def test_refusals_name_what_to_write(tmp_path, text, words):
+    (path := tmp_path / "t.csv").write_text(text)
+    with pytest.raises(ss.ParameterError, match=words):
+        read_speed_table(path)
+
+
+def test_ordinary_tables_are_not_asked_about(tmp_path):
+    """Random Stribeck curves of both directions, up to 1.5 times apart, of slides and of joints."""
+    chance, path = np.random.default_rng(34), tmp_path / "t.csv"
+    for _ in range(200):
+        speed = np.geomspace(1, 10 ** chance.uniform(0.5, 4), 8) * 10 ** chance.uniform(-6, -3)
+        mu = 10 ** chance.uniform(-2.8, 0) * curve(speed, 1.0, chance.uniform(1, 2.5), speed[3], 0.0, 1.0)
+        load, back = 10 ** chance.uniform(0, 5), chance.uniform(0.67, 1.5)
+        rows = [f"{v!r},{f!r},{load!r}" for v, f in zip(speed.tolist(), (load * mu).tolist(), strict=True)]
+        rows += [f"{-v!r},{-f!r},{load!r}" for v, f in zip(speed.tolist(), (back * load * mu).tolist(), strict=True)]
+        turns = chance.integers(2)
+        header = "speed [rad/s],torque [N m],load [N m]\n" if turns else "speed [m/s],force [N],load [N]\n"
+        path.write_text(header + "\n".join(rows))
+        assert read_speed_table(path).questions == ()
+
+
+JOINT = """
+bodies.joint = {{motion = "rotation", inertia = 0.1}}
+bodies.arm = {{motion = "rotation", inertia = 1, torque = {load}}}
+links.shaft = {{kind = "shaft", between = ["drive", "joint"], stiffness = "1e4 N m/rad"}}
+links.gear = {{kind = "shaft", between = ["joint", "arm"], stiffness = "1e4 N m/rad"}}
+drive = {{control = "rotary-steady", velocity = {velocity}}}
+contacts.bearing.body = "joint"
+contacts.bearing.radius = {radius}
+contacts.bearing.loaded_by = "gear"
+[contacts.bearing.contact]
+law = "transmitted"
+{contact}
+[contacts.bearing.friction]
+"""
+
+
+@pytest.mark.parametrize("radius", [1.0, 0.04])
+def test_a_table_of_several_loads_tells_how_a_rig_is_given_them(tmp_path, radius):
+    """What the file's comments say is written, and has the torques of the table at loads that are not in it."""
+    speeds, path = np.array([0.1, 0.2, 0.5, 1, 2, 5, 10]), tmp_path / "joint.csv"
+
+    def torque(load):
+        return (30.0 + load) * curve(speeds, 0.1, 0.2, 0.5, 0.0, 1.0)
+
+    rows = [f"{v},{f:.12g},{load}" for load in (5, 40) for v, f in zip(speeds, torque(load), strict=True)]
+    path.write_text("\n".join(["speed [rad/s],torque [N m],load [N m]", *rows]))
+    options = {} if radius == 1.0 else {"radius": radius}
+    found = ss.experiments.fit_friction_table(path, "lugre", hold={"viscous": 0.0}, **options)
+    line = (
+        "  loads 5 N m and 40 N m: friction is in proportion to the load + internal_preload, and rises by 100 % between"
+    )
+    assert line in str(found)
+    assert "The rig file has one constant load, 22.5 N m" in str(found)
+    text = found.rig_text()
+    assert "# The table has the loads 5 N m and 40 N m; friction is in proportion to load + 30 N m.\n" in text
+    given = re.search(r'# law = "transmitted", (preload = ".*"), (transmitted = 1)\n', text)
+    friction = text[text.index('law = "lugre"') : text.index("[contacts.bearing.contact]")]
+    for load in (0.0, 17.0, 90.0):
+        for i, expected in enumerate(torque(load)):
+            contact = "\n".join(given.groups())
+            joint = JOINT.format(load=-load, velocity=speeds[i], radius=radius, contact=contact)
+            rig = ss.rig_from_text(joint + friction)
+            steady = ss.steady_state(rig).contacts["bearing"]
+            assert steady.friction_force * radius == pytest.approx(expected, rel=1e-4)
+
+
+def test_loads_that_friction_follows_alone_leave_nothing_beside_them():
+    speed = np.tile([1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2], 2)
+    load = np.repeat([500.0, 1000.0], 6)
+    table = {"speed": speed, "force": load * curve(speed, 0.1, 0.2, 1e-3, 0.0, 1.0), "load": load}
+    text = ss.experiments.fit_friction_table(table, "lugre", hold={"viscous": 0.0}).rig_text()
+    assert "# The table has the loads 500 N and 1 kN; friction is in proportion to load.\n" in text
+    assert 'law = "transmitted", preload = "0 N", transmitted = that share' in text

@@ -15,8 +15,15 @@ from steadyslip.core.quantities import PER_LOAD
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.core.version import stamped
 from steadyslip.core.written import display_units
+from steadyslip.experiments.fitting.load_dependence import (
+    dependence,
+    dragged_beside,
+    how_to_give_it,
+    pressed_beside,
+    summary,
+)
 from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedEstimate, SpeedFindings
-from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, UNTOLD
+from steadyslip.experiments.fitting.steady_curve import UNTOLD
 from steadyslip.files.specifications.layout import UNKNOWN
 
 BRISTLES, BRISTLE_DAMPING, SLIP = "bristle stiffness", "bristle damping", "slip distance"
@@ -40,7 +47,7 @@ def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
     """Least, usual and largest value of parameters of the law that a table of speeds does not tell, in law units."""
     one, turns = found.main, found.table.turns
     load = rig_load(found)
-    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load + one.beside(OFFSET))
+    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load + pressed_beside(one))
     turned = 1 / found.table.radius if found.table.radius else RAD_A_METRE
     short, usual, long = (length * (turned if turns else 1.0) for length in DEFLECTION)
     ranges: dict[str, tuple[float, float, float]] = {}
@@ -80,6 +87,7 @@ def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -
         turned = found.table.turns and found.table.radius is None
         what = "torques in N m" if turned else "forces in N"
         lines += [f"# The table has no load: it is 1 N here, and coefficients are {what}."]
+    lines += [f"# To check: {text}" for text in found.table.questions]
     lines += ["", *(_joint if found.table.turns else _axis)(found, ranges)]
     where = "contacts.bearing.friction" if found.table.turns else "friction"
     if ranges:
@@ -93,12 +101,13 @@ def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -
 
 def _axis(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
     one = found.main
-    offset, damping = one.beside(OFFSET), one.beside(DAMPING)
+    offset, damping = pressed_beside(one), dragged_beside(one)
     slowest = one.speed.min() / unit(found.table.speed_unit)[0]
     drag = [f'radiation_damping = "{damping:.6g} N s/m"  # viscous drag that does not follow the load']
     return [
         *_friction(found, ranges, "friction"), "", "[contact]", 'law = "constant"',
-        _preload(found) + (f", with {format_quantity(offset, 'N')} that presses beside the load" if offset else ""), "",
+        _preload(found) + (f", with {format_quantity(offset, 'N')} that presses beside the load" if offset else ""),
+        *how_to_give_it(found, 1.0), "",
         "[slider]", 'area = "1 m^2"  # so that forces and stresses have the same numbers',
         f'stiffness = "{STIFFNESS}"  # {CHANGE}', f'mass = "{MASS:g} kg"  # {CHANGE}',
         *(drag if damping else []), "", "[drive]",
@@ -134,7 +143,7 @@ def _at_radius(found: SpeedFindings, si_unit: str, kind: str) -> float:
 def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
     one, where = found.main, "contacts.bearing"
     slowest = one.speed.min() / unit(found.table.speed_unit)[0]
-    damping = one.beside(DAMPING)
+    damping = dragged_beside(one)
     drag = [
         "[links.drag]",
         'kind = "shaft"',
@@ -148,7 +157,7 @@ def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) 
         *(drag if damping else []), f"[{where}]", 'body = "joint"',
         _radius(found), "",
         *_friction(found, ranges, f"{where}.friction"), "",
-        f"[{where}.contact]", 'law = "constant"', _preload(found), "", "[drive]",
+        f"[{where}.contact]", 'law = "constant"', _preload(found), *how_to_give_it(found, _lever(found)), "", "[drive]",
         'control = "rotary-steady"',
         f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
     ]  # fmt: skip
@@ -167,7 +176,7 @@ def _preload(found: SpeedFindings) -> str:
         if found.table.is_coefficient
         else "the table has none"
     )
-    load = _lever(found) * (rig_load(found) + found.main.beside(OFFSET))
+    load = _lever(found) * (rig_load(found) + pressed_beside(found.main))
     return f'preload = "{load:.6g} N"  # {told}'
 
 
@@ -231,12 +240,14 @@ def words(found: SpeedFindings) -> str:
     """Whole text of a fit, about 100 columns wide."""
     table = found.table
     lines = [f"Friction of {table.source} as the law {found.law}"]
-    lines += [f"  {note}" for note in table.notes]
+    lines += [f"  to check: {note}" if note in table.questions else f"  {note}" for note in table.notes]
     for one in (found.forward, found.backward):
         lines += ["", *_direction(found, one)] if one is not None else []
     lines.append("")
     if table.turns and table.radius is None:
         lines += textwrap.wrap(AT_ONE_METRE, 100)
+    if (loads := summary(found, rig_load(found))) is not None:
+        lines += textwrap.wrap(loads, 100)
     if found.bristles is not None:
         at = "" if table.load is None else f" at {format_quantity(found.main.load, 'N m' if table.load_turns else 'N')}"
         size = "N m/rad" if table.turns else "N/m"
@@ -271,6 +282,7 @@ def _direction(found: SpeedFindings, one: DirectionFit) -> list[str]:
     if (derived := _difference(one)) is not None:
         lines.append(derived)
     lines += [f"  {note}" for note in one.notes]
+    lines += filter(None, [dependence(found, one)])
     lines += _together(one)
     return lines
 

@@ -20,10 +20,10 @@ from steadyslip.experiments.measured.columns import known_unit, listed, split_na
 from steadyslip.experiments.measured.formats import FORMATS, read_columns
 from steadyslip.experiments.measured.formats.table import Table
 from steadyslip.experiments.measured.formats.text import read_text
+from steadyslip.experiments.measured.table_questions import questions_of_table
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
 FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
-STEEPEST = 20.0  # more than friction falls from rest to its least: by some 10 with an oil film (Stribeck 1902)
 _UNITS = {
     "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
     "displacement": ("m", "rad"), "direction": ("1",),
@@ -73,6 +73,8 @@ class SpeedTable:
     load_turns : bool
     radius : float or None
         Of the contact of what turns, m; None if it is not known.
+    questions : tuple of str
+        Those of the notes that doubt the numbers.
     """
 
     source: str
@@ -85,6 +87,7 @@ class SpeedTable:
     notes: tuple[str, ...] = ()
     load_turns: bool = False
     radius: float | None = None
+    questions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,11 +113,15 @@ class PreslidingLoop:
 
 @dataclass(frozen=True)
 class _Role:
-    """A column that was found: its SI values, its unit, and the direction that its name says (0: none)."""
+    """A column that was found: its SI values, its unit, and the direction that its name says (0: none).
+
+    `is_bare` is true if the unit is assumed.
+    """
 
     values: Array
     unit: str
     side: int = 0
+    is_bare: bool = False
 
 
 def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: Any) -> SpeedTable:
@@ -156,7 +163,12 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     turns = unit(speed.unit)[1].angle == 1
     if kind != "friction" and turns != (kind == "torque"):
         says = f"got speeds in {speed.unit} and a {kind}"
-        raise _fault(source, kind, f"{says}; allowed: a force with m/s, or a torque with rad/s or rpm")
+        fix = ""
+        if speed.is_bare:
+            fix = "; the speeds have no unit: write it in the header, such as speed [rpm]"
+        elif turns:
+            fix = "; multiply rpm by the lead of the screw, in mm/rev, or the force by the radius at which it acts"
+        raise _fault(source, kind, f"{says}; allowed: a force with m/s, or a torque with rad/s or rpm{fix}")
     rows = [_stacked(speed.values, one, found.get("direction")) for one in found[kind]]
     v, f = (np.concatenate([row[i] for row in rows]) for i in range(2))
     pressed = np.tile(found["load"][0].values, len(rows)) if "load" in found else None
@@ -180,27 +192,26 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
             pressed, twisted = None, False
     elif pressed is not None and not np.all(pressed > 0):
         raise _fault(source, "load", f"got {pressed.min():g} N; allowed: loads above 0")
-    notes += _exchanged(v, f if pressed is None or np.any(pressed == 0) else f / pressed, kind)
+    friction = _unsigned(source, v, f, kind)
+    units = {role: None if columns[0].is_bare else columns[0].unit for role, columns in found.items()}
+    asked = tuple(questions_of_table(v, f, None if twisted else pressed, kind, {"load": "N", **units}))
+    notes += _signs(v, f, kind, "direction" in found)
     return SpeedTable(
-        source, v, _unsigned(source, v, f, kind), pressed, turns, kind == "friction", speed.unit, tuple(notes), twisted
-    )
+        source, v, friction, pressed, turns, kind == "friction", speed.unit, (*notes, *asked), twisted, questions=asked,
+    )  # fmt: skip
 
 
-def _exchanged(speed: Array, friction: Array, kind: str) -> list[str]:
-    """Note on friction that varies more with speed than anything that drags does; empty if it does not.
-
-    Drag grows with the square of speed at most, and what falls with speed falls by less than `STEEPEST`.
-    """
-    fast, rubs = np.abs(speed), np.abs(friction)
-    if not np.all(rubs > 0):
-        return []
-    spread, varies = fast.max() / fast.min(), rubs.max() / rubs.min()
-    if varies <= max(STEEPEST, spread**2):
-        return []
-    return [
-        f"{kind} varies by a factor of {varies:.0f} over speeds that vary by {spread:.2g}: if the names of the two "
-        "columns are exchanged, exchange them in the header"
-    ]
+def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[str]:
+    """Notes on signs that are left out."""
+    notes = []
+    if np.all(speed < 0) and not direction:
+        notes.append("all speeds are negative: the friction is that of backward motion")
+    if np.any(wrong := (friction < 0) & (speed > 0)) and not np.any((friction > 0) & (speed > 0)):
+        notes.append(
+            f"{kind} is negative at {np.sum(wrong)} forward speeds: its sign is left out, as friction opposes motion; "
+            "where the motion was backward, write those speeds negative"
+        )
+    return notes
 
 
 def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:
@@ -305,6 +316,7 @@ def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]]
         if role is None or (asked is None and chosen.get(role, (None, None))[0] is not None):
             continue
         stated = chosen.get(role, (None, None))[1] or own
+        is_bare = stated is None
         if stated is None:
             if wrong := _misfit(head, None):
                 raise _fault(str(path), name, wrong)
@@ -318,7 +330,7 @@ def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]]
         if dimension == unit("kg")[1]:
             factor *= WEIGHT
             notes.append(f"load: kg press with {WEIGHT} N each")
-        found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, _side(head)))
+        found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, _side(head), is_bare))
     for role, several in found.items():
         if len(several) > 1 and not (role in ("force", "torque", "friction") and all(one.side for one in several)):
             alike = [name for name, head in zip(table.names, heads, strict=True) if _guess(*head) == role]
@@ -435,5 +447,6 @@ def _unsigned(source: str, speed: Array, friction: Array, kind: str) -> Array:
         if np.any(own == 0) or (len(own) and np.any(np.sign(own) != np.sign(own[0]))):
             way = "forward" if side > 0 else "backward"
             raise _fault(source, kind, f"got {own.min():g} to {own.max():g} (SI) at {way} speeds; allowed: friction of "
-                         "one sign in each direction, none of it zero")  # fmt: skip
+                         "one sign in each direction, none of it zero: give rows of the other direction a negative "
+                         "speed or a column direction, and take a constant load off all")  # fmt: skip
     return np.asarray(np.abs(friction))

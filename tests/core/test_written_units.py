@@ -1,6 +1,7 @@
 """Rigs, their results and figures are told in the units of the file that the rig was read from."""
 
 import dataclasses
+import json
 import pickle
 import re
 from pathlib import Path
@@ -16,7 +17,10 @@ from javascript import Script
 from steadyslip.core.dimensions import unit
 from steadyslip.core.format import digits_apart, format_quantity, own_units
 from steadyslip.core.written import display_units
+from steadyslip.explorer.assembly import _data
+from steadyslip.explorer.equations import linear_part
 from steadyslip.reports.brief import _results_table
+from steadyslip.verdict.words import told
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 AXIS = """
@@ -112,11 +116,11 @@ def test_figures_and_fragments_have_them(axis):
 
 
 def test_an_edge_and_its_value_are_told_at_the_load_of_their_contact():
-    """Two contacts, each with a load: 4 s/m at 60 N are .24 N s/mm, and the seal has no load of 500 N."""
+    """Two contacts, each with a load: 4 s/m at 60 N are 240 N s/m, as in the file; the seal has no load of 500 N."""
     rig = ss.rig_from_text(GUIDE_AND_SEAL)
     for text, then in ((str(ss.analyze(rig)), " +-> "), (str(ss.cure(rig)), " now; from ")):
-        assert re.search(rf"guide\.friction\.viscous +0\.25 N s/mm at 500 N{then}[\d.]+ N s/mm at 500 N", text)
-        assert re.search(rf"seal\.friction\.viscous +0\.24 N s/mm at 60 N{then}[\d.]+ N s/mm at 60 N", text)
+        assert re.search(rf"guide\.friction\.viscous +250 N s/m at 500 N{then}[\d.]+ N s/m at 500 N", text)
+        assert re.search(rf"seal\.friction\.viscous +240 N s/m at 60 N{then}[\d.]+ N s/m at 60 N", text)
     assert rig.load_of("contacts.seal.friction.viscous") == 60.0
     assert rig.load_of("bodies.carriage.mass") is None
 
@@ -172,14 +176,44 @@ def test_close_values_are_told_apart():
 
 
 FAMILIES = {
-    "forces": ({}, "N", "N/µm"),
+    "forces": ({}, "N", "N/µm", ("kN", "N/um")),
     "stresses": ({'"12 N/um"': '"0.6 GPa/m"', '"240 kg"': '"12 t/m^2"', '"5 N s/mm"': '"250 kPa s/m"',
-                  '"400 N/um at 3.2 kN"': '"125000 1/m"', 'preload = "3.2 kN"': 'preload = "0.16 MPa"'}, "Pa", "MPa/m"),
-    "both": ({'preload = "3.2 kN"': 'preload = "0.16 MPa"'}, "Pa", "N/µm"),
+                  '"400 N/um at 3.2 kN"': '"125000 1/m"', 'preload = "3.2 kN"': 'preload = "0.16 MPa"'}, "Pa", "MPa/m",
+                 ("MPa", "GPa/m")),
+    "both": ({'preload = "3.2 kN"': 'preload = "0.16 MPa"'}, "Pa", "N/µm", ("MPa", "N/um")),
     "numbers": ({'"12 N/um"': "12e6", '"240 kg"': "240", '"5 N s/mm"': "5e3", '"400 N/um at 3.2 kN"': '"125000 1/m"',
-                 'preload = "3.2 kN"': "preload = 3200"}, "N", "MN/m"),
+                 'preload = "3.2 kN"': "preload = 3200"}, "N", "MN/m", ("kN", "MN/m")),
 }  # fmt: skip
-"""The axis as its author may write it: changes of the text, then units in which stress and stiffness are told."""
+"""The axis as its author may write it: changes of the text, then units in which stress and stiffness are told, and
+those of the file, in which the values and edges of preload and stiffness are told."""
+
+
+def test_a_parameter_is_told_in_its_own_unit_on_a_page_as_in_python():
+    """Edges far from the value too, as of a preload in kN below one."""
+    text = AXIS.replace(" ± 10 %", "").replace('"240 kg"', '"0.24 t"').replace('"200 cm^2"', '"0.02 m^2"')
+    rig = ss.rig_from_text(text)
+    _, facts = linear_part(rig)
+    data = _data(rig, "rig", 0, facts, text)
+    script = Script(f"{page_modules()}\ntellIn({json.dumps(data['written'])});")
+    for one in data["parameters"]:
+        given = rig.value(one["name"])
+        if one["unit"] == "1" or not given:
+            continue
+        for many in (4e-3, 0.03, 0.7, 1.0, 33.0, 300.0):
+            shown = script("told(one, value)", one={"factor": 1, "own": ["", 1, ""]} | data["usual"] | one,
+                           value=one["value"] * many)  # fmt: skip
+            with display_units(rig.written_in):
+                assert same_text(shown, told(rig, one["name"], given * many)), (one["name"], many)
+
+
+def test_forces_of_a_file_in_newtons_stay_so():
+    """A preload of 5500 N was told as 5.5 kN beside a shear force of 782.9 N, and damping in kN s/m beside N s/mm."""
+    text = AXIS.replace("3.2 kN", "5500 N").replace('"12 N/um"', '"2e6 N/m"').replace('"5 N s/mm"', '"8000 N s/m"')
+    told = str(ss.analyze(ss.rig_from_text(text)))
+    assert re.search(r"normal force 5500 N \(.*\), shear force [\d.]+ N \(", told)
+    assert re.search(r"contact.preload +5500 N +-> [\d.]+ N ", told)
+    assert re.search(r"friction.bristle_damping +0 N s/m at 5500 N +-> [\d.e+]+ N s/m at 5500 N ", told)
+    assert "kN s/mm" not in told
 
 
 def test_an_area_given_later_makes_forces():
@@ -192,7 +226,7 @@ def test_an_area_given_later_makes_forces():
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_file_is_told_in_the_forces_or_stresses_that_it_is_written_in(family, tmp_path):
     """Each quantity in its own; a file in MPa with an area was told in forces, in texts, figures, maps and pages."""
-    changes, pressed, stiff = FAMILIES[family]
+    changes, pressed, stiff, (preload, own_stiff) = FAMILIES[family]
     text = AXIS
     for one, other in changes.items():
         assert one in text
@@ -201,8 +235,10 @@ def test_a_file_is_told_in_the_forces_or_stresses_that_it_is_written_in(family, 
     word = {"N": "force", "Pa": "stress"}[pressed]
     told, plain_stiff = str(ss.analyze(rig)), stiff.replace("µ", "u")
     assert re.search(rf"normal {word} [\d.]+ k{pressed} \(", told)
-    assert re.search(rf"critical stiffness [\d.]+ {plain_stiff}\b", told)
-    assert re.search(rf"contact.preload +[\d.]+ k{pressed} ", told)
+    assert re.search(
+        rf"the stiffness [\d.]+ {own_stiff} is [\d.]+ times the critical stiffness [\d.]+ {own_stiff}\b", told
+    )
+    assert re.search(rf"contact.preload +[\d.]+ {preload} +-> [\d.]+ {preload} ", told)
     assert re.search(rf"normal {word} +[\d.]+ k{pressed} to", str(ss.simulate(rig, until=0.1)))
     assert re.search(rf"normal {word} [\d.]+ k{pressed}, shear {word}", str(ss.steady_state(rig)))
     assert str(ss.boundary(rig, "stiffness")[0]).split()[3] == f"{plain_stiff}:"

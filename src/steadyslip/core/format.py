@@ -18,6 +18,8 @@ _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "
 
 
 _SPEED, _ANGLE, _TURNING = (unit(name)[1] for name in ("m/s", "rad", "rad/s"))
+_PLAIN_FORCE = re.compile(r"(?:N|Pa)(?![A-Za-z])")
+"""Unit of a force, stress or what is in proportion to one, without a prefix."""
 _FINE = ("arcsec", "arcmin")
 """Parts of a degree: whoever writes one has the others told in it too."""
 
@@ -27,15 +29,15 @@ def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     """Units of a context by dimension, where one of them differs from the default by more than a leading prefix.
 
     Speeds and all that turns are told with the prefixes of the context as well, and angles in what its speeds of
-    turning have, or these in what its angles have.
+    turning have, or these in what its angles have. Forces and stresses that it has in N or Pa alone, without a prefix,
+    are told so too.
     """
-    found: dict[Dimension, set[str]] = {}
-    for name in names:
-        found.setdefault(unit(name)[1], set()).add(name)
+    found = {kind: set(several) for kind, several in _by_dimension(names).items()}
     loads = {name.partition(" at ")[2] for name in names if " at " in name}
     for kind, si in _PER_LOAD.items():  # what is told at a load is so throughout
         if loads and not any(" at " in name for name in found.get(kind, ())):
-            found[kind] = {f"{si} at {load}" for load in loads}
+            of_forces = found.get(unit(si)[1]) or {si}
+            found[kind] = {f"{one} at {load}" for load in loads for one in of_forces}
     for kind, other, add in ((_ANGLE, _TURNING, ""), (_TURNING, _ANGLE, "/s")):
         fine = {name.removesuffix("/s") for name in found.get(other, ())}.intersection(_FINE)
         if fine and kind not in found:
@@ -46,8 +48,15 @@ def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     return {
         kind: tuple(sorted(several))
         for kind, several in found.items()
-        if kind == _SPEED or kind.angle or any(map(_is_own, several))
+        if kind == _SPEED or kind.angle or any(map(_is_own, several)) or all(map(_PLAIN_FORCE.match, several))
     }
+
+
+def _by_dimension(names: frozenset[str]) -> dict[Dimension, set[str]]:
+    found: dict[Dimension, set[str]] = {}
+    for name in names:
+        found.setdefault(unit(name)[1], set()).add(name)
+    return found
 
 
 def units_for(si_unit: str, names: frozenset[str]) -> tuple[str, ...]:
@@ -156,10 +165,47 @@ def format_like(value: float, like: float, si_unit: str, digits: int = 4, area: 
     ('0.8 kN', '2 N', '0 kN')
     """
     factor, si_unit = outside(si_unit, told_area(si_unit, area))
-    name = format_quantity(like * factor, si_unit).partition(" ")[2]
+    name = written_unit(like * factor, si_unit) or format_quantity(like * factor, si_unit).partition(" ")[2]
     size = unit(name)[0] if name and like and math.isfinite(like) else 0.0
     if size and (value == 0 or 0.1 * _SHORTEST <= abs(value * factor / size) < _LONGEST):
         return f"{_few(value * factor / size, digits)} {name}"
+    return format_quantity(value * factor, si_unit, digits)
+
+
+def written_unit(value: float, si_unit: str) -> str:
+    """Unit of the context in which an SI value was written: of several the one in which it is closest to 10.
+
+    Empty where there is none of its dimension, or the value would be too long in it.
+
+    >>> from steadyslip.core.written import display_units
+    >>> with display_units(["kN", "N m/rad", "N m/arcsec"]):
+    ...     [written_unit(*one) for one in ((3200.0, "N"), (0.8, "N m/rad"), (9.3e5, "N m/rad"), (1.0, "m"))]
+    ['kN', 'N m/rad', 'N m/arcsec', '']
+    """
+    if not _SCALED.match(si_unit) or not math.isfinite(value):
+        return ""
+    name = _best(value, tuple(sorted(_by_dimension(display_names()).get(unit(si_unit)[1], ()))))
+    longest = _LONGEST if name and _is_own(name) else _LONG
+    return name if name and " at " not in name and _SHORTEST <= abs(value / unit(name)[0]) < longest else ""
+
+
+def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
+    """Format a value of a parameter in the unit in which its `own` one was written, unless it is too long in that.
+
+    Without such a unit in the context it is formatted by itself.
+
+    >>> from steadyslip.core.written import display_units
+    >>> with display_units(["kN"]):
+    ...     format_as_written(800.0, 3200.0, "N"), format_as_written(0.8, 3200.0, "N"), format_quantity(800.0, "N")
+    ('0.8 kN', '0.8 N', '800 N')
+    """
+    factor, si_unit = outside(si_unit, told_area(si_unit, area))
+    name = written_unit(own * factor, si_unit)
+    longest = _LONGEST if name and _is_own(name) else _LONG
+    number = value * factor / unit(name)[0] if name else math.inf
+    if number == 0 or _SHORTEST <= abs(number) < longest:
+        name = _turned(value * factor, name)
+        return f"{_few(value * factor / unit(name)[0], digits)} {name}"
     return format_quantity(value * factor, si_unit, digits)
 
 

@@ -24,9 +24,11 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
     """Context in which quantities are formatted in the user's units, such as rpm, bar, mm^2 or N/um.
 
     They are added to those of the context around. Of several units of a dimension the one is used whose number is
-    closest to 10. Units that differ from the default by a leading prefix alone, such as kN or um, have no effect,
-    since a suitable prefix is chosen in any case; but speeds and all that turns keep theirs, from 0.001 to 10 000 of
-    it. Friction per load is told at the largest load that is named, or that which `of_load` picks.
+    closest to 10. Units that differ from the default by a leading prefix alone, such as kN or um, have no effect on
+    results, since a suitable prefix is chosen in any case; but speeds and all that turns keep theirs, from 0.001 to
+    10 000 of it, forces and stresses that are in N or Pa alone those, and parameters what they were written in
+    (`steadyslip.core.format.format_as_written`). Friction per load is told at the largest load that is named, or that
+    which `of_load` picks.
 
     >>> from steadyslip.core.format import format_quantity
     >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_as_written, format_quantity
 from steadyslip.verdict.causes import ILL_POSED, why_always_stable, why_ill_posed, why_never_stable
 from steadyslip.verdict.support import gain_words, support_stiffness
 
@@ -92,5 +92,6 @@ def _many(ratio: float) -> str:
 
 
 def in_stiffness(analysis: Findings, value: float) -> str:
-    """Format a stiffness given in Pa/m; as N/m of the whole contact where the rig has an area."""
-    return format_quantity(value, "Pa/m", area=analysis.rig.area)
+    """Format a stiffness (Pa/m) in the unit of the rig's own; as N/m of the contact where the rig has an area."""
+    own = analysis.rig.value(analysis.rig.stiffness_name()) or 0.0
+    return format_as_written(value, own, "Pa/m", area=analysis.rig.area)

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
-from steadyslip.core.format import digits_apart, format_growth, format_quantity, format_range
+from steadyslip.core.format import digits_apart, format_as_written, format_growth, format_quantity, format_range
 from steadyslip.core.written import of_load
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.machine.letters import said
@@ -113,8 +113,9 @@ def headline(analysis: Findings, capitals: bool = True) -> str:
 def told(rig: Rig, name: str, value: float, beside: float | None = None) -> str:
     """Value of a parameter in words, with as many digits as tell it from another `beside` it."""
     digits = 4 if beside is None else digits_apart(value, beside)
+    own, (number, unit) = rig.told(name, rig.parameters()[name].value or 0.0)[0], rig.told(name, value)
     with of_load(rig.load_of(name)):
-        return format_quantity(*rig.told(name, value), digits, area=rig.printed_area(name))
+        return format_as_written(number, own, unit, digits, area=rig.printed_area(name))
 
 
 def told_range(rig: Rig, name: str, low: float, high: float) -> str:

@@ -74,7 +74,7 @@ export function parse(text, si, unit, own = ["", 1]) {
 }
 
 /** Unit with print typography: µm, m². @param {string} name */
-export const printed = (name) => name.replace(/(?<![A-Za-z])[uμ](?=[A-Za-z])/g, "µ").replace(/\^?2(?!\d)/g, "²").replace(/\^?3(?!\d)/g, "³");
+export const printed = (name) => name.replace(/(?<![A-Za-z])[uμ](?=[A-Za-z])/g, "µ").replace(/(?<=[A-Za-z])\^?2(?!\d)/g, "²").replace(/(?<=[A-Za-z])\^?3(?!\d)/g, "³"); // not those of "at 3.2 kN"
 
 /** Unit in a text of number and unit; empty if it has none. @param {string} text */
 export const unitIn = (text) => NUMBER.exec(text.slice(0, 200))?.[2] ?? "";

@@ -179,3 +179,16 @@ def test_the_drop_of_a_body_that_turns_is_a_torque_at_whatever_radius(radius):
     assert drop == pytest.approx(last.force_drop * radius, rel=5e-3)
     assert f"torque drop {last.force_drop * radius:.4g} N m" in run.summary()
     assert "arrests" not in run.summary()  # hundreds where it rings
+
+
+def test_the_swing_of_cycles_of_a_body_that_turns_is_a_torque_at_whatever_radius():
+    found = []
+    for radius in (1.0, 0.05):
+        text = JOINT.format(radius=radius, speed=0.73 * radius, bristles=2300 / radius, preload=33.6 / radius)
+        rig = ss.rig_from_text(text.replace("[contacts.bearing]", '[links.drag]\nkind = "shaft"\nbetween = ["joint", '
+                                            '"ground"]\ndamping = "0.1 N m s/rad"\n[contacts.bearing]'))  # fmt: skip
+        found.append(ss.cycles(rig, "contacts.bearing.friction.mu_static", between=(0.1, 0.12)))
+    (swings, unit), (others, _) = (one.swings() for one in found)
+    assert unit == "N m"
+    assert max(others) == pytest.approx(max(swings), rel=1e-3)
+    assert f"torque swing up to {max(swings):.4g} N m" in str(found[0])

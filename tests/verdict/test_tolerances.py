@@ -370,3 +370,11 @@ def test_the_command_line_says_how_sure_a_verdict_is(axis):
     data = json.loads(run("analyze", axis, "--json").stdout)["tolerances"]
     assert data["chance"] == pytest.approx(0.2437, abs=2e-3)
     assert {one["parameter"] for one in data["parameters"]} >= {"slider.stiffness", "contact.preload"}
+
+
+def test_a_chance_beside_what_is_not_known_says_of_which_values_it_is():
+    """`cure` and `compare` tell the least over what is not known."""
+    within = Tolerances({"stiffness": Tolerance("10 %", "10 %", False)}, unknown={"friction.b": (0.015, 0.018)})
+    first, *_ = str(ss.tolerate(OWN, within)).splitlines()
+    assert first.endswith(", with the file's values of what is not known")
+    assert "not known" not in str(ss.tolerate(OWN, {"stiffness": "10 %"}))

@@ -314,15 +314,15 @@ def _slip_table(result: History) -> Iterator[str]:
 @parts_of.register
 def _branch(result: CycleBranch) -> Parts:
     along, unit, area = result.along, result.unit, result.rig.printed_area(result.along)
-    stress, drop = result.rig.result_unit("Pa"), result.rig.result_name("stress swing")
+    swings, of = result.swings()
     first, _, rest = str(result).partition("\n")
     words = said(result.rig, along)
     rows = [
         (format_quantity(one.value, unit, area=area), format_quantity(one.period, "s"),
          format_quantity(one.peak_velocity, "m/s"),
-         format_quantity(one.stress_drop, stress, area=area if stress == "Pa" else None),
+         format_quantity(float(swing), of, area=area if of == "Pa" else None),
          "attracts" if one.stable else "unstable")
-        for one in result.cycles
+        for one, swing in zip(result.cycles, swings, strict=True)
     ]  # fmt: skip
     listed = _distinct_rows(rows)
     special = [
@@ -335,7 +335,7 @@ def _branch(result: CycleBranch) -> Parts:
         figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5),
                f"Cycles along {words}."),
         table(special, ("special", words, "period")),
-        table(listed, (words, "period", "peak velocity", drop, ""), left=False),
+        table(listed, (words, "period", "peak velocity", result.swing_label, ""), left=False),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
     question = f"Which stick-slip cycles does this rig have as {words} varies?"

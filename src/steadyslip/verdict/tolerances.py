@@ -129,7 +129,8 @@ class Tolerated(ReadOnly):
 
     def __str__(self) -> str:
         wide = max(26, 2 + max(len(one.parameter) for one in self.alone))
-        lines = [self.headline()]
+        unknown = isinstance(self.tolerances, Tolerances) and self.tolerances.unknown
+        lines = [self.headline() + (", with the file's values of what is not known" if unknown else "")]
         if not np.all(self.exists):
             lines.append(f"{'no steady sliding':<{wide}}in {format_percent(1 - float(np.mean(self.exists)))} of them")
         own = self.along == STIFFNESS

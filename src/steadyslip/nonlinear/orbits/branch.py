@@ -268,9 +268,22 @@ class CycleBranch(Displayed):
         return draw(self, kind, ax=ax)
 
     @property
-    def _drop(self) -> str:
-        """Label of `stress_drop` (`force_drop` of a machine), apart from the drop in which an event of a run ends."""
+    def swing_label(self) -> str:
+        """Label of `swings`, apart from the drop in which an event of a run ends."""
+        if self.cycles and self._lever(self.cycles[0]) is not None:
+            return "torque swing"
         return stress_name(self.rig.result_name("stress swing"), self.rig.area)
+
+    def swings(self) -> tuple[Array, str]:
+        """Swing of what pulls along the branch and its unit: Pa, of a machine N, at a body that turns N m."""
+        levers = [self._lever(one) for one in self.cycles]
+        unit = "N m" if any(one is not None for one in levers) else self.rig.result_unit("Pa")
+        return np.array([one.stress_drop * (by or 1.0) for one, by in zip(self.cycles, levers, strict=True)]), unit
+
+    def _lever(self, cycle: Cycle) -> float | None:
+        """Radius (m) of the contact of a cycle whose body turns, which may be what varies; None for others."""
+        lever = self.rig.lever_at(cycle.contact) if cycle.contact else None
+        return cycle.value if lever is not None and self.along == f"contacts.{cycle.contact}.radius" else lever
 
     @property
     def interrupted(self) -> bool:
@@ -286,18 +299,17 @@ class CycleBranch(Displayed):
         """Summary of the branch and of those of twice the period."""
         area = self._area("value")
         edge = format_quantity(self.onset.value, self.unit, 6, area)
-        drops, drop_unit = self.rig.result_name("stress_drop"), self.rig.result_unit("Pa")
         lines = [f"cycles along {self.along} from the {self.onset.title} at {edge}: {len(self.cycles)} cycles"]
         if self.cycles:
             v = self["peak_velocity"], self["lowest_velocity"]
-            period, drop = self["period"], self[drops]
+            period, (swing, swing_unit) = self["period"], self.swings()
             where = f" at {self.cycles[0].contact}" if self.cycles[0].contact else ""
             lines += [
                 f"  velocity     {format_quantity(float(v[1].min()), 'm/s')} to "
                 f"{format_quantity(float(v[0].max()), 'm/s')}{where}",
                 f"  period       {format_quantity(float(period.min()), 's')} to "
                 f"{format_quantity(float(period.max()), 's')}",
-                f"  {self._drop:<13}up to {format_quantity(float(drop.max()), drop_unit, area=self._area(drops))}",
+                f"  {self.swing_label:<13}up to {format_quantity(float(swing.max()), swing_unit, area=area)}",
                 f"  stable       {_stable(self)}",
             ]
         for point in self.special:

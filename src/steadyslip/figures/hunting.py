@@ -33,7 +33,7 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
     across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)
     series = (
         (f"target less place{result.at_body}", result.error, result.unit),
-        ("force of the drive", result.force, result.force_unit),
+        (result.force_label, result.force, result.force_unit),
     )
     for axes, (name, values, si) in zip(panels, series, strict=True):
         area = result.rig.area if si == "Pa" else None

@@ -122,3 +122,11 @@ def test_what_hangs_on_a_soft_gear_rests_off_the_target():
     assert -mount.lowest * 928200 == pytest.approx(2500, abs=0.006 * 28e3 * 0.45)
     off = f"{np.degrees(-mount.lowest):.4g}"
     assert hunt.sentence.startswith(f"SETTLES on the target at motor ({off} deg off it at mount) after")
+
+
+def test_figures_and_tables_name_the_body_and_the_torque(tmp_path):
+    labels = [axes.get_ylabel() for axes in found().plot()]
+    assert labels == ["target less place at motor (deg)", "torque of the drive (mN m)"]
+    found().to_csv(tmp_path / "run.csv")
+    head = (tmp_path / "run.csv").read_text().partition("\n")[0]
+    assert head == "time (s),target less place at motor (rad),speed (rad/s),torque of the drive (N m)"

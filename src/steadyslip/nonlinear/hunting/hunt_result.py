@@ -130,6 +130,11 @@ class Hunt(ReadOnly):
         """Name of the body of `error`, as " at motor"; empty for a rig with one body."""
         return f" at {name}" if (name := told_body(self.rig)) else ""
 
+    @property
+    def force_label(self) -> str:
+        """Name of `force`, which is a torque where the drive turns."""
+        return "torque of the drive" if self.rig.drive.turns else "force of the drive"
+
     def _sizes(self, both: bool) -> str:
         """How far the bodies are from their targets, to `both` sides or the larger of them, with their names."""
         own = self._size(self.lowest, self.highest, self.unit, both)
@@ -261,7 +266,7 @@ class Hunt(ReadOnly):
             "time (s)": self.time,
             f"target less place{self.at_body} ({self.unit})": self.error,
             f"speed ({self.unit}/s)": self.velocity,
-            f"force of the drive ({force})": factor * self.force,
+            f"{self.force_label} ({force})": factor * self.force,
         }
         write_columns(path, columns, "%.12g")
 

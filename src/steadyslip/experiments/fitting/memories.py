@@ -1,12 +1,13 @@
 """Memories of normal stress with which a law that has none fits as well: what they change is not determined.
 
 A step of normal stress is answered by the memory (α) and by a, b, d_c and the spring together. A law without a memory
-takes α to be 0, and then tells the others with small errors that hold only if α is 0.
+takes α to be 0, and then tells the others with small errors that hold only if α is 0. Another evolution law may need a
+memory where this one needs none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -16,7 +17,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.estimates import LEAST_CHANGE, Combination, combination, is_time
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.remedies import Remedy, remedy, with_words
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedy, with_words
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.numerics.least_squares import minimise
 
@@ -78,20 +79,29 @@ def equal_memories(
     independent : float
         Number of independent samples in its residuals.
     """
-    space, most = plan.space(), ssq * np.exp(AS_GOOD / independent)
-    found = [one for own in _with_memory(plan) for one in _rivals(plan, own, ssq, values)]
-    found = [one for one in found if one.remedy.ssq < most and np.any(one.far(space, deviations, NEAR))]
+    if not forgets_changes(plan):
+        return []
+    space, most = plan.space(), ssq * float(np.exp(AS_GOOD / independent))
+    others = product(*plan.rig.friction.decided_besides.values())
+    found: list[Rival] = []
+    for form in ((), *others):  # its own evolution law first
+        if found and max(one.remedy.gain for one in found) < STRONG_EVIDENCE:
+            break  # open already
+        near = [one for own in _with_memory(plan, form) for one in _rivals(plan, own, ssq, values, most)]
+        found += [one for one in near if one.remedy.ssq < most and np.any(one.far(space, deviations, NEAR))]
     return sorted(found, key=lambda one: -one.remedy.gain)
 
 
-def _with_memory(plan: Plan) -> Iterator[Plan]:
-    for words in product(*plan.rig.friction.decided_by_stress.values()) if forgets_changes(plan) else ():
-        own = with_words(plan, words)
+def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
+    """Plans with each memory of normal stress; `form` are words of an evolution law, none for the plan's own."""
+    for words in product(*plan.rig.friction.decided_by_stress.values()):
+        own = with_words(plan, [*form, *words])
         if not own.rig.friction.forgets_stress():
             yield own
 
 
-def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float]) -> Iterator[Rival]:
+def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most: float) -> Iterator[Rival]:
+    """Minima of a plan with a memory from those without; searches that will not get to `most` end early."""
     space, addresses = own.space(), own.rig.parameters()
     idle, tried = np.zeros(len(space)), np.zeros(len(space))
     for i, one in enumerate(space.unknowns):
@@ -104,7 +114,9 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float]) -> I
     comparison = own.comparison(Effort(budget=budget))
     begin, held = idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1))
     low, high = np.transpose([one.bounds for one in space.unknowns])
-    ends = minimise(lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=budget.part(np.inf))
+    ends = minimise(
+        lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=budget.part(np.inf), known=most
+    )
     for z in ends.coordinates[np.isfinite(ends.ssq)]:
         yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - idle)
 

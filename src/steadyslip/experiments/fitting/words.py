@@ -252,7 +252,7 @@ def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
 def _equal_memories(fit: FitNumbers) -> str:
     """Clause on the memories of normal stress with which the fit is as good, of a law that has none."""
     if not fit.remedies:
-        return "residuals are noise, and with a memory the fit is worse, which speaks for none"
+        return "residuals are noise, and with the memories that were tried the fit is worse, which speaks for none"
     before = _weakening(fit, fit.values)
     best = max(fit.remedies, key=lambda one: abs(_weakening(fit, one.values) - before))
     after = _weakening(fit, best.values)

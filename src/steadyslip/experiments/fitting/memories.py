@@ -19,7 +19,7 @@ from steadyslip.experiments.fitting.estimates import LEAST_CHANGE, Combination, 
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedy, with_words
 from steadyslip.experiments.fitting.unknowns import Space
-from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
 SIZES = (0.5, 1.0, 1.5, 2.5)  # natural sizes of a memory that are tried: α .1 to .5, as laboratories find
 AS_GOOD = 3.84  # rise of −2 log likelihood up to which a fit is as good: 95 %
@@ -61,11 +61,17 @@ def forgets_changes(plan: Plan) -> bool:
     return changes and plan.pressed and bool(plan.rig.friction.forgets_stress())
 
 
+def stress_alone(plan: Plan) -> bool:
+    """True if the normal stress changes in a record and drives the contact, and the rate of no record changes."""
+    steady = all(channel != "load" for loading in plan.loading for channel, *_ in loading.changes)
+    return steady and plan.pressed and any(record.stress_changes for record in plan.records)
+
+
 def equal_memories(
     plan: Plan, ssq: float, values: Mapping[str, float], deviations: Array, independent: float
 ) -> list[Rival]:
-    """Minima with a memory of normal stress held at each of several sizes, that fit as well as none and change more
-    than errors say.
+    """Minima with another memory of normal stress held at each of several sizes, that fit as well as the law's own and
+    change more than errors say; of a law that has one only where nothing but the normal stress changes.
 
     Parameters
     ----------
@@ -79,15 +85,18 @@ def equal_memories(
     independent : float
         Number of independent samples in its residuals.
     """
-    if not forgets_changes(plan):
+    if not (forgets_changes(plan) or stress_alone(plan)):
         return []
     space, most = plan.space(), ssq * float(np.exp(AS_GOOD / independent))
     others = product(*plan.rig.friction.decided_besides.values())
     found: list[Rival] = []
+    laws = [plan.rig.friction]
     for form in ((), *others):  # its own evolution law first
         if found and max(one.remedy.gain for one in found) < STRONG_EVIDENCE:
             break  # open already
-        near = [one for own in _with_memory(plan, form) for one in _rivals(plan, own, ssq, values, most)]
+        new = [own for own in _with_memory(plan, form) if own.rig.friction not in laws]
+        laws += [own.rig.friction for own in new]
+        near = [one for own in new for one in _rivals(plan, own, ssq, values, most)]
         found += [one for one in near if one.remedy.ssq < most and np.any(one.far(space, deviations, NEAR))]
     return sorted(found, key=lambda one: -one.remedy.gain)
 
@@ -103,22 +112,27 @@ def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
 def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most: float) -> Iterator[Rival]:
     """Minima of a plan with a memory from those without; searches that will not get to `most` end early."""
     space, addresses = own.space(), own.rig.parameters()
-    idle, tried = np.zeros(len(space)), np.zeros(len(space))
+    remembers = tuple(f"friction.{field}." for field in own.rig.friction.decided_by_stress)
+    here, idle, tried = (np.zeros(len(space)) for _ in range(3))
     for i, one in enumerate(space.unknowns):
         known = values[one.name] if one.name in values else addresses[one.parameter].value
-        none = addresses[one.parameter].role.idle if one.name not in values else None
+        none = addresses[one.parameter].role.idle if one.parameter.startswith(remembers) else None
         if none is not None:
-            known, tried[i] = none, 1.0 if none < one.high else -1.0
-        idle[i] = float(one.coordinate(known))
+            known, tried[i] = values.get(one.name, none), 1.0 if none < one.high else -1.0
+        here[i], idle[i] = (float(one.coordinate(known if value is None else value)) for value in (None, none))
     budget = Budget.of_fit(sum(map(len, own.records)), len(space))
     comparison = own.comparison(Effort(budget=budget))
-    begin, held = idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1))
     low, high = np.transpose([one.bounds for one in space.unknowns])
-    ends = minimise(
-        lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=budget.part(np.inf), known=most
-    )
+
+    def minima(begin: Array, held: Array | None) -> Minima:
+        stop = budget.part(np.inf)
+        return minimise(lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=stop, known=most)
+
+    ends = minima(idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1)))
+    if most < np.min(ends.ssq) < np.inf:  # perhaps between two sizes
+        ends = minima(ends.sorted().coordinates[:1], None)
     for z in ends.coordinates[np.isfinite(ends.ssq)]:
-        yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - idle)
+        yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - here)
 
 
 def opened(space: Space, covariance: Array, rivals: list[Rival]) -> tuple[Array, tuple[Combination, ...]]:

@@ -14,7 +14,7 @@ from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fitted import Fitted
-from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened
+from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened, stress_alone
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, continued, mended, remedies
@@ -111,16 +111,19 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
             ended = self.search.converged
             reached = self.ssq if ended else continued(self.plan, self.ssq, self.values)
             return remedies(self.plan, reached, self.values)
-        return tuple(one.remedy for one in self._equal_memories())
+        return tuple(one.remedy for one in self._equal_memories()) if forgets else ()
 
     def with_memories(self) -> Self:
         """The same fit, with wider errors of what a memory of normal stress that fits as well moves, or none if far.
 
         Where one fits better, the text says so, as it does where residuals have structure.
         """
-        if not (forgets_changes(self.plan) and self.search.converged) or self.whiteness.p < STRUCTURE:
+        forgets = forgets_changes(self.plan)
+        if not ((forgets or stress_alone(self.plan)) and self.search.converged) or self.whiteness.p < STRUCTURE:
             return self
         rivals = self._equal_memories()
+        if not (rivals or forgets):
+            return self
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
         covariance, found = opened(self.space, self.covariance, equal if len(equal) == len(rivals) else [])
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found)

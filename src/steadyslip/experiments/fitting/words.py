@@ -214,7 +214,9 @@ def _structure(fit: FitNumbers) -> list[str]:
         tried = "; ".join(one.choice for one in fit.remedies)
         return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
     if best is None:
-        return [f"{said}; {_equal_memories(fit)}"] if forgets else []
+        if not forgets and fit.remedies:
+            said = f"only the normal stress changes in {enumerated(changing)}"
+        return [f"{said}; {_equal_memories(fit)}"] if forgets or fit.remedies else []
     rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {chance(best.p)})"
     return [
         f"{said}: with {_asked(fit, best)} the sum of squares is {best.ssq / fit.ssq:.2g} of this, "
@@ -257,8 +259,9 @@ def _equal_memories(fit: FitNumbers) -> str:
     best = max(fit.remedies, key=lambda one: abs(_weakening(fit, one.values) - before))
     after = _weakening(fit, best.values)
     sign = ", so that not even its sign is determined" if before * after < 0 else ""
+    taken = "it takes that to be none; " if forgets_changes(fit.plan) else ""
     return (
-        f"it takes that to be none; the record is fitted as well with {_asked(fit, best)}, where a - b is {after:.2g} "
+        f"{taken}the record is fitted as well with {_asked(fit, best)}, where a - b is {after:.2g} "
         f"in place of {before:.2g}{sign}, {', '.join(_moved(fit, best))}; ask for that with --set (lab_rig in Python)"
     )
 

@@ -26,6 +26,19 @@ export class Controls {
       this.box.append(row.box);
       return row;
     });
+    this.hidden = new Set(); // rows out of view
+    const watch = new IntersectionObserver((all) => {
+      for (const one of all) {
+        if (one.isIntersecting) this.hidden.delete(one.target);
+        else this.hidden.add(one.target);
+      }
+    });
+    for (const { box } of this.rows) watch.observe(box);
+  }
+
+  /** True if the row of a parameter can be seen. @param {number} i */
+  inView(i) {
+    return !this.hidden.has(this.rows[i].box);
   }
 
   row(one, i) {
@@ -96,6 +109,7 @@ export class Controls {
   show() {
     const { rig, tracks } = this.page;
     this.rows.forEach(({ box, slider, text, name, refused }, i) => {
+      if (!this.page.due(i)) return;
       const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = unitFor(one, value);
       const place = String(STEPS * this.page.scale(i).of(value)), typed = (many) => `${Number((value / factor).toPrecision(many))} ${unit}`.trim(), words = typed(typed(6).length > ROOM ? 4 : 6);
       if (slider.value !== place) slider.value = place;

@@ -8,6 +8,7 @@ import { digits, told } from "./quantities.js";
 import { kindWords } from "./words.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be searched, which is slow
+const THINNED = 2.5; // factor of fewer rows while a slider moves
 const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows of machines and of sliders, and levels of k/k_cr
 const FEW = 5; // steps of the search for a contour of a machine on a side of a cell: each is some .2 ms, and the growth rate is smooth
 const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
@@ -75,7 +76,7 @@ export class Chart {
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
     this.choices.forEach((select, which) => (select.selectedIndex = this.axes[which]));
-    const rows = (facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? 2 : 1); // half the rows while a slider moves
+    const rows = Math.round((facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? THINNED : 1));
     const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
     if (others !== this.painted || rows > this.rows) { // regions are painted anew only if other values change or more rows are wanted
       [this.painted, this.rows] = [others, rows];

@@ -22,6 +22,7 @@ const OTHERS = 40; // values of the bar parameter at which eigenvalues are drawn
 const SOUGHT = 1e3; // factor beyond a slider range within which it is widened to reach a change of status
 const OPENED = { values: "values", chart: "chart", motion: "motion", numbers: "numbers" }; // parts of a narrow page, shown one at a time
 const SAID = 4000, NAMED = 4; // SAID: ms for which a notice is shown; NAMED: most parts of a refused link that it lists
+const TURNS = 4; // redraws in which every row out of view has its turn while a slider moves
 const DRAWN = 1e150; // larger numbers, and those below its inverse, are on no scale
 
 export class Page {
@@ -39,6 +40,7 @@ export class Page {
   size = WIDE;
   guessing = false;
   wide = 0; // width of the bar, px
+  turn = 0; // which rows out of view are updated while a slider moves
   part = OPENED.values; // part shown on a narrow page
   first = /** @type {Record<string, string>} */ ({}); // initial choices of the page
 
@@ -323,10 +325,17 @@ export class Page {
 
   // -- results that depend on the values
 
+  /** True for a parameter whose row must be updated now: while a slider moves, rows out of view take turns, but for that on the bar and that of the nearest edge. @param {number} i */
+  due(i) {
+    return !this.sliding || i % TURNS === this.turn || i === this.rig.bar || i === this.nearest || !this.controls || this.controls.inView(i);
+  }
+
   /** Update the changes of status along every parameter; those of a parameter stay while only it changes. */
   search() {
     const { rig, sliding, ranges } = this, { values } = rig;
+    this.turn = (this.turn + 1) % TURNS;
     rig.data.parameters.forEach((_, i) => {
+      if (!this.due(i)) return;
       const known = this.found[i], range = ranges?.[i], moved = known && values.some((value, j) => !(i === j && sliding) && !Object.is(value, known.values[j]));
       if (!known || moved || (known.coarse && !sliding) || (range && (range[0] < known.low || range[1] > known.high))) this.found[i] = { ...changes(rig, i, range, sliding), values, coarse: sliding };
     });
@@ -395,7 +404,9 @@ export class Page {
     this.redoButton.disabled = !this.future.length;
     if (!this.controls) return;
     this.trace();
-    this.banner.follow(this.answer, this.edges()[0]);
+    const [first] = this.edges();
+    this.nearest = first?.i;
+    this.banner.follow(this.answer, first);
     this.means.hidden = this.answer.status !== STABLE;
     this.controls.show();
     this.chart.show();

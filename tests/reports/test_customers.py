@@ -5,6 +5,7 @@ import inspect
 import re
 from itertools import product
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -18,7 +19,7 @@ from steadyslip.linear.formula import MEANINGS, formula_in_parts
 from steadyslip.machine.letters import said
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
-from steadyslip.reports.elements import _LINE, _lines, equation
+from steadyslip.reports.elements import _LINE, _PIECE, _lines, equation, math
 from steadyslip.reports.literature import PUBLICATIONS, cited
 from steadyslip.reports.recommendation import Order, recommendation
 from steadyslip.reports.rig import edge_table, input_table
@@ -188,7 +189,27 @@ def test_long_sums_go_on_in_further_lines():
         lines = _lines(terms)
         assert [term for line in lines for term in line] == terms
         assert all(len(line) == 1 or len(" + ".join(map(str, line))) <= _LINE for line in lines)
-        assert equation(one).count("<mtr>") == (len(lines) if len(lines) > 1 else 0)
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_formulas_break_into_parts_that_a_telephone_shows(path):
+    """Every sign of a formula stands in one of them; lines fit a page, and what is no fraction a telephone."""
+    for one in printed(ss.read_rig(path)):
+        text = equation(one)
+        inner = re.sub("^<div.*?><math.*?>|</math></div>$", "", text)
+        tree = ElementTree.fromstring(f"<mrow>{inner}</mrow>")
+        rows = [cell for row in tree.iter("mtr") for cell in list(row)[1:]] or [tree]
+        assert all(len(signs(ElementTree.tostring(row, "unicode"))) <= 1.2 * _LINE for row in rows)
+        parts = [ElementTree.tostring(part, "unicode") for row in rows for part in row]
+        assert all(len(signs(part)) <= 1.6 * _PIECE for part in parts if "<mfrac" not in part)  # subscripts are small
+        side = one.args[0] if one.args[1] == 0 else one.args[1]
+        whole = "".join(signs(math(term)) for term in side.as_ordered_terms())
+        assert re.sub("[+−]", "", whole) in re.sub("[+−]", "", signs(text))
+
+
+def signs(markup):
+    """Signs of a formula, without elements and space."""
+    return re.sub("\\s|\u2062", "", html.unescape(re.sub("<.*?>", "", str(markup))))
 
 
 def test_values_of_inline_tables_are_of_the_file():

@@ -22,9 +22,10 @@ _RESERVED = frozenset(
 _GLOBAL = frozenset(
     re.findall(
         r"\w+",
-        "Array BigInt Blob Boolean Date DOMParser Error Float64Array Image Infinity IntersectionObserver Map Math NaN "
-        "Number Object Promise ResizeObserver Set String URL Uint32Array Uint8Array Worker XMLSerializer cancelAnimationFrame "
-        "clearTimeout decodeURIComponent document encodeURIComponent getComputedStyle history location navigator performance "
+        "Array BigInt Blob Boolean Date DOMParser Error Float64Array Image Infinity IntersectionObserver Map Math "
+        "NaN Number Object Promise ResizeObserver Set String URL Uint32Array Uint8Array Worker XMLSerializer "
+        "cancelAnimationFrame clearTimeout decodeURIComponent document encodeURIComponent getComputedStyle history "
+        "location navigator performance "
         "postMessage requestAnimationFrame self setTimeout window",
     )
 )

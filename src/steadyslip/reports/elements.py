@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
 from typing import Any
+from xml.etree import ElementTree
 
 import sympy as sp
 from sympy.printing.mathml import MathMLPresentationPrinter
@@ -33,6 +34,7 @@ _LONG = 30  # characters of a word that may be broken, for it is none
 _NARROW = 3  # columns that fit on a telephone (by trial, at 360 px)
 _NARROW_LINE = 44  # letters that fit beside each other there, of 13 px (358 px of some 8 px each)
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
+_PIECE = 30  # most characters of a part of a formula that is never broken: some 300 px of the 358 px of a telephone
 _ZERO = '<mrow><mo form="infix">=</mo><mn>0</mn></mrow>'
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
@@ -70,7 +72,7 @@ STYLE = """
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
 @media screen and (max-width: 600px) {
   .steadyslip-told .formula math { font-size: 14px; }
-  .steadyslip-told .formula math, .steadyslip-told .formula mtd { display: flex; flex-wrap: wrap; align-items: center;
+  .steadyslip-told .formula :is(math, mtd) { display: flex; flex-wrap: wrap; align-items: center;
     row-gap: 4px; }
   .steadyslip-told .formula math { justify-content: safe center; }
   .steadyslip-told .formula :is(mtable, mtr) { display: block; min-width: 0; }
@@ -213,7 +215,10 @@ def equation(one: sp.Eq) -> str:
     left, right = one.args
     side, begin, end = (left, "", _ZERO) if right == 0 else (right, f"{_presented(left)}<mo>=</mo>", "")
     lines = [[_presented(term) for term in terms] for terms in _lines(side.as_ordered_terms())]
-    whole = ["".join(_term(text, not (n or k)) for k, text in enumerate(line)) for n, line in enumerate(lines)]
+    pieces = [
+        [piece for k, text in enumerate(line) for piece in _term(text, not (n or k))] for n, line in enumerate(lines)
+    ]
+    whole = [row for line in pieces for row in _rows(line)]
     if len(whole) == 1:
         begin = f"<mrow>{begin}</mrow>" if begin else ""
         return f'<div class="formula" tabindex="0">{_mathml(begin + whole[0] + end, True)}</div>'
@@ -225,13 +230,60 @@ def equation(one: sp.Eq) -> str:
     return f'<div class="formula" tabindex="0">{_mathml("<mtable>" + "".join(rows) + "</mtable>", True)}</div>'
 
 
-def _term(text: str, first: bool) -> str:
-    """MathML of a term of a sum with its sign, which is spaced as between two of them unless it is the first."""
-    if first:
-        return f"<mrow>{text}</mrow>"
-    if re.sub("<.*?>", "", text).startswith("−"):
-        return "<mrow>" + text.replace("<mo>−</mo>", '<mo form="infix">−</mo>', 1) + "</mrow>"
-    return f'<mrow><mo form="infix">+</mo>{text}</mrow>'
+def _term(text: str, first: bool) -> list[str]:
+    """MathML of a term of a sum with its sign, which is spaced as between two of them unless it is the first.
+
+    A wide term is in pieces, between which lines may end.
+    """
+    if not first and re.sub("<.*?>", "", text).startswith("−"):
+        text = text.replace("<mo>−</mo>", '<mo form="infix">−</mo>', 1)
+    elif not first:
+        text = f'<mo form="infix">+</mo>{text}'
+    pieces = _pieces(ElementTree.fromstring(f"<mrow>{text}</mrow>"))
+    return [f"<mrow>{''.join(ElementTree.tostring(one, 'unicode') for one in piece)}</mrow>" for piece in pieces]
+
+
+def _rows(pieces: Iterable[str]) -> list[str]:
+    """MathML of pieces, parted into lines of `_LINE` characters at most, or of one piece."""
+    rows, room = [""], _LINE
+    for piece in pieces:
+        length = len(re.sub("<.*?>", "", piece))
+        if rows[-1] and length > room:
+            rows.append("")
+            room = _LINE
+        rows[-1] += piece
+        room -= length
+    return rows
+
+
+def _pieces(element: ElementTree.Element, most: int = _PIECE) -> list[list[ElementTree.Element]]:
+    """Elements of a row in groups of some `most` characters, each of which begins with a sign or a slash."""
+    if element.tag != "mrow" or _length([element]) <= most:
+        return [[element]]
+    groups: list[list[ElementTree.Element]] = [[]]
+    for n, child in enumerate(element):
+        sign = child.tag == "mo" and child.text in ("+", "−", "-")
+        if sign and not child.get("form"):
+            child.set("form", "infix" if n else "prefix")
+        if n and (sign or (child.text == "/" and "".join(element[n - 1].itertext()).endswith(")"))):
+            groups.append([])
+        if child.get("symmetric"):  # a bracket as high as a fraction, which may be in another piece
+            child.set("minsize", "2.2em")
+        groups[-1].append(child)
+    found: list[list[ElementTree.Element]] = []
+    for group in groups:
+        found.append([])
+        for child in group:
+            inner = most if len(group) == 1 else max(most // 2, _PIECE // 2)
+            first, *others = _pieces(child, inner) if _length(group) > most else [[child]]
+            found[-1].extend(first)
+            found.extend(others)
+    return found
+
+
+def _length(elements: Iterable[ElementTree.Element]) -> int:
+    """Characters of elements."""
+    return sum(len(text) for one in elements for text in one.itertext())
 
 
 def _lines(terms: Iterable[sp.Expr]) -> list[list[sp.Expr]]:
@@ -291,7 +343,8 @@ class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no
 
     def _print_Mul(self, expression: sp.Mul) -> Any:  # noqa: N802 -- SymPy's name
         above, below = sp.fraction(expression)
-        if not self._inline or below == 1:
+        wide = max(len(str(above)), len(str(below))) > _LINE  # a fraction cannot be broken, a quotient can
+        if not (self._inline or wide) or below == 1:
             return super()._print_Mul(expression)
         sign = above.could_extract_minus_sign() and not above.is_Add
         parts = [self._sign("-")] * sign + [self._closed(-above if sign else above, above.is_Add)]

@@ -74,14 +74,14 @@ export class Course {
         this.soon();
       });
     }
-    this.strips = svg("svg", { class: "chart strips", role: "img" });
+    this.strips = svg("svg", { class: "chart strips", role: "img", "aria-label": "motion over time" });
     this.strips.addEventListener("pointermove", (event) => this.point(event));
     this.strips.addEventListener("pointerdown", (event) => this.point(event));
     this.time = make("input", { type: "range", min: "0", max: "1000", step: "any", "aria-label": "time", className: "time" });
     this.time.addEventListener("input", () => this.show(Number(this.time.value) / 1000));
     this.player = button("▶", "play", () => this.play());
     this.reading = make("output", { className: "reading" });
-    this.phase = svg("svg", { class: "chart phase", role: "img", viewBox: `0 0 ${PLANE.left + PLANE.width + 14} ${PLANE.top + PLANE.height + 46}` });
+    this.phase = svg("svg", { class: "chart phase", role: "img", "aria-label": "phase plane", viewBox: `0 0 ${PLANE.left + PLANE.width + 14} ${PLANE.top + PLANE.height + 46}` });
     this.events = make("tbody", {});
     const mark = (className, words) => make("span", {}, svg("svg", { class: "chart", viewBox: "0 0 14 14", "aria-hidden": "true" }, svg("circle", { class: className, cx: 7, cy: 7, r: 4 })), words);
     const key = make("p", { className: "key" }, mark("begin", "where it begins"), mark("at", "at the time chosen"));

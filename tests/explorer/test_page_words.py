@@ -181,7 +181,7 @@ def test_a_drop_on_a_body_that_turns_is_a_torque_as_in_python():
              "every": last.recurrence, "rings": [], "peak": last.peak_velocity, "sticks": True}  # fmt: skip
     (at,) = there.data["levers"]
     lever = there.home[there.names.index(f"contacts.{name}.radius")]
-    assert there.script("data.facts.parameters[at]", at=at) == f"contacts.{name}.radius"
+    assert at == f"contacts.{name}.radius"
     course = {"events": [event], "status": "done", "end": 3.0, "at": 1.0,
               "contacts": [{"name": name, "v": [1.0], "floor": 0.0, "lever": lever}]}  # fmt: skip
     told = there.script("outcome(course, data)", course=course)

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 import steadyslip as ss
 from command import run as cli
 from guide_and_seal import GUIDE_AND_SEAL
+from joint_at_radius import joint
 from steadyslip.motion import ContactSlip
 from steadyslip.verdict.judder import is_irregular, motion_after
 
@@ -138,38 +139,10 @@ def test_an_unstable_rig_that_nothing_disturbs_is_disturbed_on_the_command_line(
         assert ("judders" in done.stdout) is ("nothing disturbs this unstable rig" in done.stderr) is judders
 
 
-JOINT = """
-[bodies.joint]
-motion = "rotation"
-inertia = "0.1 kg m^2"
-[links.shaft]
-kind = "shaft"
-between = ["drive", "joint"]
-stiffness = "10 kN m/rad"
-[contacts.bearing]
-body = "joint"
-radius = "{radius} m"
-[contacts.bearing.friction]
-law = "lugre"
-mu_coulomb = 0.1
-mu_static = 0.17
-v_stribeck = "{speed} m/s"
-viscous = 0
-bristle_stiffness = "{bristles} 1/m"
-[contacts.bearing.contact]
-law = "constant"
-preload = "{preload} N"
-[drive]
-control = "rotary-steady"
-velocity = "1 rpm"
-"""
-
-
 @pytest.mark.parametrize("radius", [1.0, 0.05])
 def test_the_drop_of_a_body_that_turns_is_a_torque_at_whatever_radius(radius):
     """One joint, its bearing written at two radii; the torque is that of the shaft."""
-    text = JOINT.format(radius=radius, speed=0.73 * radius, bristles=2300 / radius, preload=33.6 / radius)
-    rig = ss.rig_from_text(text)
+    rig = ss.rig_from_text(joint(radius))
     push = [ss.protocol.VelocityStep(at=at, to=to) for at, to in ((0.1, "1.1 rpm"), (0.2, "1 rpm"))]
     run = ss.simulate(rig, push, until=3.0)
     (drop,) = told(r"bearing .* a drop of ([\d.]+) N m in the torque of shaft on joint.*", run.sentence)
@@ -182,11 +155,10 @@ def test_the_drop_of_a_body_that_turns_is_a_torque_at_whatever_radius(radius):
 
 
 def test_the_swing_of_cycles_of_a_body_that_turns_is_a_torque_at_whatever_radius():
-    found = []
+    found, contact = [], "[contacts.bearing]"
+    drag = f'[links.drag]\nkind = "shaft"\nbetween = ["joint", "ground"]\ndamping = "0.1 N m s/rad"\n{contact}'
     for radius in (1.0, 0.05):
-        text = JOINT.format(radius=radius, speed=0.73 * radius, bristles=2300 / radius, preload=33.6 / radius)
-        rig = ss.rig_from_text(text.replace("[contacts.bearing]", '[links.drag]\nkind = "shaft"\nbetween = ["joint", '
-                                            '"ground"]\ndamping = "0.1 N m s/rad"\n[contacts.bearing]'))  # fmt: skip
+        rig = ss.rig_from_text(joint(radius).replace(contact, drag))
         found.append(ss.cycles(rig, "contacts.bearing.friction.mu_static", between=(0.1, 0.12)))
     (swings, unit), (others, _) = (one.swings() for one in found)
     assert unit == "N m"

@@ -263,17 +263,14 @@ def _stiffness(rig: Slider, names: list[str]) -> str | None:
 
 
 def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Page data of machines only: indices of areas and radii of contacts, what pulls at these, phrases."""
+    """Page data of machines only: indices of areas of contacts, names of radii, what pulls at these, phrases."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
         "phrases": {name: words for name, words in machine_words.PHRASES.items() if name not in BEYOND},
         "means": machine_words.MEANS,
         "pulls": {name: pull_words(rig, name) for name in rig.contacts},
-        "levers": [
-            facts["parameters"].index(f"contacts.{name}.radius") if rig.lever_at(name) is not None else -1
-            for name in rig.contacts
-        ],
+        "levers": [f"contacts.{name}.radius" if rig.lever_at(name) is not None else "" for name in rig.contacts],
     }
 
 

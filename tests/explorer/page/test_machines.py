@@ -8,6 +8,7 @@ import pytest
 import steadyslip as ss
 from explored_edges import written
 from explored_pages import Visit
+from joint_at_radius import joint
 from machines import block
 from steadyslip.machine.letters import said
 from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row
@@ -91,6 +92,23 @@ def test_a_machine_is_disturbed_where_one_says_and_shown_by_name(browser, page_o
         after = [bodies.nth(i).get_attribute("transform") for i in range(bodies.count())]
         assert len(before) == 2
         assert before != after
+
+
+def test_a_page_tells_what_a_turning_body_sheds_as_a_torque_at_any_radius(browser, tmp_path):
+    """The same joint with its bearing at 5 cm: in the text and in the table of events."""
+    drops = []
+    for radius in (1.0, 0.05):
+        path = tmp_path / f"{radius}.html"
+        ss.explore(ss.rig_from_text(joint(radius))).save(path)
+        with Visit(browser, path) as visit:
+            told = visit.told("in the torque of shaft on joint")
+            (drop,) = re.findall(r"; the last: .*torque drop ([\d.]+) N m", told)
+            drops.append(float(drop))
+            head = visit.page.locator(".events th").all_text_contents()
+            row = visit.page.locator(".events tbody tr").last.text_content().replace("\u00a0", " ")
+            assert "drop of torque" in head
+            assert f"{drop} N m" in row
+    assert drops[1] == pytest.approx(drops[0], rel=0.1)  # the last events of runs that are cut
 
 
 @pytest.mark.parametrize("changes", [

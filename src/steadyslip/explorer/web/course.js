@@ -85,7 +85,7 @@ export class Course {
     this.events = make("tbody", {});
     const mark = (className, words) => make("span", {}, svg("svg", { class: "chart", viewBox: "0 0 14 14", "aria-hidden": "true" }, svg("circle", { class: className, cx: 7, cy: 7, r: 4 })), words);
     const key = make("p", { className: "key" }, mark("begin", "where it begins"), mark("at", "at the time chosen"));
-    const { area, phrases, levers } = this.page.rig.data, torques = levers?.filter((at) => at >= 0).length ?? 0;
+    const { area, phrases, levers } = this.page.rig.data, torques = levers?.filter(Boolean).length ?? 0;
     const drop = torques ? (torques < levers.length ? "drop" : "drop of torque") : phrases || area !== null ? "drop of force" : "stress drop";
     const heads = [...(phrases ? ["contact"] : []), "begins", "lasts", "peak velocity", drop, "since the last"];
     this.list = make("details", { className: "events" }, make("summary", { textContent: "Slip events" }),
@@ -161,7 +161,7 @@ export class Course {
       const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(wanted.until, "s", 3)} so far; curves are those of before.`);
       const found = await this.mover.run(this.model, this.page.answer.sigmas, wanted, told);
       clearTimeout(this.late);
-      this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own, lever: this.model[this.page.rig.data.levers?.[n] ?? -1] ?? null }));
+      this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own, lever: this.model[this.page.rig.data.motion.parameters.indexOf(this.page.rig.data.levers?.[n])] ?? null }));
       this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
       const { at, until } = this.course;
       this.course.since = until - at > BRIEF * at ? Math.max(0, at - LEAD * (until - at)) : 0; // the curves begin just before the disturbance

@@ -9,7 +9,7 @@ import { exactly, tellIn } from "./quantities.js";
  *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its SI size and the text of the value in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: (number | string)[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null, stiffnessArea: number | null,
- *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], levers?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string,
+ *   stiffness: string | null, remote: number, written: Record<string, [string, number][]>, areas?: number[], levers?: string[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string,
  *   pace: any, columns: string[], aperiodic: string, beyond: any, ends: any, means: string, usual: any}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */

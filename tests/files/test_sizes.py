@@ -90,6 +90,21 @@ MISTAKES = {
     "N m/arcsec of a gain": (TELESCOPE, "0.8 N m/rad", "0.8 N m/arcsec", 'motor, .* at 4819 Hz, .* is "0.8 N m/rad"'),
     "s for ms": (HELD, "1 ms", "1 s", 'sample_time = 1 s is 43 times the period of .* 23.51 ms: is "1 ms" or "1 us"'),
     "a radius": (TELESCOPE, "450 mm", "450 m", "radius = 450 m; the largest in use are some 2 m: write the unit"),
+    "m for mm": (WORM, "40 mm", "40 m", '200 times the radius of a steel ball .* is "40 mm" meant'),
+    "kg cm^2 for kg m^2": (WORM, "4.2 kg m^2", "4.2 kg cm^2", '2100 times that inertia: is "axis: 4.2 kg m.2" meant'),
+    "g cm^2 for kg m^2": (SERVO, "2.1 kgm²", "2.1 g cm²", '3800000 times that inertia: is "arm: 2.1 kg m.2" meant'),
+    "the gain of a motor": (WORM, 'body = "motor"', 'body = "axis"', "once in 57.59 s, if it is of that body"),
+    "stiffness at a motor": (WORM, "12000 Nm", "0.0926 Nm", 'twisted by 495 deg .* "1.2e\\+04 N m/rad at axis"'),
+    "kNms for Nms": (WORM, "5 Nms", "5 kNms", '11 times the critical damping .* "damping = 5 N m s/rad"'),
+    "kN m for N m": (SERVO, "-20 N m", "-20 kN m", 'torque on arm alone twists .* "torque = -20 N m" meant'),
+    "an exponent": (AXIS, "mu_static", "stribeck_exponent = 20\nmu_static", "largest measured are some 2: write that"),
+    "a share in per cent": (SERVO, "transmitted = 1", "transmitted = 100", "in per cent is written as a share, 1$"),
+    "a gear in quotes": (WORM, '"1/360"', '"360"', 'a reduction is written "1/360", this one "360/1"$'),
+    "an area in mm^2": (GUIDE, '"1 m2"', "200", "area = 200 is read as 200 m.2; the largest in use are some 5 m"),
+    "km/s for km/h": (SHEETS["brake"], "2 km/h", "2 km/s", "makes the slider slide at 2000 m.s: is"),
+    "um/min for mm/min": (AXIS, "3 mm/min", "3 um/min", '4000 times the speed .* is "velocity = 3 mm/min" meant'),
+    "kN s/mm of viscous friction": (PRESS, "5 kN s/m", "5 kN s/mm", '1.5 of viscous .* "5 N s/mm at 10 kN" meant'),
+    "damping of bristles": (PRESS, '"100 N s/m at 10 kN"', "100", '3.7 times .* is "100 N s/m at 10 kN" or'),
 }  # fmt: skip
 
 
@@ -144,7 +159,9 @@ def friction(chance, velocity, preload):
     rest = mu * chance.uniform(1.01, 1.8)
     bristles = rest * preload / between(chance, 1e-7, 1e-4)
     stiff = in_unit(chance, bristles, STIFFNESSES) + f" at {in_unit(chance, preload, FORCES)}"
-    law = f'law = "lugre"\nmu_coulomb = {mu:.6g}\nmu_static = {rest:.6g}\nbristle_stiffness = "{stiff}"\n'
+    viscous = chance.uniform(0, 0.5) * rest / max(1e-5, scale)
+    law = f'law = "lugre"\nviscous = {viscous:.4g}\n'
+    law += f'mu_coulomb = {mu:.6g}\nmu_static = {rest:.6g}\nbristle_stiffness = "{stiff}"\n'
     return law + f'v_stribeck = "{in_unit(chance, min(1.0, max(1e-5, scale)), SPEEDS)}"\n', rest
 
 
@@ -180,6 +197,8 @@ def joint(chance):
     torque = chance.choice([0.0, 1.0]) * between(chance, 1, 100) * inertia
     least = (rest * preload * radius + torque) / 0.1
     stiffness = max(inertia * (2 * math.pi * between(chance, 2, 200)) ** 2, least)
+    reduced = 1 / (1 / inertia + 1 / (motor * gear**2))
+    damping = 2 * math.sqrt(stiffness * reduced) * between(chance, 1e-4, 0.7)
     gain = motor * (2 * math.pi * between(chance, 1, 300)) ** 2
     return f"""
 [bodies.motor]
@@ -194,6 +213,7 @@ kind = "shaft"
 between = ["motor", "table"]
 gear = "1/{gear:.4g}"
 stiffness = "{in_unit(chance, stiffness, TORSIONS)}"
+damping = "{damping:.4g} N m s/rad"
 [contacts.bearing]
 body = "table"
 radius = "{radius * 1e3:.4g} mm"

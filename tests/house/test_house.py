@@ -85,6 +85,7 @@ def test_only_laws_know_laws():
     # arguments of `lab_rig`, which makes a rig of the usual law
     arguments = {("experiments/spec.py", name) for name in ("v_ref", "normal_memory")}
     sizes = ("mu_coulomb", "mu_static", "mu_ref", "sample_time", "drive.resolution")  # told by name from others
+    sizes += ("stribeck_exponent",)
     arguments |= {("files/specifications/bare_numbers.py", name) for name in sizes}
     arguments.add(("nonlinear/hunting/hunt_result.py", "drive.resolution"))  # an encoder's step in words
     telling = {word for word in words | fields if {"_", "-"} & set(word)}  # others mean more than a law

@@ -6,6 +6,8 @@ import pytest
 import steadyslip as ss
 from explored import ExploredMachine, differences
 
+pytestmark = pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")  # random sizes are asked about
+
 SHAFT = """
 [bodies.motor]
 motion = "rotation"

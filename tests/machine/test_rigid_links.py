@@ -63,6 +63,7 @@ def slow(machine, count):
     return found[np.argsort(np.abs(found))[:count]]
 
 
+@pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")  # which is asked whether it is meant
 def test_a_rigid_link_of_a_file_is_the_limit_of_a_stiff_one(tmp_path):
     """A link of 1e16 N/m leaves two roots at 1e8 1/s; without them those of one body, J + m lead², radius lead."""
     rigid, stiff = read(tmp_path, '"rigid"'), read(tmp_path, "1e16")

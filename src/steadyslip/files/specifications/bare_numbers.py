@@ -11,9 +11,10 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import UnitWarning
 from steadyslip.core.format import format_quantity
 from steadyslip.core.quantities import parse, units_in
+from steadyslip.files.specifications.contact_sizes import G
 from steadyslip.files.specifications.held_bodies import friction_at_rest, is_of_forces, mass_on
 from steadyslip.files.specifications.other_units import number_of
-from steadyslip.files.specifications.sizes import G, questions_of_size
+from steadyslip.files.specifications.sizes import questions_of_size
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
@@ -50,11 +51,15 @@ LARGEST = {
     ("radius", "m"): Largest(2.0, 10.0),  # turntables, turbine rings
     ("lead", "m/rad"): Largest(0.1 / (2 * math.pi), 0.1),  # screws of 100 mm/rev
     ("gear", "1"): Largest(10.0, 10.0),
+    ("exponent", "1"): Largest(2.0, 5.0, "measured"),
+    ("transmitted", "1"): Largest(2.0, 10.0),
+    ("area", "m^2"): Largest(5.0, 50.0),
 }
 """By kind of parameter or last part of its name, and SI unit."""
 WITH_UNIT = 10.0  # times as far as without one is asked about what has a unit, as rings of telescopes are 30 m wide
 REMEDIES = {
     "gear": 'its second body turns faster than the first; a reduction is written "1/{raw:g}", this one "{raw:g}/1"',
+    "stribeck_exponent": "write that of exp(-(v/v_stribeck)^exponent)",
     "1": "a number in per cent is written as a share, {share:g}",
     "": "write the unit that is meant",
 }
@@ -148,8 +153,11 @@ def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str,
         if _is_between(raw, known.questioned, ABSURD * known.questioned):
             remedy = (REMEDIES.get(last) or REMEDIES.get(si) or REMEDIES[""]).format(raw=raw, share=raw / 100)
             yield name, f"{name} = {raw:g} is read as {format_quantity(float(raw), si)}; {largest}: {remedy}"
-        elif isinstance(raw, str) and (number_of(raw, si) or 0.0) > WITH_UNIT * known.questioned:
-            yield name, f"{name} = {raw}; {largest}: {REMEDIES['']}"
+        elif isinstance(raw, str):
+            number, further = number_of(raw, si) or 0.0, 1.0 if si == "1" else WITH_UNIT
+            if number > further * known.questioned:
+                remedy = (REMEDIES.get(last) or REMEDIES[""]).format(raw=number)
+                yield name, f"{name} = {raw}; {largest}: {remedy}"
 
 
 def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:

@@ -51,6 +51,12 @@ class Body(NamedTuple):
         across: float = (32 * self.inertia / (math.pi * DENSITY)) ** 0.2
         return SHEAR * math.pi * across**3 / 32
 
+    @property
+    def ball(self) -> float:
+        """Radius (m) of a ball of steel with the moment of inertia of a body that turns."""
+        radius: float = (15 * self.inertia / (8 * math.pi * DENSITY)) ** 0.2
+        return radius
+
 
 APART = Body("", False, math.inf, 0.0, 0.0, 0.0, {})
 """The ground, or the load point of the drive."""

@@ -8,6 +8,8 @@ from typing import Any
 from steadyslip.core.dimensions import unit
 from steadyslip.core.quantities import parse, units_in
 
+Question = tuple[str, str]
+"""Name of a parameter, and the question about it."""
 Read = Mapping[str, tuple[Any, str]]
 """Values that were read by dotted name: each as it was written, and its SI unit."""
 UNITS = {
@@ -17,6 +19,9 @@ UNITS = {
     "kg": ("kg", "g", "t"),
     "kg m^2": ("kg m^2", "kg cm^2", "g cm^2"),
     "N": ("N", "kN"),
+    "N m": ("N m", "kN m"),
+    "N m s/rad": ("N m s/rad", "mN m s/rad"),
+    "m": ("mm", "m"),
     "m/s": ("mm/min", "mm/s", "m/min", "m/s"),
     "s": ("ms", "us"),
 }

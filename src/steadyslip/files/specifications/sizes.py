@@ -10,23 +10,15 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 
 from steadyslip.core.format import format_quantity
-from steadyslip.files.specifications.held_bodies import (
-    Body,
-    Spring,
-    bodies_of,
-    friction_at_rest,
-    is_of_forces,
-    mass_at,
-    mass_on,
-    springs_of,
-)
+from steadyslip.files.specifications.contact_sizes import LIGHT, G, questions_of_contacts
+from steadyslip.files.specifications.held_bodies import Body, Spring, bodies_of, springs_of
 from steadyslip.files.specifications.other_units import (
+    Question,
     Read,
     asked,
     between,
     in_units,
     named,
-    number_of,
     texts_in_units,
     times,
     written,
@@ -34,23 +26,15 @@ from steadyslip.files.specifications.other_units import (
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
-Question = tuple[str, str]
-"""Name of a parameter, and the question about it."""
-G = 9.81  # m/s^2
 SLOWEST = 0.05  # Hz: long drill strings turn to and fro at 0.2 Hz, base isolation at 0.3 Hz
 USUAL = 20.0  # Hz, of a drive
 LONG, TWIST, WAIT = 0.01, 0.3, 1000.0  # m, rad, s: further than drives give way, and longer than any takes to do so
 SAG = 0.5  # rad: arms on springs by intent sag by 0.2 to 0.3 rad
 STEEL = 10.0  # times softer than a block of steel is what is made of several parts
-LIGHT = 0.01  # share of its weight by which a body is hardly ever pressed: hanging and floating ones are by some 1 %
 OVERDAMPED, DAMPED = 1.0, 0.2  # of critical damping; of shafts, screws and guides 0.01 to 0.2 are measured
-OTHER_LOAD = 100.0  # times the load of which bristles are told to the contact's own
-THIN, THICK = 1e-8, 1e-3  # m: bends of bristles at which they slip; measured are 0.1 um to 0.1 mm, and of rubber more
-TURNED = 1.0  # rad: the most bristles of what turns bend by, at a motor in front of its gear
-UNCHANGED = 1e3  # times the speed of sliding, where friction is that at rest
-SLOW_LAW = 1e-6  # m/s: measured Stribeck velocities are 0.1 mm/s to 1 m/s
 FAST_GAINS = 3e3  # Hz: ten times the bandwidth of drives of machines
 LATE = 0.5  # of the period of a controller: samples tell no faster oscillation (Nyquist)
+UNLIKE = 500.0  # times the inertia that it turns is that of a motor through its gear: of light arms up to 100
 GEARED_UP = 10.0  # turns of a body for one of its motor
 
 
@@ -70,26 +54,25 @@ def questions_of_size(rig: Rig, read: Read) -> Iterator[Question]:
     if geared := list(_geared_up(rig, bodies)):
         yield from geared
         return  # springs are at the wrong ends as well, and speeds are wrong
-    held, light = [*_stiff(springs, read), *_soft(rig, springs, bodies, read)], list(_light(rig, read))
+    held = [*_stiff(rig, springs, read), *_soft(rig, springs, bodies, read), *_unlike(read, springs)]
     yield from dict(held).items()
-    yield from light
     if not held:
-        yield from _damped(rig, read, bodies)
-    if not light:
-        yield from _bristles(rig, read)
-    yield from _unchanged(rig, read)
+        yield from _damped(rig, read, springs)
+    yield from questions_of_contacts(rig, read, bodies)
     yield from _controlled(rig, read, bodies)
     yield from _massless(rig, read)
 
 
-def _stiff(springs: Mapping[str, Spring], read: Read) -> Iterator[Question]:
+def _stiff(rig: Rig, springs: Mapping[str, Spring], read: Read) -> Iterator[Question]:
     """Questions about springs that are stiffer than a block of steel of the heavier body's mass."""
     for name, spring in springs.items():
         body, stiffness = spring.heavier
         if body.inertia and stiffness > body.block:
             made = "cylinder of steel as thick as long, of the inertia" if body.turns else "cube of steel of the mass"
             text = f"{written(read, name)} is {times(stiffness / body.block)} the stiffness of a {made} of "
-            yield name, f"{text}{body.name}, {body.told}: {asked(_springs_meant(read, name, spring))}"
+            meant = asked(_springs_meant(read, name, spring))
+            rigid = ', or stiffness = "rigid"' if isinstance(rig, Machine) and "is " not in meant else ""
+            yield name, f"{text}{body.name}, {body.told}: {meant}{rigid}"
 
 
 def _soft(rig: Rig, springs: Mapping[str, Spring], bodies: Mapping[str, Body], read: Read) -> Iterator[Question]:
@@ -100,12 +83,13 @@ def _soft(rig: Rig, springs: Mapping[str, Spring], bodies: Mapping[str, Body], r
             continue
         spring, stiffness = springs[name], sum(body.springs.values())
         if why := _why_soft(spring, body, stiffness):
-            meant = _springs_meant(read, name, spring) or _loads_meant(rig, read, spring, body)
+            meant = _springs_meant(read, name, spring)
+            meant += _loads_meant(rig, read, spring, body) if body.load or not meant else []
             yield name, f"{written(read, name)}, {why}: {asked(meant)}"
 
 
 def _loads_meant(rig: Rig, read: Read, spring: Spring, body: Body) -> list[str]:
-    """Loads of contacts in units in which friction does not stretch a spring far."""
+    """Loads of contacts and of the body in units in which friction does not stretch a spring far."""
     found, stiffness = [], sum(body.springs.values())
 
     def fits(load: float, of: float) -> bool:
@@ -114,7 +98,9 @@ def _loads_meant(rig: Rig, read: Read, spring: Spring, body: Body) -> list[str]:
     for name in rig.of_kind("normal stress"):
         if load := rig.load_of(name):
             found += named(name, texts_in_units(read, name, "N", partial(fits, of=load)))
-    return found
+    name, si = f"bodies.{body.name}.{'torque' if body.turns else 'force'}", "N m" if body.turns else "N"
+    smaller = between(0.0, 0.1 * SAG * stiffness if body.turns else LONG * stiffness)
+    return found + named(name, texts_in_units(read, name, si, lambda load: smaller(abs(load))))
 
 
 def _why_soft(spring: Spring, body: Body, stiffness: float) -> str:
@@ -144,8 +130,11 @@ def _springs_meant(read: Read, name: str, spring: Spring) -> list[str]:
         return abs(math.log(spring._replace(stiffness=one[0]).frequency / USUAL))
 
     si = "N m/rad" if spring.heavier[0].turns else "N/m"
-    found = in_units(read.get(name, (None, ""))[0], si, fits)
-    return [text for _, text in sorted(found, key=away)[:2]]
+    found = sorted(in_units(read.get(name, (None, ""))[0], si, fits), key=away)[:2]
+    at_second = spring.stiffness / spring.ratio**2
+    if spring.first.turns and spring.ratio * GEARED_UP <= 1 and fits(at_second):
+        found.append((at_second, f"{at_second:.4g} {si} at {spring.second.name}"))
+    return [text for _, text in found]
 
 
 def _geared_up(rig: Rig, bodies: Mapping[str, Body]) -> Iterator[Question]:
@@ -164,100 +153,43 @@ def _geared_up(rig: Rig, bodies: Mapping[str, Body]) -> Iterator[Question]:
             yield f"links.{name}.between", f'{text}between = ["{second}", "{first}"]'
 
 
-def _damped(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Question]:
-    """Question about a drive that is damped so that a mass does not swing."""
-    name, body = "slider.damping", bodies.get("slider")
-    if body is None or name not in read or not (body.inertia and body.springs):
-        return
-    spring, stiffness = next(iter(body.springs.items()))
-    damping = (rig.value(name) or 0.0) * (rig.area or 1.0)
-
-    def ratio(c: float = damping, m: float = body.inertia, k: float = stiffness) -> float:
-        return c / (2 * math.sqrt(m * k))
-
-    if ratio() > OVERDAMPED:
-        heaviest = (rig.load_of("friction.any") or math.inf) / (G * LIGHT)
-        meant = [
-            *named(spring, texts_in_units(read, spring, "N/m", lambda k: ratio(k=k) < DAMPED)),
-            *named("mass", texts_in_units(read, "slider.mass", "kg", lambda m: ratio(m=m) < DAMPED and m < heaviest)),
-            *named(name, texts_in_units(read, name, "N s/m", lambda c: ratio(c=c) < DAMPED)),
-        ]
-        text = f"{written(read, name)} is {times(ratio())} the critical damping of {body.told} on "
-        text += f"{format_quantity(stiffness, 'N/m')}, so that nothing swings; of drives 0.01 to 0.2 are measured: "
-        yield name, text + asked(meant)
-
-
-def _light(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about typed loads that hardly press: far less than a body weighs."""
-    for name in rig.of_kind("normal stress"):
-        load, weight = rig.load_of(name), G * mass_on(rig, name)
-        if not isinstance(read.get(name, (None, ""))[0], str) or is_of_forces(rig, name):
+def _unlike(read: Read, springs: Mapping[str, Spring]) -> Iterator[Question]:
+    """Questions about what turns so easily that its motor, seen through the gear, is far heavier."""
+    for key, (_, ratio, first, second) in springs.items():
+        if not (first.turns and second.turns and second.inertia > 0 and 0 < first.inertia < math.inf and ratio < 1):
             continue
-        if load and load < LIGHT * weight:
-            mass = texts_in_units(read, mass_at(rig, name), "kg", between(load / (100 * G), load / (0.1 * G)))
-            meant = named(name, texts_in_units(read, name, "N", between(0.1 * weight, 100 * weight)))
-            meant += named("mass", mass)
-            text = f"{written(read, name)} is {times(load / weight)} the weight of what slides there, "
-            yield name, f"{text}{format_quantity(weight, 'N')}: {asked(meant)}"
+        seen = first.inertia / ratio**2
+        if seen > UNLIKE * second.inertia:
+            name, other = f"bodies.{second.name}.inertia", f"bodies.{first.name}.inertia"
+            light = between(1e-3 * second.inertia * ratio**2, 100 * second.inertia * ratio**2)
+            heavier = texts_in_units(read, name, "kg m^2", between(seen / 100, 1e3 * seen))
+            meant = [f"{second.name}: {text}" for text in heavier]
+            meant += [f"{first.name}: {text}" for text in texts_in_units(read, other, "kg m^2", light)]
+            text = f"{written(read, name)} is turned by {first.name}, {first.told}, which through {key.split('.')[1]} "
+            yield name, f"{text}has {times(seen / second.inertia)} that inertia: {asked(meant)}"
 
 
-def _bristles(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about bristles of another load than the contact's, or that bend unlike any that were measured."""
-    for name in rig.of_kind("bristle stiffness"):
-        raw, load, value = read.get(name, (None, ""))[0], rig.load_of(name), rig.value(name)
-        if not isinstance(raw, str) or is_of_forces(rig, name) or not (load and value):
+def _damped(rig: Rig, read: Read, springs: Mapping[str, Spring]) -> Iterator[Question]:
+    """Questions about links that are damped so that what they hold does not swing."""
+    for key, spring in springs.items():
+        name, stiffness, (body, at_body) = f"{key.rpartition('.')[0]}.damping", spring.stiffness, spring.heavier
+        if name not in read or not 0 < body.inertia < math.inf:
             continue
-        force, _, of = raw.partition(" at ")
-        of_load, at_rest = number_of(of, "N"), friction_at_rest(rig, name)
-        if of_load and not 1 / OTHER_LOAD < of_load / load < OTHER_LOAD:
-            own = next(one for one in rig.of_kind("normal stress") if one.startswith(name.split("friction")[0]))
-            meant = named(own, texts_in_units(read, own, "N", between(0.1 * of_load, 10 * of_load)))
-            meant += [f"{force} at {text}" for _, text in in_units(of, "N", between(0.1 * load, 10 * load))]
-            text = f"{name} = {raw} is of a load {times(of_load / load)} that of its contact, "
-            yield name, f"{text}{format_quantity(load, 'N')}: {asked(meant)}"
-        elif at_rest and not _bends_well(rig, name, at_rest / value):
-            meant = []
-            if of_load:
-                found = in_units(force, "N/m", between(at_rest * load / (THICK / 5), at_rest * load / (10 * THIN)))
-                meant = [f"{text} at {of}" for _, text in found]
-            bend = format_quantity(at_rest / value, "m")
-            text = f"{name} = {raw}: friction bends such bristles by {bend} before they slip; measured are 0.1 um to "
-            yield name, f"{text}0.1 mm: {asked(meant)}"
-
-
-def _bends_well(rig: Rig, name: str, bend: float) -> bool:
-    """True if bristles that bend by this length (m) are like those of some contact."""
-    radius = rig.contacts[name.split(".")[1]].radius if isinstance(rig, Machine) else None
-    return bool(bend <= TURNED * radius) if radius else THIN <= bend <= THICK
-
-
-def _unchanged(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about Stribeck velocities far above the speed of sliding, or below all that were measured."""
-    for prefix, *_ in rig.laws_by_contact().values():
-        law = f"{prefix}friction."
-        kinds = {one.role.kind: name for name, one in rig.parameters().items() if name.startswith(law)}
-        name = kinds.get("velocity scale", "")
-        if "exponent" not in kinds or name not in read or not (scale := rig.value(name)):
-            continue
-        speed = _slip_speed(rig, prefix)
-        near = speed or math.sqrt(SLOW_LAW)  # m/s: the middle of those measured
-        meant = texts_in_units(read, name, "m/s", between(max(10 * SLOW_LAW, near / 10), UNCHANGED * near))
-        if scale < SLOW_LAW:
-            yield name, f"{written(read, name)} is far below all that were measured, 0.1 mm/s to 1 m/s: {asked(meant)}"
-        elif speed and scale > UNCHANGED * speed:
-            text = f"{written(read, name)} is {times(scale / speed)} the speed of sliding, "
-            text += f"{format_quantity(speed, 'm/s')}, at which friction is still that at rest: "
+        damping = (rig.value(name) or 0.0) * (1.0 if isinstance(rig, Machine) else rig.area or 1.0)
+        inertia = body.inertia * stiffness / at_body  # as at the end of which the stiffness is
+        critical = 2 * math.sqrt(inertia * stiffness)
+        if damping > OVERDAMPED * critical:
+            si, of = ("N m/rad", "N m s/rad") if body.turns else ("N/m", "N s/m")
+            least = (damping / (2 * DAMPED)) ** 2  # stiffness times inertia from which it swings well
+            meant = named(key, texts_in_units(read, key, si, between(least / inertia, body.block / STEEL)))
+            if not isinstance(rig, Machine):
+                heaviest = (rig.load_of("friction.any") or math.inf) / (G * LIGHT)
+                masses = texts_in_units(read, "slider.mass", "kg", between(least / stiffness, heaviest))
+                meant += named("mass", masses)
+            meant += named(name, texts_in_units(read, name, of, between(0.0, DAMPED * critical)))
+            text = f"{written(read, name)} is {times(damping / critical)} the critical damping of {body.told} on "
+            text += f"{format_quantity(stiffness, si)}, so that nothing swings; of drives 0.01 to 0.2 are measured: "
             yield name, text + asked(meant)
-
-
-def _slip_speed(rig: Rig, prefix: str) -> float:
-    """Speed (m/s) of steady sliding at a contact; 0 where a place is held or it is not known."""
-    if rig.holds:
-        return 0.0
-    if not isinstance(rig, Machine):
-        return abs(float(rig.drive.velocity))
-    surface = rig.contacts[prefix.split(".")[1]]
-    return abs(float(rig.speeds().get(surface.held, 0.0))) * (surface.radius or 1.0)
 
 
 def _controlled(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Question]:
@@ -271,9 +203,13 @@ def _controlled(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Qu
     def frequency(stiffness: float) -> float:
         return math.sqrt(stiffness / body.inertia) / (2 * math.pi)
 
-    swings = frequency(gain)
+    swings, si = frequency(gain), "N m/rad" if body.turns else "N/m"
+    if swings < SLOWEST:
+        meant = texts_in_units(read, name, si, lambda k: 10 * SLOWEST < frequency(k) < FAST_GAINS / 10)
+        text = f"{written(read, name)} swings {body.name}, {body.told}, once in {format_quantity(1 / swings, 's')}, "
+        yield name, f"{text}if it is of that body: {asked(meant)}"
+        return
     if swings > FAST_GAINS:
-        si = "N m/rad" if body.turns else "N/m"
         meant = texts_in_units(read, name, si, lambda k: 10 * SLOWEST < frequency(k) < FAST_GAINS / 10)
         text = f"{written(read, name)} swings {body.name}, {body.told}, at {format_quantity(swings, 'Hz')}, "
         yield name, f"{text}faster than drives do: {asked(meant)}"

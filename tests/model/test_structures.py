@@ -6,6 +6,7 @@ from scipy import io
 from scipy.linalg import eigh
 
 import steadyslip as ss
+from steadyslip.core.errors import UnitWarning
 from steadyslip.machine import (
     Machine,
     PlanarBody,
@@ -248,6 +249,42 @@ def test_modes_are_read_from_a_table(tmp_path):
                fmt="%.17g")  # fmt: skip
     machine = ss.read_rig(written(tmp_path, "reed.csv", "", "modes"))
     assert abs(ss.eigenvalues(machine)[0] - (12.4673358145 + 4565.039870161j)) < 1e-9 * 4565
+
+
+@pytest.mark.parametrize(("letter", "change", "said"), [
+    ("K", np.triu, r"stiffness has entries above its diagonal only; .* K \+ K.T - diag\(diag\(K\)\)"),
+    ("C", np.tril, r"damping has entries below its diagonal only; .* C \+ C.T"),
+    ("G", np.abs, r"gyroscopic is not skew-symmetric, .* allowed: G = -G.T; the rest is damping, C"),
+    ("K", lambda one: one * (1 + 0.01j), r"K has entries of type complex128; .* give K, and modal_damping = eta/2"),
+])  # fmt: skip
+def test_matrices_that_are_half_or_in_the_wrong_place_are_refused(tmp_path, letter, change, said):
+    mass, damping, stiffness = reed_matrices()
+    found = {"M": mass, "C": damping, "K": stiffness, "G": stiffness}
+    del found["G" if letter != "G" else "C"]
+    np.savez(tmp_path / "reed.npz", **(found | {letter: change(found[letter])}))
+    with pytest.raises(ss.RigFileError, match=said):
+        ss.read_rig(written(tmp_path, "reed.npz"))
+
+
+@pytest.mark.parametrize(("names", "ratio", "said"), [
+    ("tip.x,tap.y", 0.01, "has tap.y and tip.x alone: is that one point"),
+    ("tip.x,tip.y", 2.0, "has damping ratios from 2; of structures .0001 to .1 are measured, and 2 % is 0.02"),
+    ("way.x,tip.y", 0.01, "reed.tip has no displacement along the slide, so that friction moves nothing there"),
+])  # fmt: skip
+def test_odd_modes_are_asked_about(tmp_path, names, ratio, said):
+    (tmp_path / "modes.csv").write_text(f"frequency,damping,{names}\n70,{ratio},0.5,0.1\n90,{ratio},0.1,0.6\n")
+    path = written(tmp_path, "modes.csv", "", "modes")
+    if "way" in names:
+        path.write_text(path.read_text().replace("60 deg", "0 deg"))
+    with pytest.warns(UnitWarning, match=said):
+        ss.read_rig(path)
+
+
+def test_a_point_needs_two_degrees_of_freedom(tmp_path):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    with pytest.raises(ss.RigFileError, match=r"points.tip.y: is 58, as x; allowed: another degree of freedom"):
+        ss.read_rig(written(tmp_path, "reed.npz", "x = 58\ny = 58"))
 
 
 # Node 1 of the reed is clamped; directions 1, 2 and 6 of each node are x, y and the rotation.

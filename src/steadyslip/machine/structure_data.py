@@ -21,7 +21,10 @@ MOST_FREEDOM = 3000
 _FREE = 1e-10  # stiffness of a mode relative to the largest that counts as none; files of 11 digits
 _GOOD_TO = 0.5  # of the frequency of the last mode of a reduction, up to which it is meant to be good: usual practice
 _LISTED = 12  # degrees of freedom that a message lists: a line or two
-_SYMMETRIC = 1e-8  # relative asymmetry of an inertia matrix that is taken for rounding of a file
+_SYMMETRIC = 1e-8  # relative asymmetry of an inertia or gyroscopic matrix that is taken for rounding of a file
+_HALVES = (
+    4  # degrees of freedom from which a triangle with an entry in each row is half a matrix: smaller ones are models
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +77,7 @@ class StructureData(Displayed):
             count = len(set(self.freedoms))
             problems.append(Problem("freedoms", f"names {count} degrees of freedom; allowed: {size}, one for each row"))
         if not problems:
-            problems += self._inertia_problems()
+            problems += [*self._inertia_problems(), *self._shape_problems()]
         if problems:
             raise ParameterError(problems)
 
@@ -92,6 +95,24 @@ class StructureData(Displayed):
             yield Problem(
                 "mass", "is not positive definite; allowed: inertia in every direction; condense massless coordinates"
             )
+
+    def _shape_problems(self) -> Iterator[Problem]:
+        turning = self.gyroscopic
+        if np.max(np.abs(turning + turning.T)) > _SYMMETRIC * np.max(np.abs(turning)):
+            yield Problem(
+                "gyroscopic",
+                "is not skew-symmetric, so that it takes or feeds energy; allowed: G = -G.T; the rest is damping, C",
+            )
+        for name, letter in (("damping", "C"), ("stiffness", "K")):
+            one = getattr(self, name)
+            above, below = (np.count_nonzero(np.triu(half, 1)) for half in (one, one.T))
+            if self.size >= _HALVES and min(above, below) == 0 < self.size - 1 <= max(above, below):
+                side = "above" if above else "below"
+                whole = f"{letter} + {letter}.T - diag(diag({letter}))"
+                message = (
+                    f"has entries {side} its diagonal only; allowed: the whole matrix, of half of a symmetric one "
+                )
+                yield Problem(name, f"{message}{whole}")
 
     @property
     def size(self) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from difflib import SequenceMatcher
+from itertools import permutations
 from numbers import Integral
 from typing import Any, ClassVar
 
@@ -24,6 +26,7 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.machine.structure_data import StructureData, reduced_once
 
 _ONE = "give exactly one of matrices, modes and response"
+_SMALL = 1e-8  # share of the largest eigenvalue of a damping matrix that is taken for rounding of a file
 _UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
 
 
@@ -195,6 +198,9 @@ class StructureBody(Body, name="structure"):
                 found = ", ".join(self._read.points)
                 hint = f"; the file names {found}" if found else ""
                 yield Problem(f"points.{name}.x", f"missing; give the degree of freedom along x, y or both{hint}")
+            if taken and point.x == point.y:
+                message = f"is {repr_short(point.y)}, as x; allowed: another degree of freedom, or none"
+                yield Problem(f"points.{name}.y", message)
             for axis in ("x", "y"):
                 try:
                     if (place := getattr(point, axis)) is not None:
@@ -205,6 +211,26 @@ class StructureBody(Body, name="structure"):
         most = self._read.size - len(self._rows)
         if self.kept_modes is not None and self.kept_modes > most:
             yield Problem("kept_modes", f"got {self.kept_modes}; allowed: up to {most}, the other degrees of freedom")
+
+    def doubts(self) -> Iterator[str]:
+        """Yield what is unusual about allowed values, in sentences that begin with a name in the body's table."""
+        small = "of structures .0001 to .1 are measured, and 2 % is 0.02"
+        if self.modal_damping is not None and self.modal_damping >= 1:
+            yield f"modal_damping = {self.modal_damping:g} is a damping ratio; {small}"
+        if self.modes is not None:
+            of_modes = self.modes
+            critical = 2 * np.sqrt(np.diag(of_modes.mass) * np.diag(of_modes.stiffness))
+            ratios = np.diag(of_modes.damping)[critical > 0] / critical[critical > 0]
+            if len(ratios) and np.min(ratios) >= 1:
+                yield f"modes: {of_modes.source!r} has damping ratios from {np.min(ratios):g}; {small}"
+            for (one, (_, y)), (other, (x, _)) in permutations(of_modes.points.items(), 2):
+                alone = of_modes.points[one][0] is None and of_modes.points[other][1] is None
+                if alone and y is not None and x is not None and SequenceMatcher(None, one, other).ratio() >= 0.5:
+                    yield f"modes: {of_modes.source!r} has {one}.y and {other}.x alone: is that one point?"
+        elif self.matrices is not None:
+            own = np.linalg.eigvalsh(0.5 * (self.matrices.damping + self.matrices.damping.T))
+            if own[0] < -_SMALL * np.max(np.abs(own)):
+                yield "matrices: the damping C feeds some motions (it has negative eigenvalues): is its sign right?"
 
     @property
     def data(self) -> StructureData:

@@ -7,6 +7,8 @@ import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import UnitWarning
 from steadyslip.core.format import format_quantity
@@ -17,6 +19,7 @@ from steadyslip.files.specifications.other_units import number_of
 from steadyslip.files.specifications.sizes import questions_of_size
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
+from steadyslip.machine.structures import StructureBody
 
 SPEEDS = ("m/s", "rad/s")
 STIFFNESSES = ("N/m", "Pa/m")
@@ -120,9 +123,26 @@ def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
             continue  # what a law doubts is how these compare
         for text in one.friction.doubts():
             found.setdefault(text, []).append(one.prefix)
+    if isinstance(rig, Machine):
+        yield from _structure_doubts(rig)
     for text, (first, *others) in found.items():
         names = " and ".join(prefix.removesuffix(".") for prefix in (first, *others))
         yield f"{names}: {text}" if others else f"{first}{text}"
+
+
+def _structure_doubts(rig: Machine) -> Iterator[str]:
+    """What structures doubt, and contacts at points that do not move along the slide."""
+    structures = {name: body for name, body in rig.bodies.items() if isinstance(body, StructureBody)}
+    for name, body in structures.items():
+        yield from (f"bodies.{name}.{text}" for text in body.doubts())
+    ends = [(name, end) for name, own in rig.contacts.items() for end in (own.body, own.against) if end]
+    for contact, end in ends:
+        name, _, point = end.partition(".")
+        if name in structures and not np.any(structures[name].rows(point)[0]):
+            yield (
+                f"contacts.{contact}: {end} has no displacement along the slide, so that friction moves nothing there: "
+                f"is there a column or degree of freedom x of it? Points: {', '.join(structures[name].point_names())}"
+            )
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:

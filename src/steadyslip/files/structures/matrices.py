@@ -87,6 +87,8 @@ def _from_numpy(path: str, folder: Path) -> NamedMatrices:
             return NamedMatrices(
                 {letter: _dense(path, letter, table[letter]) for letter in LETTERS if letter in table.files}, names
             )
+    except UnreadableFile:
+        raise
     except (zipfile.BadZipFile, OSError, ValueError, EOFError, KeyError) as error:
         raise UnreadableFile(path, f"it is no file that numpy.savez writes ({error})") from error
 
@@ -159,5 +161,6 @@ def _dense(path: str, letter: str, given: Any) -> Array:
         raise UnreadableFile(path, f"{letter} has shape {shape}; allowed: square, up to {MOST_FREEDOM} rows")
     full = given.toarray() if hasattr(given, "toarray") else np.asarray(given)
     if full.dtype.kind not in "fiu":
-        raise UnreadableFile(path, f"{letter} has entries of type {full.dtype}; allowed: real numbers")
+        lossy = "; of K (1 + i eta) give K, and modal_damping = eta/2" if np.iscomplexobj(full) else ""
+        raise UnreadableFile(path, f"{letter} has entries of type {full.dtype}; allowed: real numbers{lossy}")
     return full.astype(float)

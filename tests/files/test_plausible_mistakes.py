@@ -55,6 +55,7 @@ MISTAKES_OF_MACHINES = {
     "a stiffness for what turns": ('"120 N/um"', '"120 N m/rad"', "at a radius, divide by its square"),
     "a mass for an inertia": ('"40 kg cm^2"', '"40 kg"', "expected a quantity in kg m^2, for example '1 kg m^2'"),
     "a speed of what turns": ('v_ref = "1 mm/s"', 'v_ref = "6.5 rad/s"', "at a radius, multiply by the radius"),
+    "a diameter": ("[contacts.guide]", '[contacts.guide]\ndiameter = "40 mm"', "did you mean 'radius'"),
     "a torque for a force": ('"3 kN"', '"3 Nm"', "at a radius, divide by the radius"),
     "bristles of what turns": ('"5 um"', '"5 deg"', "at a radius, multiply by the radius"),
 }
@@ -87,6 +88,17 @@ def test_a_misspelt_table_is_one_problem_on_its_line(right, wrong, count):
     (problem,) = raised.value.problems
     assert problem.line == line
     assert f"unknown table {name!r}; did you mean {right.strip('[].')!r}?" in problem.message
+
+
+def test_a_part_under_nearly_the_name_of_its_contact_is_one_problem():
+    """There were three: two of what the misspelt one lacks, and one of what the other does."""
+    text = SHEETS["telescope worm"].replace("[contacts.bearing.contact]", "[contacts.bearings.contact]")
+    with pytest.raises(ss.RigFileError, match=r"only contact, which contacts\.bearing lacks; did you mean 'bearing'"):
+        ss.rig_from_text(text)
+    both = MACHINE + '[bodies.tables]\nmotion = "rotation"\n'  # a body of its own, joined to nothing
+    with pytest.raises(ss.RigFileError) as raised:
+        ss.rig_from_text(both)
+    assert "did you mean" not in str(raised.value)
 
 
 def test_a_misspelt_table_hides_no_other_problem():

@@ -88,7 +88,7 @@ MISTAKES = {
     "N/mm of bristles": (AXIS, "500 N/um", "500 N/mm", 'bristles by 1.76 mm .* is "500 N/um at 5.5 kN"'),
     "N/nm of bristles": (AXIS, "500 N/um", "500 N/nm", 'bristles by 1.76 nm .* is "500 N/um at 5.5 kN"'),
     "N m/arcsec of a gain": (TELESCOPE, "0.8 N m/rad", "0.8 N m/arcsec", 'motor, .* at 4819 Hz, .* is "0.8 N m/rad"'),
-    "s for ms": (HELD, "1 ms", "1 s", 'sample_time = 1 s is 43 times the period of .* 23.51 ms: is "1 ms" or "1 us"'),
+    "s for ms": (HELD, "1 ms", "1 s", '= 1 s is 43 times the period of .* 23.51 ms: is "sample_time = 1 ms"'),
     "a radius": (TELESCOPE, "450 mm", "450 m", "radius = 450 m; the largest in use are some 2 m: write the unit"),
     "m for mm": (WORM, "40 mm", "40 m", '200 times the radius of a steel ball .* is "40 mm" meant'),
     "kg cm^2 for kg m^2": (WORM, "4.2 kg m^2", "4.2 kg cm^2", '2100 times that inertia: is "axis: 4.2 kg m.2" meant'),
@@ -104,6 +104,9 @@ MISTAKES = {
     "km/s for km/h": (SHEETS["brake"], "2 km/h", "2 km/s", "makes the slider slide at 2000 m.s: is"),
     "um/min for mm/min": (AXIS, "3 mm/min", "3 um/min", '4000 times the speed .* is "velocity = 3 mm/min" meant'),
     "kN s/mm of viscous friction": (PRESS, "5 kN s/m", "5 kN s/mm", '1.5 of viscous .* "5 N s/mm at 10 kN" meant'),
+    "Nms for mNms": (WORM, "1 mNms", "1 Nms", '860 times .* on the gain kp: is "1 mN m s/rad" meant'),
+    "kN/um of a gain": (HELD, "30 N/um", "30 kN/um", '1.3 times the period .* or "kp = 30 N/um"'),
+    "N/um of a motor's bristles": (SERVO, '"5000 1/m"', '"5000 N/um at 65 N"', "bristles by 1.95 nm before they slip"),
     "damping of bristles": (PRESS, '"100 N s/m at 10 kN"', "100", '3.7 times .* is "100 N s/m at 10 kN" or'),
 }  # fmt: skip
 

@@ -31,7 +31,7 @@ class Surface(FrozenRecord):
     radius: float | None = parameter(
         "m",
         positive,
-        "radius r of the contact, of a body that turns; slip is radius times angle",
+        "radius r of the contact, half its diameter, of a body that turns; slip is radius times angle",
         default=None,
         letter="r",
     )

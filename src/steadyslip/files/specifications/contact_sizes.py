@@ -95,7 +95,7 @@ def _bristles(rig: Rig, read: Read) -> Iterator[Question]:
 def _bends_well(rig: Rig, name: str, bend: float) -> bool:
     """True if bristles that bend by this length (m) are like those of some contact."""
     radius = rig.contacts[name.split(".")[1]].radius if isinstance(rig, Machine) else None
-    return bool(bend <= TURNED * radius) if radius else THIN <= bend <= THICK
+    return THIN <= bend <= (TURNED * radius if radius else THICK)
 
 
 def _unchanged(rig: Rig, read: Read) -> Iterator[Question]:

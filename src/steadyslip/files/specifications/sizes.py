@@ -33,6 +33,7 @@ SAG = 0.5  # rad: arms on springs by intent sag by 0.2 to 0.3 rad
 STEEL = 10.0  # times softer than a block of steel is what is made of several parts
 OVERDAMPED, DAMPED = 1.0, 0.2  # of critical damping; of shafts, screws and guides 0.01 to 0.2 are measured
 FAST_GAINS = 3e3  # Hz: ten times the bandwidth of drives of machines
+OVERDAMPED_GAIN = 50.0  # of critical damping: a load in front of the motor asks for some 10 times that of the motor
 LATE = 0.5  # of the period of a controller: samples tell no faster oscillation (Nyquist)
 UNLIKE = 500.0  # times the inertia that it turns is that of a motor through its gear: of light arms up to 100
 GEARED_UP = 10.0  # turns of a body for one of its motor
@@ -214,12 +215,26 @@ def _controlled(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Qu
         text = f"{written(read, name)} swings {body.name}, {body.told}, at {format_quantity(swings, 'Hz')}, "
         yield name, f"{text}faster than drives do: {asked(meant)}"
         return
+    yield from _overdamped_gain(rig, read, body, gain)
     for late in ("drive.sample_time", "drive.delay"):
         lag = known[late].value if isinstance(read.get(late, (None, ""))[0], str) else None
         if lag and lag * swings > LATE:
-            meant = texts_in_units(read, late, "s", lambda t: t * swings < LATE / 5)
+            meant = named(late, texts_in_units(read, late, "s", between(0.0, LATE / 5 / swings)))
+            slowest, fastest = (body.inertia * (2 * math.pi * one) ** 2 for one in (10 * SLOWEST, LATE / 5 / lag))
+            meant += named(name, texts_in_units(read, name, si, between(slowest, fastest)))
             text = f"{written(read, late)} is {times(lag * swings)} the period of {body.name} on the gain kp, "
             yield late, f"{text}{format_quantity(1 / swings, 's')}: {asked(meant)}"
+
+
+def _overdamped_gain(rig: Rig, read: Read, body: Body, gain: float) -> Iterator[Question]:
+    """Question about a gain kd that damps a body far beyond what lets it follow the gain kp."""
+    name, of = "drive.kd", "N m s/rad" if body.turns else "N s/m"
+    critical = 2 * math.sqrt(gain * body.inertia)
+    damping = (rig.value(name) or 0.0) * (rig.area or 1.0) if name in read else 0.0
+    if damping > OVERDAMPED_GAIN * critical:
+        meant = texts_in_units(read, name, of, between(0.05 * critical, 10 * critical))
+        text = f"{written(read, name)} is {times(damping / critical)} the critical damping of {body.name}, "
+        yield name, f"{text}{body.told}, on the gain kp: {asked(meant)}"
 
 
 def _massless(rig: Rig, read: Read) -> Iterator[Question]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import Field, fields, replace
+from difflib import get_close_matches
 from typing import Any
 
 from steadyslip.core.areas import is_per_area, total_unit
@@ -27,6 +28,8 @@ from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.rig import Rig
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
+
+ONE_NAME = 0.8  # likeness of two names of which one is the other misspelt: azimut and azimuth
 
 
 class TableReader:
@@ -138,7 +141,7 @@ class TableReader:
             self.problem(name, f"got {repr_short(raw)}; allowed: a table for each, [{name}.NAME]")
             return None
         before, found = len(self.problems), {}
-        for key, member in raw.items():
+        for key, member in self._of_one_spelling(raw, name).items():
             if wrong := unfit_name(key):
                 self.problem(f"{name}.{legible(key)}", wrong)
             elif not isinstance(member, dict):
@@ -150,6 +153,19 @@ class TableReader:
             elif (one := self.record(role.family, member, f"{name}.{key}.")) is not None:
                 found[key] = one
         return Members(found) if len(self.problems) == before else None
+
+    def _of_one_spelling(self, raw: Table, name: str) -> Table:
+        """Tables by name; parts of one, tables as well, that are under nearly its name are reported and put there."""
+        tables = {key: one for key, one in raw.items() if isinstance(one, dict)}
+        for key, part in tables.items():
+            if not all(isinstance(one, dict) for one in part.values()):
+                continue  # a table with values of its own is not a part alone
+            larger = [one for one, rest in tables.items() if len(rest) > len(part) and not set(rest) & set(part)]
+            if meant := next(iter(get_close_matches(key, larger, n=1, cutoff=ONE_NAME)), None):
+                keys = enumerated(list(part))
+                self.problem(f"{name}.{key}", f"has only {keys}, which {name}.{meant} lacks; did you mean {meant!r}?")
+                raw = {one: rest | part if one == meant else rest for one, rest in raw.items() if one != key}
+        return raw
 
     def _law(self, family: type[FrozenRecord], name: object, where: str) -> type[FrozenRecord] | None:
         try:

@@ -40,7 +40,7 @@ class SvgPencil(Pencil):
         return (
             '<svg xmlns="http://www.w3.org/2000/svg" class="sketch machine" role="img" '
             f'aria-label="sketch of the machine" viewBox="{x:.0f} {y:.0f} {wide:.0f} {tall:.0f}" '
-            f'style="max-width:{0.85 * wide:.0f}px" fill="none" stroke="currentColor" stroke-width="1.4" '
+            f'style="max-width:{1.1 * wide:.0f}px" fill="none" stroke="currentColor" stroke-width="1.4" '
             f'font-family="inherit">{"".join(self.parts)}</svg>'
         )
 

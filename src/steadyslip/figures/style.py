@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
 
 from steadyslip.core.areas import outside, stress_name, told_area
 from steadyslip.core.dimensions import unit
@@ -196,6 +196,9 @@ def _parts_ticks(figure: Any, bins: int) -> bool:
         touching = any(a.x1 + 0.4 * a.height > b.x0 > a.x0 for a, b in pairwise(boxes))
         if touching and isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             ax.locator_params(axis="x", nbins=bins)
+            found = True
+        elif touching and isinstance(ax.xaxis.get_major_locator(), FixedLocator):  # ticks that were set: every other
+            ax.set_xticks(ax.get_xticks()[::2], [one.get_text() for one in ax.get_xticklabels()[::2]])
             found = True
     return found
 

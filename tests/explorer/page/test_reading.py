@@ -164,3 +164,25 @@ def test_numbers_stay_with_their_units_and_letters_with_their_subscripts(browser
         assert visit.page.evaluate("(t => t.scrollWidth <= t.clientWidth)(document.querySelector('.tools'))")
         visit.page.locator(".tabs").get_by_role("button", name="motion").click()
         assert visit.page.locator(".verdict").bounding_box()["height"] <= 90
+
+
+def test_a_narrow_page_prints_its_chart(browser, file):
+    """It is drawn only where it is seen; a print shows all parts."""
+    with Visit(browser, file) as visit:
+        visit.page.set_viewport_size({"width": 390, "height": 844})
+        visit.page.reload()
+        visit.page.locator(".steadyslip[data-ready]").wait_for(state="attached")
+        chart = visit.page.locator("svg[role=application] path.region.stable")
+        assert chart.count() == 0
+        visit.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        assert chart.get_attribute("d")
+
+
+def test_every_contour_has_its_number(browser, tmp_path):
+    """Pieces of one that lie apart have one each."""
+    ss.explore(ss.read_rig("examples/machines/brake-pad.toml")).save(tmp_path / "pad.html")
+    with Visit(browser, tmp_path / "pad.html") as visit:
+        lines = visit.page.locator(".contours path")
+        assert lines.count() >= 3
+        assert visit.page.locator(".contours path + text").count() == lines.count()
+        assert visit.page.locator(".contours text").count() > lines.count()

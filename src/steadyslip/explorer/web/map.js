@@ -12,6 +12,7 @@ const THINNED = 2.5; // factor of fewer rows while a slider moves
 const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows of machines and of sliders, and levels of k/k_cr
 const FEW = 5; // steps of the search for a contour of a machine on a side of a cell: each is some .2 ms, and the growth rate is smooth
 const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
+const NUMBERS = 4, AGAIN = 130; // most numbers of a contour, which may be in pieces, and their least distance, SVG units
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Chart {
@@ -71,8 +72,9 @@ export class Chart {
     this.page.move(this.axes, this.axes.map((i, which) => this.page.scale(i).of(rig.values[i]) + far * steps[which]), false);
   }
 
-  show() {
-    if (this.page.root.dataset.width === "narrow" && this.page.part !== "chart") return; // not visible
+  /** Update the chart, if it is visible or printed. @param {boolean} [printed] */
+  show(printed = false) {
+    if (this.page.root.dataset.width === "narrow" && this.page.part !== "chart" && !printed) return;
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
     this.choices.forEach((select, which) => (select.selectedIndex = this.axes[which]));
@@ -114,13 +116,19 @@ export class Chart {
       const [lower, upper] = [0, UPPER].map((more) => at(level / (1 + level) + more));
       return { path: lower.path + upper.path, middles: [...lower.middles, ...upper.middles] };
     });
+    const known = /** @type {number[]} */ ([]);
     drawn.forEach(({ path, middles }, n) => {
-      const beside = [own, ...words.map((one) => [one.x, one.y, 0.3]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))];
-      const room = ([u, v]) => Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b, wide = 1]) => Math.hypot(wide * (a - u), b - v)));
-      const [u, v] = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
-      this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...(room([u, v]) > TIGHT ? [svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))] : []));
+      const beside = [own, ...words.map((one) => [one.x, one.y, 0.3]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))], numbers = /** @type {number[][]} */ ([]);
+      const room = ([u, v]) => (numbers.some(([a, b]) => Math.hypot(a - u, b - v) < AGAIN) ? 0 : Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b, wide = 1]) => Math.hypot(wide * (a - u), b - v))));
+      for (let best; numbers.length < NUMBERS; numbers.push(best)) {
+        best = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
+        if (room(best) <= TIGHT) break;
+      }
+      if (!numbers.length) return; // a contour without a number tells nothing
+      known.push(levels[n]);
+      this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...numbers.map(([u, v]) => svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))));
     });
-    if (phrases) this.refine(Array.from(this.lines.querySelectorAll("path")), (n) => line(grid, levels[n], width, height, { exact, steep: 0, steps: FEW, bends: true }).path);
+    if (phrases) this.refine(Array.from(this.lines.querySelectorAll("path")), (n) => line(grid, known[n], width, height, { exact, steep: 0, steps: FEW, bends: true }).path);
   }
 
   /** Draw contours of a machine anew where they run exactly, one after another, so that the page answers in between. @param {any[]} paths @param {(n: number) => string} exactly */

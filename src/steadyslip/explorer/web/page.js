@@ -103,6 +103,7 @@ export class Page {
       this.chart.show();
       this.course.draw();
     }).observe(root);
+    window.addEventListener("beforeprint", () => this.chart.show(true));
     window.addEventListener("hashchange", (event) => {
       const link = new URL(event.newURL).hash; // not location.hash, which may have changed since
       if (this.told || link === this.hash()) return;

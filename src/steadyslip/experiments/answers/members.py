@@ -20,12 +20,10 @@ from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import STRESS
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.measured.same import is_same_measurement
 from steadyslip.experiments.numerics.pooling import ExperimentEstimate
-from steadyslip.experiments.numerics.splitting import displacement_noise, spread
 from steadyslip.model.sliding import steady_state
 
-FEWEST_SHARED, LEAST_SHARED = 8, 0.5  # samples, and share of the sparser record, that two must share to be one
-SAME_NOISE = 0.3  # scatter of their difference, in that of its noise: 1 or more of two experiments, 0 of one
 DIFFERENCE = "a - b"  # a less the sum of all b, as fits name it
 
 
@@ -165,32 +163,14 @@ def problems_together(fits: Mapping[str, Fit]) -> list[Problem]:
     known: list[tuple[str, Record]] = []
     for label, one in fits.items():
         for record in one.plan.records:
-            first = next((owner for owner, other in known if owner != label and _same_measured(record, other)), None)
+            first = next(
+                (owner for owner, other in known if owner != label and is_same_measurement(record, other)), None
+            )
             known.append((label, record))
             if first is not None:
                 message = f"has the record of {first} again ({record.source}), whole, cut or averaged; an experiment "
                 found.append(Problem(f"fits.{label}", f"{message}counts once"))
     return found
-
-
-def _same_measured(one: Record, other: Record) -> bool:
-    """True if two records have the same noise where they overlap, so that one is the other, cut, thinned or averaged.
-
-    The noise of two experiments is independent, and so their difference has at least that of the sparser one.
-    """
-    fine, sparse = (one, other) if len(one) >= len(other) else (other, one)
-    inside = (sparse.time >= fine.time[0]) & (sparse.time <= fine.time[-1])
-    time, friction = sparse.time[inside], sparse.friction[inside]
-    if len(time) < max(FEWEST_SHARED, LEAST_SHARED * len(sparse)):
-        return False
-    noise = displacement_noise(time, friction)
-    edges = np.searchsorted(fine.time, np.append(time[0], 0.5 * (time[1:] + time[:-1])))
-    counts = np.diff(edges, append=max(int(np.searchsorted(fine.time, time[-1], side="right")), edges[-1] + 1))
-    sums = np.append(0.0, np.cumsum(fine.friction))
-    means = (sums[np.minimum(edges + counts, len(fine))] - sums[edges]) / np.maximum(counts, 1)
-    return any(
-        spread(friction - same) < SAME_NOISE * noise for same in (means, np.interp(time, fine.time, fine.friction))
-    )
 
 
 def labelled(fits: Sequence[Fit]) -> dict[str, Fit]:

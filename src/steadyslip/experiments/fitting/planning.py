@@ -24,6 +24,7 @@ from steadyslip.experiments.fitting.settings import FitSettings, faults
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.clipped import without_clipped, without_wild
 from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.measured.same import is_same_measurement
 from steadyslip.experiments.measured.waves import without_wave
 from steadyslip.experiments.numerics.splitting import spread
 from steadyslip.machine.input_units import in_units_of
@@ -219,6 +220,10 @@ def check_records(plan: Plan) -> None:
             problems.append(
                 Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
             )
+        for k, other in enumerate(plan.records[: i - 1], start=1):
+            if is_same_measurement(record, other):
+                again = f"is record {k} again ({record.source}), whole, cut or averaged; an experiment counts once"
+                problems.append(Problem(where, again))
         needed = len(plan.free) + plan.trend + plan.offset + (plan.initial == "free")
         if len(record) <= needed:
             problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))

@@ -20,6 +20,7 @@ from steadyslip.protocol.protocol import LOAD_POINT
 
 _RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a thousandth of its stretch: of no account
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
+OTHER_UNIT = 20.0  # times the calibrated stiffness: lags and servos make it up to 2 times, units 1000 times
 CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
 WAVY = 4.0  # times its noise from sample to sample by which a displacement wanders, from which waves are told
 MOST_FAULTS = 10  # slips and glitches of a sensor beyond which waves are told; the most of real records had 5
@@ -176,13 +177,22 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
 
 def _off_calibration(fit: FitNumbers) -> list[str]:
     """Warning on a fitted stiffness that differs from the calibrated one by more than both are uncertain."""
-    return [
-        f"the fitted stiffness is {one.value:.3g} of the calibrated one ({one.range()}): a channel that comes "
-        f"{'late or a servo that lags' if one.value < 1 else 'early or a servo that overshoots'} may make "
-        "that (lag = true); where the calibration holds, name the stiffness in fixed"
-        for one in fit.derived
+    far = [
+        one for one in fit.derived
         if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
-    ]
+    ]  # fmt: skip
+    found = []
+    for one in far:
+        if 1 / OTHER_UNIT < one.value < OTHER_UNIT:
+            late = "late or a servo that lags" if one.value < 1 else "early or a servo that overshoots"
+            why = f"a channel that comes {late} may make that (lag = true); where the calibration holds, name the "
+            why += "stiffness in fixed"
+        else:
+            why = "by so much a column or the calibration is in another unit (um and mm, MPa and Pa)"
+        _, at, which = one.name.partition("@")
+        where = f" of {fit.plan.records[int(which) - 1].source}" if at and which.isdigit() else ""
+        found.append(f"the fitted stiffness{where} is {one.value:.3g} of the calibrated one ({one.range()}): {why}")
+    return found
 
 
 def _unusual_distances(fit: FitNumbers) -> list[str]:

@@ -33,6 +33,7 @@ from steadyslip.model.sliding import steady_state
 
 MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
 END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
+UNEQUAL = 3.0  # ratio of noise at which two records that weigh alike have errors 1.7 times those with weights
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
@@ -106,10 +107,28 @@ def warnings(fit: FitNumbers) -> list[str]:
     follows = fit.at_bounds if best is not None and best.p >= STRUCTURE else ()
     first = _structure(fit) if best is not None else []
     found = [one for one in fitted_warnings(fit) if one not in follows]
-    found += _open_memory(fit) + _left_out(fit) + _ends_off_model(fit)
+    found += _open_memory(fit) + _left_out(fit) + _unequal_noise(fit) + _ends_off_model(fit)
     found += _vague_jumps(fit) + _possible_ramps(fit) + loading_warnings(fit)
     last = _structure(fit) if best is None else []
     return first + found + last + _drained_at_once(fit) + version_warnings(fit)
+
+
+def _unequal_noise(fit: FitNumbers) -> list[str]:
+    """Warning on records of unequal noise that weigh alike in a joint fit."""
+    if fit.plan.weights is not None or len(fit.plan.records) < 2:
+        return []
+    spreads = [
+        float(np.std(fit.residuals[where]) * np.sqrt(max(noise.inflation, 1.0)))
+        for where, noise in zip(fit.comparison.slices, fit.noise, strict=True)
+    ]
+    least, most = int(np.argmin(spreads)), int(np.argmax(spreads))
+    if spreads[most] <= UNEQUAL * spreads[least]:
+        return []
+    noisy, quiet = (fit.plan.records[k].source for k in (most, least))
+    return [
+        f"{noisy} has {spreads[most] / max(spreads[least], 1e-300):.0f} times the noise of {quiet}, its correlation "
+        f"counted, and records weigh alike: errors may be larger than those of {quiet} alone; give weights (in Python)"
+    ]
 
 
 def _ends_off_model(fit: FitNumbers) -> list[str]:
@@ -341,7 +360,9 @@ def drive_line(fit: FitNumbers) -> str:
     text += (
         f", {len(free)} of {'its' if count + sum(pressed.values()) == 1 else 'their'} {what_of} fitted" if free else ""
     )
-    text += "".join(_servo(course) for course in loads)
+    for record, course in zip(plan.records, loads, strict=False):
+        servo = _servo(course)
+        text += f"{servo} in {record.source}" if servo and len(loads) > 1 else servo
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
         text += "; at rest at first, how long is fitted (start.hold)"
     if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):

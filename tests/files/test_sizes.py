@@ -3,6 +3,7 @@
 import math
 import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -240,3 +241,28 @@ def test_plausible_rigs_are_not_asked_about(make):
     for _ in range(200):
         text = make(chance)
         assert asked(text) == [], text
+
+
+ROOT = Path(__file__).parents[2]
+
+
+def shipped():
+    """Rigs that come with the package or stand in its pages, by name."""
+    found = {str(path.relative_to(ROOT)): path for path in (ROOT / "examples").rglob("*.toml")}
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        for i, text in enumerate(re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.S)):
+            if "[drive]" in text and "friction" in text:
+                found[f"{page.name} {i}"] = text
+    return found
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_shipped_rigs_are_not_asked_about(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        one = shipped()[name]
+        try:
+            rig = ss.read_rig(one) if isinstance(one, Path) else ss.rig_from_text(one)
+        except ss.RigFileError:  # a file of fits or maps, or a part of one
+            return
+    assert rig.drive is not None

@@ -510,6 +510,15 @@ def test_a_table_of_several_loads_tells_how_a_rig_is_given_them(tmp_path, radius
             assert steady.friction_force * radius == pytest.approx(expected, rel=1e-4)
 
 
+def test_loads_that_friction_does_not_follow_are_told():
+    speed = np.tile([1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2], 2)
+    table = {"speed": speed, "force": 100 * curve(speed, 1, 2, 1e-3, 0.0, 1.0), "load": np.repeat([500.0, 1000.0], 6)}
+    found = ss.experiments.fit_friction_table(table, "lugre", hold={"viscous": 0.0})
+    assert "  loads 500 N and 1 kN: friction hardly follows them, and rises by " in str(found)
+    assert "# The table has the loads 500 N and 1 kN, which friction hardly follows.\n" in found.rig_text()
+    assert "transmitted" not in found.rig_text()
+
+
 def test_loads_that_friction_follows_alone_leave_nothing_beside_them():
     speed = np.tile([1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2], 2)
     load = np.repeat([500.0, 1000.0], 6)

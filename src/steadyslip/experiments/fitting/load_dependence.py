@@ -9,6 +9,7 @@ from steadyslip.experiments.fitting.speed_fit import SAME, DirectionFit, SpeedFi
 from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET
 
 LISTED = 4  # loads that are told one by one
+HARDLY = 10.0  # times the largest load that presses beside it, from which friction is told not to follow the load
 NONE = 1e-6  # share of the load, or of friction, below which what is fitted beside it is told as none
 
 
@@ -51,6 +52,8 @@ def dependence(found: SpeedFindings, one: DirectionFit) -> str | None:
         return None
     offset = pressed_beside(one)
     rises = 100 * ((loads[-1] + offset) / (loads[0] + offset) - 1)
+    if offset > HARDLY * loads[-1]:
+        return f"  loads {loads_told(found, one)}: friction hardly follows them, and rises by {rises:.2g} %"
     text = f"  loads {loads_told(found, one)}: friction is in proportion to the load"
     if (beside := {estimate.name: estimate for estimate in one.estimates}.get(OFFSET)) is not None:
         text += f" + {OFFSET}"
@@ -65,6 +68,8 @@ def how_to_give_it(found: SpeedFindings, lever: float) -> list[str]:
     if len(loads) < 2:
         return []
     offset = pressed_beside(one)
+    if offset > HARDLY * loads[-1]:
+        return [f"# The table has the loads {loads_told(found, one)}, which friction hardly follows."]
     beside = f" + {told(found, offset)}" if offset else ""
     over = "" if lever == 1 else f", over the radius: {lever:.6g} N for 1 N m"
     lines = [f"# The table has the loads {loads_told(found, one)}; friction is in proportion to load{beside}.",
@@ -84,7 +89,8 @@ def how_to_give_it(found: SpeedFindings, lever: float) -> list[str]:
 
 def summary(found: SpeedFindings, load: float) -> str | None:
     """Sentence on the load of the rig file (N) and the others of the table; None with fewer than two loads."""
-    if len(loads_of(found, found.main)) < 2:
+    loads = loads_of(found, found.main)
+    if len(loads) < 2 or pressed_beside(found.main) > HARDLY * loads[-1]:
         return None
     return (
         f"The rig file has one constant load, {told(found, load)}, the middle of the table's; its comments tell how "

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 
 from steadyslip.core.format import format_quantity
+from steadyslip.core.roles import Placeholder
 from steadyslip.files.specifications.contact_sizes import LIGHT, G, questions_of_contacts
 from steadyslip.files.specifications.held_bodies import Body, Spring, bodies_of, springs_of
 from steadyslip.files.specifications.other_units import (
@@ -40,7 +41,7 @@ GEARED_UP = 10.0  # turns of a body for one of its motor
 
 
 def questions_of_size(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about the sizes of a rig, at most one for each parameter; none for rigs in stresses.
+    """Questions about the sizes of a rig, at most one for each parameter; none in stresses, or of one to be fitted.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def questions_of_size(rig: Rig, read: Read) -> Iterator[Question]:
     read : mapping of str to (object, str)
         Names of the values read, each as it was written and with its SI unit.
     """
-    if not (rig.in_forces or rig.area is not None):
+    if not (rig.in_forces or rig.area is not None) or any(isinstance(raw, Placeholder) for raw, _ in read.values()):
         return
     bodies = bodies_of(rig)
     springs = springs_of(rig, bodies)
@@ -238,9 +239,9 @@ def _overdamped_gain(rig: Rig, read: Read, body: Body, gain: float) -> Iterator[
 
 
 def _massless(rig: Rig, read: Read) -> Iterator[Question]:
-    """Question about the mass of a slide that was not given, of one with a damping or a Stribeck curve."""
+    """Question about the mass of a slide that was not given, of one with a Stribeck curve."""
     if isinstance(rig, Machine) or "slider.mass" in read:
         return
-    if "slider.damping" in read or any(one.role.kind == "exponent" for one in rig.parameters().values()):
+    if any(one.role.kind == "exponent" for one in rig.parameters().values()):
         text = "slider.mass is not given, so nothing swings; write the mass, or mass = 0 if it is left out on purpose"
         yield "slider.mass", text

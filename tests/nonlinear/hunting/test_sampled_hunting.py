@@ -138,6 +138,7 @@ def test_a_controller_sees_multiples_of_the_step_at_the_body_that_it_measures(me
     assert ("encoder         1 um of table, 0.036 deg of motor\n" in str(found)) == (measured == "table")
 
 
+@pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")  # no scale has a step of a metre
 def test_a_speed_that_is_measured_elsewhere_is_not_rounded():
     """A scale of a step that the table never makes: the speed of the motor is still felt."""
     rig = held(RINGING, control="'rotary-p-pi'", body="'motor'", measured="'table'", kv="'30 1/s'",

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import sympy as sp
 
 import steadyslip as ss
 from data_sheets import SHEETS
@@ -205,6 +206,15 @@ def test_formulas_break_into_parts_that_a_telephone_shows(path):
         side = one.args[0] if one.args[1] == 0 else one.args[1]
         whole = "".join(signs(math(term)) for term in side.as_ordered_terms())
         assert re.sub("[+−]", "", whole) in re.sub("[+−]", "", signs(text))
+
+
+def test_a_sum_has_its_signs():
+    """The minus of a numerator is not that of its term."""
+    a, b, c, d = sp.symbols("a b c d", positive=True)
+    for numerator in (b - c, -b - c, b + c):
+        term = sp.Mul(numerator, 1 / d, evaluate=False)
+        text = equation(sp.Eq(c, a + term))
+        assert re.search("a</mi>(</?mrow>)*<mo form=.infix.>[+−]</mo>(<mrow>)*<mfrac>", text)
 
 
 def signs(markup):

@@ -72,6 +72,7 @@ STYLE = """
 .steadyslip-told math { font-size: 17px; white-space: nowrap; }
 @media screen and (max-width: 600px) {
   .steadyslip-told .formula math { font-size: 14px; }
+  .steadyslip-told .formula mfrac { font-size: 12px; }
   .steadyslip-told .formula :is(math, mtd) { display: flex; flex-wrap: wrap; align-items: center;
     row-gap: 4px; }
   .steadyslip-told .formula math { justify-content: safe center; }
@@ -235,7 +236,7 @@ def _term(text: str, first: bool) -> list[str]:
 
     A wide term is in pieces, between which lines may end.
     """
-    if not first and re.sub("<.*?>", "", text).startswith("−"):
+    if not first and re.match("(<mrow>)*<mo>−</mo>", text):  # not that of a numerator
         text = text.replace("<mo>−</mo>", '<mo form="infix">−</mo>', 1)
     elif not first:
         text = f'<mo form="infix">+</mo>{text}'
@@ -327,7 +328,9 @@ def _with_low_brackets(text: str) -> str:
 class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types
     """Printer of MathML that looks alike in every font: no root signs, whose bar some lack, no towers of exponents."""
 
-    _inline = False  # fractions are on one line: within exp and log, where they would be too small to be read
+    _inline = (
+        False  # fractions are on one line: within exp, log and fractions, where they would be too small to be read
+    )
 
     def _print_exp(self, expression: sp.exp) -> Any:
         return self._print_inline(sp.Function("exp")(*expression.args))
@@ -335,20 +338,22 @@ class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no
     def _print_log(self, expression: sp.log) -> Any:
         return self._print_inline(sp.Function("log")(*expression.args))
 
-    def _print_inline(self, function: Any) -> Any:
+    def _print_inline(self, expression: Any, printed: Any = None) -> Any:
         before, self._inline = self._inline, True
-        found = self._print(function)
+        found = (printed or self._print)(expression)
         self._inline = before
         return found
 
     def _print_Mul(self, expression: sp.Mul) -> Any:  # noqa: N802 -- SymPy's name
         above, below = sp.fraction(expression)
         wide = max(len(str(above)), len(str(below))) > _LINE  # a fraction cannot be broken, a quotient can
-        if not (self._inline or wide) or below == 1:
+        if below == 1:
             return super()._print_Mul(expression)
+        if not (self._inline or wide):  # fractions within a fraction are on one line
+            return self._print_inline(expression, super()._print_Mul)
         sign = above.could_extract_minus_sign() and not above.is_Add
         parts = [self._sign("-")] * sign + [self._closed(-above if sign else above, above.is_Add)]
-        return self._row([*parts, self._sign("/"), self._closed(below, not below.is_Atom)])
+        return self._row([*parts, self._sign("/"), self._closed(below, below.is_Add or below.is_Mul)])
 
     def _print_Pow(self, expression: sp.Pow) -> Any:  # noqa: N802 -- SymPy's name
         base, exponent = expression.as_base_exp()

@@ -94,7 +94,7 @@ def recommendation(
     yield paragraph(f"Change {name} from {now} to {to}.{because}{alone}")
     share = f"{100 * BEYOND_EDGE:g} %"
     head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
-    sequence = "Changes that make it stable: first of settings, then of parts, last of the speed, which is the task."
+    sequence = "Changes that make it stable: settings first, then parts; the speed, which the task sets, last."
     yield table(rows, head, caption=sequence)
     if close and (far := [row.cells[0] for one, row in found.items() if one not in close]):
         yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")

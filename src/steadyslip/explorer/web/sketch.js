@@ -57,7 +57,7 @@ const TURN = 40, LINK = 62; // TURN: largest rotation of a wheel, degrees; LINK:
 
 /** Moving sketch of a machine: bodies shift or turn in proportion to their lead over steady sliding. */
 export class MachineSketch {
-  caption = "The machine, as seen by who moves with it";
+  caption = "The machine, as an observer moving with it sees it";
   /** @type {number[]} */ gain = [];
 
   /** @param {string} text drawn by steadyslip/explorer/machine_sketch.py @param {[string, string, number, number][]} bodies */

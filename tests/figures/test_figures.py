@@ -6,6 +6,7 @@ from dataclasses import replace
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.path import Path
 
 import steadyslip as ss
@@ -430,3 +431,25 @@ def test_a_legend_is_no_wider_than_its_axes():
     axes.figure.draw_without_rendering()
     assert axes.get_window_extent().width > 0.7 * axes.figure.bbox.width
     assert axes.get_legend().get_window_extent().x1 <= axes.figure.bbox.x1
+
+
+@pytest.mark.parametrize("width", [3.0, 6.3])
+@pytest.mark.parametrize("kind", ["slider", "machine"])
+def test_the_end_of_a_run_is_told_clear_of_the_legend(kind, width):
+    """In a narrow figure the legend has a line for each entry."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    step = ss.protocol.VelocityStep(at=1.0, to=1.1e-6)
+    rig = ss.read_rig("examples/triaxial.toml")
+    if kind == "machine":
+        rig = ss.read_rig("examples/machines/brake-pad.toml")
+        step = ss.protocol.VelocityStep(at=1e-4, to=2.0)
+    run = ss.simulate(rig, step, until=1000.0 if kind == "slider" else 0.02)
+    assert run.status != "done"
+    figure = Figure(figsize=(width, 4.0), layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    panels = figures.history(run, figure.subplots(3, sharex=True))
+    canvas.draw()
+    title = panels[0].title.get_window_extent(canvas.get_renderer())
+    for text in panels[0].get_legend().get_texts():
+        assert not title.overlaps(text.get_window_extent(canvas.get_renderer()))

@@ -12,6 +12,7 @@ from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SK
 from steadyslip.figures.style import (
     add_arrowheads,
     add_legend_above,
+    add_title_above_legend,
     axes_or_new,
     axis_label,
     display_unit,
@@ -61,7 +62,7 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
     panels[-1].set_xlabel(axis_label("time", unit))
     add_legend_above(panels[0], 4, 1.0, fontsize="small")
     if run.status != "done":
-        panels[0].set_title(end_title(run, left), color=VERMILION, fontsize="medium", pad=22)
+        add_title_above_legend(panels[0], end_title(run, left), VERMILION)
     return panels
 
 

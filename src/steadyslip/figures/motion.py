@@ -20,6 +20,7 @@ from steadyslip.figures.style import (
     WIDTH,
     add_arrowheads,
     add_legend_above,
+    add_title_above_legend,
     axes_or_new,
     axis_label,
     display_unit,
@@ -107,8 +108,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
         if run.status != "done":
             panel.axvline(run.end / factor, color=BLOW_UP, linewidth=1.5, linestyle="--")
     if run.status != "done":
-        pad = 36 if "creep" in run.data else 22  # the legend has a second line
-        panels[0].set_title(machine_motion.end_title(run, left), color=BLOW_UP, fontsize="medium", pad=pad)
+        add_title_above_legend(panels[0], machine_motion.end_title(run, left), BLOW_UP)
     return panels
 
 

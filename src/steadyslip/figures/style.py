@@ -61,6 +61,7 @@ JOURNAL: Any = {
 Words of size "small", .83 of the first, have 6.5 points: 9.5 pixels on a telephone 390 wide.
 """
 _SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are in the file
+_TITLE_GAP = 4.0  # points between a legend and the title above it
 _LEGEND_LETTERS = 42  # of a line beside its mark: .5 of 6.5 points each, in the 60 mm of Axes 85 mm wide with a scale
 _FOOTER = 6.0  # points, size of the letters below a saved figure
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
@@ -294,6 +295,14 @@ def add_legend_above(
         )
         if legend.get_window_extent().width <= ax.get_window_extent().width:
             break
+
+
+def add_title_above_legend(ax: Axes, title: str, color: str) -> None:
+    """Add a title to axes that have a legend above, clear of it."""
+    legend = ax.get_legend()
+    top = legend.get_window_extent().y1 - ax.get_window_extent().y1 if legend is not None else 0.0
+    pad = max(top, 0.0) * 72 / ax.figure.dpi + _TITLE_GAP
+    ax.set_title(title, color=color, fontsize="medium", pad=pad)
 
 
 def _wrapped(label: str) -> str:

@@ -57,7 +57,7 @@ QUICK = {
     "ValuesWithin": lambda: made("StableWithin").each[0],
     "Samples": lambda: ss.maps.Samples({"friction.a": (0.01, 0.02)}, 2), "Explorer": lambda: ss.explore(RIG),
     "ResponseData": lambda: ss.machine.ResponseData(np.arange(9), np.ones((9, 1, 1)), np.zeros((9, 1, 1)), ("p.x",)),
-    "StructureData": lambda: ss.machine.StructureData(*np.eye(2)[None].repeat(4, axis=0)),
+    "StructureData": lambda: ss.machine.StructureData(*np.eye(2)[None].repeat(3, axis=0), np.zeros((2, 2))),
     "MotionRecord": lambda: ss.experiments.motion_from_arrays(np.arange(30.0), {"table.x": np.arange(30.0)}),
     "Hunt": lambda: ss.hunt(axis(mass=1.0, rest=1.5, sliding=1.0, viscous=0.4, kp=3.0, kd=6.0, ki=4.0), until=30.0),
 }  # fmt: skip

@@ -130,6 +130,7 @@ def test_no_number_that_is_none_is_printed():
     assert "nan" not in str(run)
 
 
+@pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")  # no block has that mass
 def test_a_rate_that_is_lost_in_rounding_is_said_to_be():
     """A block so heavy that it swings with ω = √((k + kp)/m), beside roots 28 decades faster: which way is rounding."""
     rig = ss.read_rig("examples/slow-axis.toml", ["mass=1e60 kg"])

@@ -244,7 +244,7 @@ def tolerate(
     >>> print(ss.tolerate(rig, {"friction.a": "3 %"}))
     Stable in none of 65536 rigs within the tolerances, nor at any of their 2 corners
     critical stiffness        20.64 to 37.5 GPa/m
-    stiffness over critical   0.24 to 0.436
+    stiffness over critical   0.24 to 0.4361
     friction.a                0.01407 to 0.01494 alone: unstable, 0.24 to 0.4361 times critical
     """
     name = name_along(rig, along) if along or rig.default_along else ""

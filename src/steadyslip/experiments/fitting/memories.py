@@ -131,6 +131,8 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most
     ends = minima(idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1)))
     if most < np.min(ends.ssq) < np.inf:  # perhaps between two sizes
         ends = minima(ends.sorted().coordinates[:1], None)
+        if np.any(np.abs(ends.coordinates[0] - idle)[tried != 0] < SIZES[0]):
+            return  # hardly any memory: noise, in which none is as good
     for z in ends.coordinates[np.isfinite(ends.ssq)]:
         yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - here)
 

@@ -174,6 +174,8 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
             return True
         deviation = float(np.sqrt(self.covariance[which, which]))
+        if self.whiteness.p < STRUCTURE:  # where the model is not that of the record, each is a sign of it
+            return True
         return not np.isfinite(deviation) or abs(float(self._released[which])) > BEYOND * deviation
 
     @cached_property

@@ -69,8 +69,7 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) ->
     samples = sum(len(record) for record in plan.records)
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.comparison(Effort(budget=budget))
-    near = DAMPING_NEAR
-    return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, damping=near, **options)
+    return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, **options)
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:
@@ -104,8 +103,9 @@ def with_ramps(
     held[:, lengths] = True
     z = space.coordinates(begin)
     lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
+    near = {"damping": DAMPING_NEAR, "known": wanted}
     # with a larger tolerance searches end along flat valleys
-    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8, known=wanted)
+    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8, **near)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
     return tuple(
         RampFit(share, float(ssq), dict(zip(names, map(float, row), strict=True)))

@@ -85,7 +85,7 @@ export class Course {
     this.events = make("tbody", {});
     const mark = (className, words) => make("span", {}, svg("svg", { class: "chart", viewBox: "0 0 14 14", "aria-hidden": "true" }, svg("circle", { class: className, cx: 7, cy: 7, r: 4 })), words);
     const key = make("p", { className: "key" }, mark("begin", "where it begins"), mark("at", "at the time chosen"));
-    const { area, phrases, levers } = this.page.rig.data, torques = levers?.filter(Boolean).length ?? 0;
+    const { area, phrases, levers = [] } = this.page.rig.data, torques = levers.filter(Boolean).length;
     const drop = torques ? (torques < levers.length ? "drop" : "drop of torque") : phrases || area !== null ? "drop of force" : "stress drop";
     const heads = [...(phrases ? ["contact"] : []), "begins", "lasts", "peak velocity", drop, "since the last"];
     this.list = make("details", { className: "events" }, make("summary", { textContent: "Slip events" }),

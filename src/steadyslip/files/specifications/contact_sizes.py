@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from steadyslip.core.dimensions import unit
 from steadyslip.core.format import format_quantity
-from steadyslip.files.specifications.held_bodies import Body, friction_at_rest, is_of_forces, mass_at, mass_on
+from steadyslip.files.specifications.held_bodies import HeldBody, friction_at_rest, is_of_forces, mass_at, mass_on
 from steadyslip.files.specifications.other_units import (
     UNITS,
     Question,
@@ -39,7 +39,7 @@ FASTEST = 300.0  # m/s: nothing that is to go on sliding is faster
 WIDE = 100.0  # times the radius of a ball of steel of the same inertia: light rims and arms are up to some 10 times
 
 
-def questions_of_contacts(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Question]:
+def questions_of_contacts(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
     """Questions about the sizes at the contacts of a rig in forces, at most one for each parameter."""
     light = list(_light(rig, read))
     yield from light
@@ -152,7 +152,7 @@ def _per_load(read: Read, name: str, si: str, load: float, fits: Callable[[float
     return [f"{raw:g} {one} at {format_quantity(load, 'N')}" for value, one in totals if fits(value / load)]
 
 
-def _bristle_damping(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Question]:
+def _bristle_damping(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
     """Questions about bristles that are damped far beyond what lets a mass swing on them."""
     body, kinds = bodies.get("slider"), _kinds(rig, "")
     name, bristles = kinds.get("bristle damping", ""), kinds.get("bristle stiffness", "")
@@ -176,7 +176,7 @@ def _too_fast(rig: Rig, read: Read) -> Iterator[Question]:
             return
 
 
-def _radii(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Question]:
+def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
     """Questions about contacts far outside of the body that turns; 1 m stands for a radius that is not known."""
     for name, surface in rig.contacts.items() if isinstance(rig, Machine) else ():
         body, radius, key = bodies.get(surface.held), surface.radius, f"contacts.{name}.radius"

@@ -13,7 +13,7 @@ from steadyslip.machine.rig import Rig
 YOUNG, SHEAR, DENSITY = 2.1e11, 8e10, 7850.0  # Pa, Pa, kg/m^3, of steel
 
 
-class Body(NamedTuple):
+class HeldBody(NamedTuple):
     """A body and what holds it in its direction of motion.
 
     Attributes
@@ -58,20 +58,20 @@ class Body(NamedTuple):
         return radius
 
 
-APART = Body("", False, math.inf, 0.0, 0.0, 0.0, {})
+APART = HeldBody("", False, math.inf, 0.0, 0.0, 0.0, {})
 """The ground, or the load point of the drive."""
 
 
-class Spring(NamedTuple):
+class HoldingSpring(NamedTuple):
     """A spring between two bodies: stiffness (N/m or N m/rad) at the second, speed of that for one of the first."""
 
     stiffness: float
     ratio: float
-    first: Body
-    second: Body
+    first: HeldBody
+    second: HeldBody
 
     @property
-    def ends(self) -> list[tuple[Body, float]]:
+    def ends(self) -> list[tuple[HeldBody, float]]:
         """Bodies at its ends, and the stiffness there."""
         both = ((self.first, self.stiffness * self.ratio**2), (self.second, self.stiffness))
         return [one for one in both if one[0] is not APART]
@@ -83,23 +83,23 @@ class Spring(NamedTuple):
         return math.sqrt(inverse) / (2 * math.pi)
 
     @property
-    def heavier(self) -> tuple[Body, float]:
+    def heavier(self) -> tuple[HeldBody, float]:
         """The slower of its ends on this spring, and the stiffness there."""
         return min(self.ends, key=lambda one: one[1] / one[0].inertia if one[0].inertia else math.inf)
 
 
-def bodies_of(rig: Rig) -> dict[str, Body]:
+def bodies_of(rig: Rig) -> dict[str, HeldBody]:
     """Bodies of a rig by name, with no springs yet: of a slider one named ``slider``; without structures."""
     if not isinstance(rig, Machine):
         pull = friction_at_rest(rig, "friction.any") * (rig.load_of("friction.any") or 0.0)
         mass = (rig.value("slider.mass") or 0.0) * (rig.area or 1.0)
-        return {"slider": Body("the slider", False, mass, pull, 0.0, abs(float(rig.drive.velocity)), {})}
+        return {"slider": HeldBody("the slider", False, mass, pull, 0.0, abs(float(rig.drive.velocity)), {})}
     speeds = {} if rig.holds else rig.speeds()
     found = {}
     for name, body in rig.bodies.items():
         if not body.is_structure:
             load, speed = abs(float(body.along())), abs(float(speeds.get(name, 0.0)))
-            found[name] = Body(name, body.turns, float(body.inertia_of()), 0.0, load, speed, {})
+            found[name] = HeldBody(name, body.turns, float(body.inertia_of()), 0.0, load, speed, {})
     for name, surface in rig.contacts.items():
         if one := found.get(surface.held):
             parameter = f"contacts.{name}.friction.any"
@@ -108,17 +108,17 @@ def bodies_of(rig: Rig) -> dict[str, Body]:
     return found
 
 
-def springs_of(rig: Rig, bodies: Mapping[str, Body]) -> dict[str, Spring]:
+def springs_of(rig: Rig, bodies: Mapping[str, HeldBody]) -> dict[str, HoldingSpring]:
     """Springs along the motion by the names of their stiffnesses, which are noted at `bodies` too."""
     found = {}
     for name, link in rig.links.items() if isinstance(rig, Machine) else ():
         ends = [APART if end not in rig.bodies else bodies.get(end) for end in link.between]
         if link.rigidity() is not None and "x" in link.directions() and not any("." in end for end in link.between):
             first, second = (end for end in ends if end is not None)
-            found[f"links.{name}.stiffness"] = Spring(float(link.rigidity()), float(link.ratio()), first, second)
+            found[f"links.{name}.stiffness"] = HoldingSpring(float(link.rigidity()), float(link.ratio()), first, second)
     for name in rig.of_kind("stiffness"):
         if name.startswith("slider.") and (stiffness := (rig.value(name) or 0.0) * (rig.area or 1.0)):
-            found[name] = Spring(stiffness, 1.0, APART, bodies["slider"])
+            found[name] = HoldingSpring(stiffness, 1.0, APART, bodies["slider"])
     for name, spring in found.items():
         for body, stiffness in spring.ends:
             body.springs[name] = stiffness

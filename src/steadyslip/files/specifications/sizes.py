@@ -12,7 +12,7 @@ from functools import partial
 from steadyslip.core.format import format_quantity
 from steadyslip.core.roles import Placeholder
 from steadyslip.files.specifications.contact_sizes import LIGHT, G, questions_of_contacts
-from steadyslip.files.specifications.held_bodies import Body, Spring, bodies_of, springs_of
+from steadyslip.files.specifications.held_bodies import HeldBody, HoldingSpring, bodies_of, springs_of
 from steadyslip.files.specifications.other_units import (
     Question,
     Read,
@@ -65,7 +65,7 @@ def questions_of_size(rig: Rig, read: Read) -> Iterator[Question]:
     yield from _massless(rig, read)
 
 
-def _stiff(rig: Rig, springs: Mapping[str, Spring], read: Read) -> Iterator[Question]:
+def _stiff(rig: Rig, springs: Mapping[str, HoldingSpring], read: Read) -> Iterator[Question]:
     """Questions about springs that are stiffer than a block of steel of the heavier body's mass."""
     for name, spring in springs.items():
         body, stiffness = spring.heavier
@@ -77,7 +77,9 @@ def _stiff(rig: Rig, springs: Mapping[str, Spring], read: Read) -> Iterator[Ques
             yield name, f"{text}{body.name}, {body.told}: {meant}{rigid}"
 
 
-def _soft(rig: Rig, springs: Mapping[str, Spring], bodies: Mapping[str, Body], read: Read) -> Iterator[Question]:
+def _soft(
+    rig: Rig, springs: Mapping[str, HoldingSpring], bodies: Mapping[str, HeldBody], read: Read
+) -> Iterator[Question]:
     """Questions about the stiffest spring of a body, if the body hangs on it too softly."""
     for body in bodies.values():
         name = max(body.springs, key=lambda one: body.springs[one], default="")
@@ -90,7 +92,7 @@ def _soft(rig: Rig, springs: Mapping[str, Spring], bodies: Mapping[str, Body], r
             yield name, f"{written(read, name)}, {why}: {asked(meant)}"
 
 
-def _loads_meant(rig: Rig, read: Read, spring: Spring, body: Body) -> list[str]:
+def _loads_meant(rig: Rig, read: Read, spring: HoldingSpring, body: HeldBody) -> list[str]:
     """Loads of contacts and of the body in units in which friction does not stretch a spring far."""
     found, stiffness = [], sum(body.springs.values())
 
@@ -105,7 +107,7 @@ def _loads_meant(rig: Rig, read: Read, spring: Spring, body: Body) -> list[str]:
     return found + named(name, texts_in_units(read, name, si, lambda load: smaller(abs(load))))
 
 
-def _why_soft(spring: Spring, body: Body, stiffness: float) -> str:
+def _why_soft(spring: HoldingSpring, body: HeldBody, stiffness: float) -> str:
     """What a stiffness at a body makes of it that no machine does; empty if nothing."""
     stretch = (body.pull + body.load) / stiffness
     if body.turns and body.load / stiffness > SAG:
@@ -119,7 +121,7 @@ def _why_soft(spring: Spring, body: Body, stiffness: float) -> str:
     return ""
 
 
-def _springs_meant(read: Read, name: str, spring: Spring) -> list[str]:
+def _springs_meant(read: Read, name: str, spring: HoldingSpring) -> list[str]:
     """The number of a stiffness in the two units in which it is most that of a drive."""
 
     def fits(stiffness: float) -> bool:
@@ -139,7 +141,7 @@ def _springs_meant(read: Read, name: str, spring: Spring) -> list[str]:
     return [text for _, text in found]
 
 
-def _geared_up(rig: Rig, bodies: Mapping[str, Body]) -> Iterator[Question]:
+def _geared_up(rig: Rig, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
     """Question about a body that turns much faster than its motor, though it is the heavier."""
     motor = bodies.get(rig.drive.driven() or "") if isinstance(rig, Machine) else None
     if motor is None or not motor.turns or not isinstance(rig, Machine):
@@ -155,7 +157,7 @@ def _geared_up(rig: Rig, bodies: Mapping[str, Body]) -> Iterator[Question]:
             yield f"links.{name}.between", f'{text}between = ["{second}", "{first}"]'
 
 
-def _unlike(read: Read, springs: Mapping[str, Spring]) -> Iterator[Question]:
+def _unlike(read: Read, springs: Mapping[str, HoldingSpring]) -> Iterator[Question]:
     """Questions about what turns so easily that its motor, seen through the gear, is far heavier."""
     for key, (_, ratio, first, second) in springs.items():
         if not (first.turns and second.turns and second.inertia > 0 and 0 < first.inertia < math.inf and ratio < 1):
@@ -171,7 +173,7 @@ def _unlike(read: Read, springs: Mapping[str, Spring]) -> Iterator[Question]:
             yield name, f"{text}has {times(seen / second.inertia)} that inertia: {asked(meant)}"
 
 
-def _damped(rig: Rig, read: Read, springs: Mapping[str, Spring]) -> Iterator[Question]:
+def _damped(rig: Rig, read: Read, springs: Mapping[str, HoldingSpring]) -> Iterator[Question]:
     """Questions about links that are damped so that what they hold does not swing."""
     for key, spring in springs.items():
         name, stiffness, (body, at_body) = f"{key.rpartition('.')[0]}.damping", spring.stiffness, spring.heavier
@@ -194,7 +196,7 @@ def _damped(rig: Rig, read: Read, springs: Mapping[str, Spring]) -> Iterator[Que
             yield name, text + asked(meant)
 
 
-def _controlled(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Question]:
+def _controlled(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
     """Questions about a position gain on which a body swings faster than drives do, and times too long for it."""
     known, name = rig.parameters(), "drive.kp"
     body = bodies.get((rig.drive.driven() or "") if isinstance(rig, Machine) else "slider")
@@ -227,7 +229,7 @@ def _controlled(rig: Rig, read: Read, bodies: Mapping[str, Body]) -> Iterator[Qu
             yield late, f"{text}{format_quantity(1 / swings, 's')}: {asked(meant)}"
 
 
-def _overdamped_gain(rig: Rig, read: Read, body: Body, gain: float) -> Iterator[Question]:
+def _overdamped_gain(rig: Rig, read: Read, body: HeldBody, gain: float) -> Iterator[Question]:
     """Question about a gain kd that damps a body far beyond what lets it follow the gain kp."""
     name, of = "drive.kd", "N m s/rad" if body.turns else "N s/m"
     critical = 2 * math.sqrt(gain * body.inertia)

@@ -24,7 +24,8 @@ NAMES = sorted(
 
 @cache
 def page(name):
-    return Edges(ss.read_rig(EXAMPLES / f"{name}.toml"))
+    file = EXAMPLES / f"{name}.toml"
+    return Edges(ss.read_rig(file), file)
 
 
 def changed(name, **values):

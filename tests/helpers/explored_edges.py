@@ -62,12 +62,15 @@ function edgesAt(values, coarse) {
 
 
 class Edges:
-    """Results of the page of a rig at given values: edges of all parameters, and the list of nearest edges."""
+    """Results of the page of a rig at given values: edges of all parameters, and the list of nearest edges.
 
-    def __init__(self, rig):
+    With the `file` of the rig the page tells values in its units.
+    """
+
+    def __init__(self, rig, file=None):
         self.rig = rig
         text, facts = linear_part(rig)
-        self.data = _data(rig, "rig", 0, facts, "")
+        self.data = _data(rig, "rig", 0, facts, "" if file is None else file.read_text(encoding="utf-8"))
         self.names = [one["name"] for one in self.data["parameters"]]
         self.home = [one["value"] for one in self.data["parameters"]]
         self.script = Script(f"{page_modules()}\nconst programs = {text}, data = {json.dumps(self.data)};\n{_ASK}")
@@ -254,7 +257,7 @@ DRIVES = ss.machine.SteadyDrive(V0), ss.machine.PD(V0, kp=2e10, kd=1e9), ss.mach
 
 @cache
 def example(path):
-    return Edges(ss.read_rig(path))
+    return Edges(ss.read_rig(path), Path(path))
 
 
 def drawn(chance):

@@ -3,7 +3,7 @@
 
     python3 run.py analyze examples/inclined-spring.toml   any steadyslip command
     python3 run.py test                                    the tests
-    python3 run.py test --oldest                           a fast part of them with the oldest supported versions
+    python3 run.py test --oldest                           the mechanics with the oldest supported versions
     python3 run.py docs                                    the site, into build/site
     python3 run.py build                                   source distribution and wheel, into dist
     python3 run.py check                                   lint, format, types, import layers
@@ -33,23 +33,23 @@ class Home:
 NEWEST = Home(".venv", "pins.txt")
 OLDEST = Home(".venv-oldest", "pins-oldest.txt")
 
-# One route through each package that we stand on: numbers, formulas, kernels, figures, files, maps, fits, options.
+# The mechanics in full, which use formulas, numbers and kernels, and one route through each package besides.
 OLDEST_TESTS = (
-    "tests/linear/test_closed_forms.py",
+    "tests/linear",
+    "tests/machine",
+    "tests/model",
+    "tests/motion",
+    "tests/nonlinear",
     "tests/files/test_rig_files.py",
-    "tests/figures/test_figures.py",
-    "tests/cli/test_command_line.py::test_verdict_on_the_example",
-    "tests/cli/test_command_line.py::test_require_stable",
-    "tests/cli/test_command_line.py::test_bad_input_is_one_message_and_status_2",
-    "tests/cli/test_command_line.py::test_simulate_runs_the_protocol_of_the_file",
-    "tests/experiments/test_fits.py::test_scipy_finds_the_same_minimum",
-    "tests/experiments/measured/test_records.py::test_hdf5_matlab_and_parquet",
-    "tests/maps/test_maps.py::test_a_map_holds_what_the_functions_give",
-    "tests/maps/test_maps.py::test_samples_in_a_map",
-    "tests/maps/test_maps.py::test_exports_hold_the_same",
+    "tests/figures",
+    "tests/cli/test_command_line.py",
+    "tests/experiments/test_fits.py",
+    "tests/experiments/measured/test_records.py",
+    "tests/maps/test_maps.py",
 )
 # Old packages warn of what newer ones around them deprecate; only with pins.txt a warning is an error.
 OLDEST_OPTIONS = ("-o", "filterwarnings=default", "-p", "no:cacheprovider")
+OLDEST_TIERS = ("-m", "not slow and not campaign")
 
 CHECKS = (
     ("ruff", "check", "."),
@@ -69,7 +69,7 @@ def main(arguments):
         install(OLDEST, "test-oldest")
         chosen = [word for word in rest if word != "--oldest"]
         named = any(os.path.exists(os.path.join(HERE, word.split("::")[0])) for word in chosen)
-        chosen += () if named else OLDEST_TESTS
+        chosen += () if named else (*OLDEST_TIERS, *OLDEST_TESTS)
         return call(OLDEST.python, "-m", "pytest", *OLDEST_OPTIONS, *chosen, folder=HERE)
     if command == "test":
         install(NEWEST, "test")

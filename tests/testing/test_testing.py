@@ -280,6 +280,19 @@ CONTACT_FAULTS = [
     ("check_contact_names", {"steady_stress": lambda self: self.preload}, "give exactly one, None for the other"),
     ("check_contact_names", {"load": lambda self: None}, "give exactly one, None for the other"),
     ("check_contact_names", {"load": lambda self: -self.preload}, "the load is -5000000.0 Pa, must be > 0"),
+    ("check_lock_up", {"lock_up": lambda self, friction: ""}, "lock_up is a method; allowed: a text; write it in the"),
+    ("check_lock_up", {"lock_up": "below {mu}"}, "lock_up is 'below {mu}' .*allowed gaps: {inverse} and {angle}"),
+    ("check_lock_up", {"lock_up": "below {"}, "lock_up is 'below {' .*allowed gaps"),
+    (
+        "check_contact_numbers",
+        {"coupling": lambda self, motion: self.gradient * motion.slip},
+        "normal_stress uses a former name: ContactInputs.slip is ContactInputs.lead now",
+    ),
+    (
+        "check_contact_numbers",
+        {"coupling": lambda self, motion: self.gradient * motion.displacement},
+        "normal_stress uses motion.displacement, which does not exist; allowed: lead, velocity, ",
+    ),
     (
         "check_contact_numbers",
         {"coupling": lambda self, motion: 1e4 if isinstance(motion.lead, float) else 0},

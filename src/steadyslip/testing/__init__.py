@@ -23,6 +23,7 @@ from steadyslip.testing.contact import (
     check_contact_numbers,
     check_contact_round_trip,
     check_linearisation,
+    check_lock_up,
     check_steady_stress,
 )
 from steadyslip.testing.contact_states import check_contact_routes, check_contact_senses, check_contact_states
@@ -54,6 +55,7 @@ FRICTION_CHECKS: tuple[Callable[[FrictionLaw, Conditions], None], ...] = (
 )
 CONTACT_CHECKS: tuple[Callable[[ContactLaw, Surroundings], None], ...] = (
     check_contact_names,
+    check_lock_up,
     check_contact_senses,
     check_contact_states,
     check_contact_numbers,

@@ -178,6 +178,23 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = DEFAUL
     require(given > 0 or unloaded, contact, f"the load is {given!r} Pa, must be > 0 (compression is positive)")
 
 
+def check_lock_up(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
+    """Check that `lock_up` is a text whose only gaps are {inverse}, 1/μss, and {angle}, arccot μss in degrees.
+
+    Examples
+    --------
+    >>> contact = ss.laws.InclinedSpring(preload="5 MPa", angle="-45 deg")
+    >>> ss.testing.check_lock_up(contact)
+    """
+    words = contact.lock_up
+    hint = 'write it in the class body as lock_up = "the gain must be below 1/μss = {inverse}"'
+    require(isinstance(words, str), contact, f"lock_up is a {type(words).__name__}; allowed: a text; {hint}")
+    try:
+        words.format(inverse="1.429", angle="55.01")
+    except (LookupError, ValueError, AttributeError) as error:
+        require(False, contact, f"lock_up is {words!r} ({error!r}); allowed gaps: {{inverse}} and {{angle}}; {hint}")
+
+
 def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
     """Check that the normal stress called with floats equals that in symbols, in and near steady sliding.
 

@@ -6,7 +6,9 @@ visible part of them, so that a tolerance between the two needs no tuning.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from typing import Any
 
 import mpmath
@@ -15,6 +17,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable, SteadyslipError
 from steadyslip.core.expressions import supported
 from steadyslip.core.records import FrozenRecord, parameters, with_values
+from steadyslip.laws.contact import ContactInputs
 
 DIGITS = 50  # decimal digits of all evaluations: rounding stays far below `TOLERANCE` after any cancellation
 #: Allowed error relative to the terms that cancel: far above rounding at fifty digits and above constants
@@ -50,10 +53,25 @@ def symbolic_copy(law: FrozenRecord) -> tuple[Any, dict[sp.Symbol, float]]:
 
 
 def call_with_symbols(law: FrozenRecord, what: str, method: Callable[..., Any], *arguments: Any) -> Any:
-    """SymPy result of a method of a law called with symbols; ContractViolation if it does not accept them."""
+    """SymPy result of a method of a law called with symbols.
+
+    Raises
+    ------
+    ContractViolation
+        If the method does not accept symbols, or uses something that `ContactInputs` does not offer.
+    """
     try:
-        result = method(*arguments)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", r"ContactInputs\.", DeprecationWarning)
+            result = method(*arguments)
+    except DeprecationWarning as error:
+        raise ContractViolation(f"{law!r}: {what} uses a former name: {error}") from error
     except (TypeError, ValueError, AttributeError, LookupError, sp.SympifyError) as error:
+        if isinstance(error, AttributeError) and isinstance(error.obj, ContactInputs):
+            offered = ", ".join([*(item.name for item in fields(ContactInputs)), "steady"])
+            raise ContractViolation(
+                f"{law!r}: {what} uses motion.{error.name}, which does not exist; allowed: {offered}"
+            ) from error
         raise ContractViolation(
             f"{law!r}: {what} does not accept SymPy symbols ({type(error).__name__}: {error}); write it with "
             "arithmetic and functions of sympy (sympy.log, not math.log or numpy.log), and branches as sympy.Piecewise"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -228,3 +229,25 @@ def unknown_name(
         close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""
     return f"unknown {what} {repr_short(name)}; {hint}allowed: {', '.join(allowed) or 'none'}"
+
+
+def keywords_of(function: Callable[..., object], without: Iterable[str] = ()) -> list[str]:
+    """Names of the arguments of a function that can be given by name, but for those left out."""
+    return [
+        name
+        for name, item in inspect.signature(function).parameters.items()
+        if item.kind in (item.POSITIONAL_OR_KEYWORD, item.KEYWORD_ONLY) and name not in without
+    ]
+
+
+def refuse_unknown(function: str, given: Iterable[str], allowed: Iterable[str], what: str = "option") -> None:
+    """Raise ParameterError if a public function, named in the message, does not take all options given.
+
+    >>> refuse_unknown("fit", ["start"], ["starts", "effort"])
+    Traceback (most recent call last):
+    ...
+    steadyslip.core.errors.ParameterError: fit: unknown option 'start'; did you mean 'starts'? allowed: starts, effort
+    """
+    allowed = list(allowed)
+    if problems := [Problem(function, unknown_name(what, name, allowed)) for name in given if name not in allowed]:
+        raise ParameterError(problems)

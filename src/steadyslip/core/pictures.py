@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from steadyslip.core.errors import NotAvailable, unknown_name
+from steadyslip.core.errors import NotAvailable, keywords_of, refuse_unknown, unknown_name
 from steadyslip.core.written import in_written_units
 
 _figures: dict[type, dict[str, Callable[..., Any]]] = {}
@@ -49,6 +49,8 @@ def draw(result: Any, kind: str | None = None, **options: Any) -> Any:
     ------
     NotAvailable
         If the result type has no figure of this kind.
+    ParameterError
+        If the figure does not take one of the options.
     """
     while _sources:
         _sources[-1]()
@@ -61,4 +63,6 @@ def draw(result: Any, kind: str | None = None, **options: Any) -> Any:
     chosen = next(iter(known)) if kind is None else kind
     if chosen not in known:
         raise NotAvailable(unknown_name("kind of plot", chosen, known))
-    return known[chosen](result, **options)
+    function, *first = known[chosen], *keywords_of(known[chosen])[:1]
+    refuse_unknown(f"{type(result).__name__}.plot(kind={chosen!r})", options, keywords_of(function, first))
+    return function(result, **options)

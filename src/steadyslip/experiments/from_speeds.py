@@ -11,13 +11,20 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.domains import positive
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, keywords_of, refuse_unknown, unknown_name
 from steadyslip.core.options import checked
 from steadyslip.core.records import role_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.fitting.speed_fit import fit_direction, fit_loop
 from steadyslip.experiments.fitting.speed_result import SpeedFit
-from steadyslip.experiments.measured.speeds import SpeedTable, is_loop, read_loop, read_speed_table, table_from_arrays
+from steadyslip.experiments.measured.speeds import (
+    UNITS_OF_ROLES,
+    SpeedTable,
+    is_loop,
+    read_loop,
+    read_speed_table,
+    table_from_arrays,
+)
 from steadyslip.files.specifications.changes import named_value
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.laws.friction.law import FrictionLaw
@@ -91,6 +98,8 @@ def fit_friction_table(
     >>> print(found["mu_coulomb"])
     mu_coulomb = 0.1012 ± 0.00092
     """
+    roles = () if isinstance(table, Mapping | SpeedTable) else UNITS_OF_ROLES  # arrays are named by role already
+    refuse_unknown("fit_friction_table", columns, [*roles, *keywords_of(fit_friction_table)])
     if errors not in ERRORS:
         raise ParameterError([Problem("errors", f"got {errors!r}; allowed: {' or '.join(map(repr, ERRORS))}")])
     if isinstance(table, SpeedTable):

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any, ClassVar
 
-from steadyslip.core.errors import Problem
+from steadyslip.core.errors import Problem, keywords_of, refuse_unknown
 from steadyslip.core.pages import Displayed
 from steadyslip.core.records import given
+from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.machines.fit_machine import fit_machine
 from steadyslip.experiments.fitting.machines.machine_result import MachineFit
 from steadyslip.experiments.fitting.settings import FitSettings
@@ -60,8 +61,9 @@ class MachineSpec(Displayed):
         return read_motion(path, **options)
 
     def fit(self, records: Sequence[MotionRecord | ResponseData], **changes: Any) -> MachineFit:
-        """Fit the records with the settings of the file."""
-        return fit_machine(self.rig, records, **self.options, protocol=self.protocol, **changes)
+        """Fit the records with the settings of the file, but for those given here, as for `steadyslip.fit`."""
+        refuse_unknown("MachineSpec.fit", changes, keywords_of(fit, ["rig", "records"]))
+        return fit_machine(self.rig, records, **(self.options | {"protocol": self.protocol} | changes))
 
     def compared(self, records: Sequence[Any]) -> tuple[str, ...]:
         """Labels of laws to compare; none."""

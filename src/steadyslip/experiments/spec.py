@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, keywords_of, refuse_unknown
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
@@ -89,9 +89,10 @@ class Spec(Displayed):
         return record if decimate is None else record.decimated(decimate)
 
     def fit(self, records: Sequence[Record], **changes: Any) -> Fit:
-        """Fit the records with the settings of the file."""
+        """Fit the records with the settings of the file, but for those given here, as for `steadyslip.fit`."""
         rig, parts = self._rig_and_records(records)
-        found: Fit = fit(rig, parts, **self._options(rig), protocol=self.protocol, **changes)
+        refuse_unknown("Spec.fit", changes, keywords_of(fit, ["rig", "records"]))
+        found: Fit = fit(rig, parts, **(self._options(rig) | {"protocol": self.protocol} | changes))
         return found
 
     def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
@@ -101,10 +102,11 @@ class Spec(Displayed):
         return self.laws or (self.undecided if decides else ())
 
     def compare(self, records: Sequence[Record], **changes: Any) -> LawComparison:
-        """Fit all laws of `compared`."""
+        """Fit all laws of `compared`; settings given here, as for `steadyslip.fit`, go before those of the file."""
+        refuse_unknown("Spec.compare", changes, keywords_of(fit, ["rig", "records"]))
         rig, parts = self._rig_and_records(records)
-        options = self._options(rig)
-        return compare_laws(rig, parts, self.compared(records), **options, protocol=self.protocol, **changes)
+        options = self._options(rig) | {"protocol": self.protocol} | changes
+        return compare_laws(rig, parts, self.compared(records), **options)
 
     def _options(self, rig: Slider) -> dict[str, Any]:
         """Arguments of `fit`; the drainage is free too if the rig was given pores because of the records."""

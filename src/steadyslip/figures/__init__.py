@@ -86,8 +86,8 @@ def _verdict(found: Analysis, ax: Axes | None = None) -> Any:
     return machine_verdict(found) if found.rig.in_forces else _locus(found, ax)
 
 
-def _locus(found: Analysis, ax: Axes | None = None, **options: Any) -> Axes:
-    return root_locus(found.rig, ax, **options)
+def _locus(found: Analysis, ax: Axes | None = None, stiffness: Any = None) -> Axes:
+    return root_locus(found.rig, ax, stiffness)
 
 
 for _name in __all__:

@@ -88,9 +88,9 @@ class ModeChart(Displayed):
         kept = np.sort(np.argsort(least)[:MOST])
         return tuple(int(i) for i in kept)
 
-    def plot(self, kind: str | None = None, **options: Any) -> Any:
+    def plot(self, kind: str | None = None, ax: Any = None) -> Any:
         """A figure: ``"chart"``, frequencies and damping ratios over the parameter."""
-        return draw(self, kind, **options)
+        return draw(self, kind, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``--json`` prints it; None for NaN."""

@@ -73,9 +73,9 @@ class Modes(Displayed):
         """The chosen mode, under the name that verdicts have for theirs."""
         return self.chosen
 
-    def plot(self, kind: str | None = None, **options: Any) -> Any:
+    def plot(self, kind: str | None = None, ax: Any = None) -> Any:
         """A figure: ``"mode"``, amplitudes and energies of the chosen mode."""
-        return draw(self, kind, **options)
+        return draw(self, kind, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``--json`` prints it."""

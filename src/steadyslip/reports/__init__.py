@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from steadyslip.core.errors import ParameterError, Problem, repr_short
+from steadyslip.core.errors import ParameterError, Problem, keywords_of, refuse_unknown, repr_short
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
 from steadyslip.machine.rig import Rig
@@ -64,7 +64,7 @@ def report(
     Raises
     ------
     ParameterError
-        If `result` is neither a rig nor a result, or `source` no path.
+        If `result` is neither a rig nor a result, an option does not apply to it, or `source` is no path.
     NotAvailable
         If the numbers of the rig leave the range of floating point.
 
@@ -79,6 +79,9 @@ def report(
     except TypeError as error:
         message = f"got {repr_short(source)}; allowed: a path, or a sequence of paths"
         raise ParameterError([Problem("source", message)]) from error
+    _, *further = keywords_of(parts_of.dispatch(type(result)), ["source"])
+    allowed = [*keywords_of(report, ["result"]), *further]
+    refuse_unknown(f"report({type(result).__name__})", options, allowed)
     block = {"project": project, "author": author, "revision": revision, "approval": approval}
     if isinstance(result, Rig | Analysis | Tolerated):
         options["source"] = source_text(paths[0]) if paths else ""

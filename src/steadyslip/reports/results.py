@@ -50,16 +50,16 @@ CONTACT_PHASE_PLANE = (
 
 
 @singledispatch
-def parts_of(result: Any, **options: Any) -> Parts:
+def parts_of(result: Any) -> Parts:
     """Contents of the document of a result; for kinds without a document of their own, the HTML that notebooks show.
 
     Raises
     ------
     ParameterError
-        If `result` is neither a rig nor a result, or an option does not apply to it.
+        If `result` is neither a rig nor a result.
     """
-    if not isinstance(result, Displayed) or options:
-        got = ", ".join([type(result).__name__, *options])
+    if not isinstance(result, Displayed):
+        got = type(result).__name__
         raise ParameterError([Problem("result", f"got {got}; allowed: a rig or a result, such as that of analyze")])
     own = getattr(result, "rig", None)
     rig: Any = own if isinstance(own, Rig) else None

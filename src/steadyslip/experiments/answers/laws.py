@@ -10,14 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import (
+    NotAvailable,
+    ParameterError,
+    Problem,
+    UnknownNameError,
+    keywords_of,
+    refuse_unknown,
+)
 from steadyslip.core.format import enumerated
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
-from steadyslip.experiments.fitting.fit import refit_from, search_fit
+from steadyslip.experiments.fitting.fit import fit, refit_from, search_fit
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE
 from steadyslip.experiments.fitting.result import Fit
@@ -220,7 +227,7 @@ def compare_laws(
     Raises
     ------
     ParameterError
-        If a law is unknown or the rig's friction has no alternatives.
+        If a law or an option is unknown or the rig's friction has no alternatives.
     NotAvailable
         If none of the laws can follow the records.
 
@@ -234,6 +241,7 @@ def compare_laws(
     aging           6     1.70956e-05  36.5   36.5   0.000               0.0002388
     'slip' it is: 'aging', the next, has a sum of squares +9.54% and is 36.5 behind in BIC.
     """
+    refuse_unknown("compare_laws", options, keywords_of(fit, ["rig", "records"]))
     many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
     rigs = {label: with_law(rig, label) for label in (_usual_labels(rig, many) if laws is None else laws)}
     effort = options.pop("effort", 1.0)

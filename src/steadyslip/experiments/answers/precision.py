@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import (
+    InternalError,
+    NotAvailable,
+    ParameterError,
+    Problem,
+    UnknownNameError,
+    keywords_of,
+    refuse_unknown,
+)
 from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.options import DURATION, NAMES, checked, finite, whole
@@ -222,7 +230,7 @@ def best_protocol(
     Raises
     ------
     ParameterError
-        If the parameter is not free, or none is given and the law has not exactly one that is such a share.
+        If an option is unknown, the parameter is not free, or none is given and the law has not exactly one such share.
 
     Examples
     --------
@@ -237,6 +245,7 @@ def best_protocol(
       10 um/s  ± 25 nm
       2 um/s   ± 40 nm
     """
+    refuse_unknown("best_protocol", options, keywords_of(precision, ["rig", "protocol"]))
     chosen = normal_stress_protocols(rig) if candidates is None else candidates
     found = {label: precision(rig, protocol, **options) for label, protocol in chosen.items()}
     known = dict.fromkeys(next(iter(found.values())).errors)

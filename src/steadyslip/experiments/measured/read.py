@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.domains import positive
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem, keywords_of, refuse_unknown
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.roles import Parameter
@@ -95,11 +95,7 @@ def read_record(
     note            friction: column 'friction'
     note            normal: column 'normal stress (MPa)', MPa
     """
-    problems = [
-        Problem(name, f"unknown column role; allowed: {', '.join(ROLES)}") for name in columns if name not in ROLES
-    ]
-    if problems:
-        raise ParameterError(problems, title=str(path))
+    refuse_unknown("read_record", columns, [*ROLES, *keywords_of(read_record, ["path"])], "column role or option")
     raw = read_columns(Path(path), table, skip_bad_lines)
     found, faults, notes = assign_columns(raw.names, columns, raw.units)
     if normal_stress is not None and "normal" in found and "normal" not in columns:

@@ -24,7 +24,7 @@ from steadyslip.experiments.measured.table_questions import questions_of_table
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
 FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
-_UNITS = {
+UNITS_OF_ROLES = {
     "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
     "displacement": ("m", "rad"), "direction": ("1",),
 }  # fmt: skip
@@ -303,8 +303,6 @@ def _refuse_misfits(path: Path) -> None:
 def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]], list[str]]:
     """Columns of a file by role, and notes; of friction there may be two, forward and backward."""
     table = _table(path)
-    if unknown := [name for name in given if name not in _UNITS]:
-        raise _fault(str(path), unknown[0], f"unknown column role; allowed: {', '.join(_UNITS)}")
     heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
     chosen = {role: _asked(str(path), role, value, table.names, heads) for role, value in given.items()}
     taken = {place for place, _ in chosen.values() if place is not None}
@@ -320,12 +318,12 @@ def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]]
         if stated is None:
             if wrong := _misfit(head, None):
                 raise _fault(str(path), name, wrong)
-            stated = _UNITS[role][0]
+            stated = UNITS_OF_ROLES[role][0]
             if role not in ("friction", "direction"):
                 notes.append(f"{role}: column {name!r} has no unit; read as {stated}")
         factor, dimension = unit(stated)
-        if dimension not in [unit(one)[1] for one in _UNITS[role]]:
-            wanted = " or ".join(_UNITS[role])
+        if dimension not in [unit(one)[1] for one in UNITS_OF_ROLES[role]]:
+            wanted = " or ".join(UNITS_OF_ROLES[role])
             raise _fault(str(path), role, f"column {name!r} is in {stated}; expected a unit such as {wanted}")
         if dimension == unit("kg")[1]:
             factor *= WEIGHT
@@ -368,7 +366,7 @@ def _asked(
             return known.index(text), stated
     try:
         spelled = _SPELLED.get(text.strip().lower()) or known_unit(text)
-        if spelled and unit(spelled)[1] in [unit(one)[1] for one in _UNITS[role]]:
+        if spelled and unit(spelled)[1] in [unit(one)[1] for one in UNITS_OF_ROLES[role]]:
             return None, spelled
     except QuantityError:
         pass
@@ -379,10 +377,10 @@ def _guess(head: str, own: str | None) -> str | None:
     """Role of a column by its name and unit; None if none is, or if they contradict each other."""
     if _SPREAD.search(head):
         return None
-    fits, named = list(_UNITS), _named(head)
+    fits, named = list(UNITS_OF_ROLES), _named(head)
     if own is not None and own != "1":
         dimension = unit(own)[1]
-        fits = [role for role, allowed in _UNITS.items() if dimension in [unit(one)[1] for one in allowed]]
+        fits = [role for role, allowed in UNITS_OF_ROLES.items() if dimension in [unit(one)[1] for one in allowed]]
         fits = [role for role in fits if role != "direction" and (role != "friction" or role in named)]
     if found := [role for role in named if role in fits]:
         return found[0]
@@ -411,12 +409,12 @@ def _misfit(head: str, own: str | None) -> str:
     if not said or said == "1" or not kinds or (len(head) == 1 and head.lower() != "f"):
         return ""
     lever = " cm" if "torque" in kinds else ""
-    good = " or ".join(one for role in kinds for one in _UNITS[role])
+    good = " or ".join(one for role in kinds for one in UNITS_OF_ROLES[role])
     try:
         dimension = unit(said)[1]
     except QuantityError:
         return f"{said} is none of its units: write {good}; multiply a current by the torque constant"
-    if dimension in [unit(one)[1] for role in kinds for one in _UNITS[role]]:
+    if dimension in [unit(one)[1] for role in kinds for one in UNITS_OF_ROLES[role]]:
         return ""
     if dimension.mass == 1 and not dimension.time:
         return f"{said} is a mass: write kgf{lever} for the reading of a balance, which is 9.80665 N{lever}"

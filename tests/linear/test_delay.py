@@ -11,11 +11,11 @@ from scipy.special import lambertw
 import steadyslip as ss
 from delays import apart, lagging, late_axis, some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
-from steadyslip.linear import quasipolynomial as quasi, rightmost as late_roots, windows
+from steadyslip.linear import delay_stable_sets, quasipolynomial as quasi, rightmost as late_roots
 from steadyslip.linear.argument import count_by_argument
+from steadyslip.linear.delay_stable_sets import delay_set, delay_set_among, linear_windows
 from steadyslip.linear.spectrum import outgrown, unstable_roots
 from steadyslip.linear.waves import Waves
-from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import quasipolynomial as operating_quasi
 
@@ -429,21 +429,23 @@ def test_a_delay_is_kept_in_files_and_is_never_negative():
 @np.errstate(all="ignore")  # as where it is used
 def test_roots_followed_through_their_crossings_are_those_that_are_counted(monkeypatch):
     """With several delays: what stands right between two values of a gain follows from which way each root goes."""
-    chance, counts, cells, asked = np.random.default_rng(3), windows.count_right_if_feasible, 0, []
+    chance, counts, cells, asked = np.random.default_rng(3), delay_stable_sets.count_right_if_feasible, 0, []
     while cells < 50:
         p, q = chance.normal(size=(2, 3, 4)) * 10.0 ** chance.uniform(-1, 1, size=(2, 3, 4))
         p[0, -1] = abs(p[0, -1])
         p[1:, -1] = q[:, -1] = 0.0
         h = np.append(0.0, 10.0 ** chance.uniform(-1, 1, size=2))
-        fast = float(np.max(windows._frequency_bound(p, q, apart(3), np.geomspace(0.2, 5.0, 9))))
-        found = windows._candidates(p, q, h, 0.2, 5.0, fast, np.empty(0)) if fast < 50 else None
+        fast = float(np.max(delay_stable_sets._frequency_bound(p, q, apart(3), np.geomspace(0.2, 5.0, 9))))
+        found = delay_stable_sets._candidates(p, q, h, 0.2, 5.0, fast, np.empty(0)) if fast < 50 else None
         if found is None or len(found[0]) < 3:
             continue
         ends = np.concatenate([[0.2], found[0], [5.0]])
         each = p, q, h, apart(3), *found, np.sqrt(ends[:-1] * ends[1:])
-        own = windows._count_each(*each)
-        monkeypatch.setattr(windows, "count_right_if_feasible", lambda c, *h: (asked.append(len(c)), counts(c, *h))[1])
-        assert np.array_equal(windows._count_by_crossings(*each), own)
+        own = delay_stable_sets._count_each(*each)
+        monkeypatch.setattr(
+            delay_stable_sets, "count_right_if_feasible", lambda c, *h: (asked.append(len(c)), counts(c, *h))[1]
+        )
+        assert np.array_equal(delay_stable_sets._count_by_crossings(*each), own)
         monkeypatch.undo()
         cells += len(own)
     assert sum(asked) < 0.5 * cells  # the few ends of rows of crossings; wrong directions would have all counted

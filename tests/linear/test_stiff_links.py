@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from machines import stacked_pads
-from steadyslip.linear.digits import precise_eigenvalues
+from steadyslip.linear.high_precision_eigenvalues import precise_eigenvalues
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.model.point import operating_point
 

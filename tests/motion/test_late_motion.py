@@ -9,7 +9,7 @@ from scipy.special import factorial
 import steadyslip as ss
 from late_motion import PUSH, axis, campaign_errors, event_errors, lagging, massless, slider, smooth_error
 from steadyslip.model.dead_time import ORDERS, transport
-from steadyslip.model.late_orders import LATE_ACCURACY, pade_error
+from steadyslip.model.delay_order import LATE_ACCURACY, pade_error
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.motion.late_check import late_error
 from steadyslip.nonlinear.kicks.settled import rest_of

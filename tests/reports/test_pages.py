@@ -20,7 +20,7 @@ from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.format import format_quantity
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
-from steadyslip.files.standalone import write_page
+from steadyslip.files.html_document import write_page
 from steadyslip.machine.letters import said, worded, words_of
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.cycle_commands import Thresholds

@@ -16,7 +16,7 @@ from rigs_of_theory import LAWS, rig
 from steadyslip.core.checks import in_words
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.linear.boundary import margins
-from steadyslip.linear.digits import precise_eigenvalues
+from steadyslip.linear.high_precision_eigenvalues import precise_eigenvalues
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.response import response_numbers
 from steadyslip.model.point import operating_point

@@ -136,9 +136,9 @@ def cure(
     as_json: AsJson = False,
 ) -> None:
     """What to change so that it slides stably with a chance, what that costs, and what would make it fail first."""
+    from steadyslip.files.html_document import write_page
     from steadyslip.files.output import check_output
     from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
-    from steadyslip.files.standalone import write_page
     from steadyslip.verdict import cure as run
 
     check_output(output or (), (".html",))
@@ -158,8 +158,8 @@ def compare(
     approval: Approval = "",
 ) -> None:
     """Two rigs beside each other: verdicts, margins, chances, and which of their differences matters."""
+    from steadyslip.files.html_document import write_page
     from steadyslip.files.output import check_output
-    from steadyslip.files.standalone import write_page
     from steadyslip.verdict.compare import compare_files
 
     check_output(output or (), (".html",))

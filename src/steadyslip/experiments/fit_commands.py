@@ -16,8 +16,8 @@ from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.experiments.fitting.machines.machine_result import MachineFit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.speed_result import SpeedFit
+from steadyslip.files.html_document import write_page
 from steadyslip.files.output import FIGURES, write_by_ending, write_text
-from steadyslip.files.standalone import write_page
 
 TABLES = (".csv", ".tex")
 SPEED_ENDINGS = (".toml", ".json")

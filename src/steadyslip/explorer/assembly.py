@@ -58,7 +58,7 @@ from steadyslip.verdict.words import BEYOND, EDGE_WORDS, EIGENVALUE_COLUMNS, HEA
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "nearness", "linear", "rig", "search", "words", "plot", "chart",
     "edges", "banner", "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view",
-    "leaving", "stories", "page",
+    "leaving", "presets", "page",
 )  # fmt: skip
 """Modules of the page in `web/`, each after those that it imports."""
 ENTRIES = ("mount", "render")

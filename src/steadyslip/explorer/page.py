@@ -8,14 +8,14 @@ from typing import Any
 
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.explorer.assembly import page
+from steadyslip.files.html_document import HtmlDocument
 from steadyslip.files.specifications.read import text_of
-from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 
 @dataclass(frozen=True)
-class Explorer(Standalone):
+class Explorer(HtmlDocument):
     """Browser page of one rig.
 
     Attributes

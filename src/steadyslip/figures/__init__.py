@@ -27,7 +27,7 @@ from steadyslip.figures.hunting import hunting
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.machine_verdict import eigenvalue_plane, machine_verdict, mode_shape, stable_ranges
 from steadyslip.figures.machines import machine_sketch
-from steadyslip.figures.map_results import refined, sensitivity
+from steadyslip.figures.map_edges_and_sobol import refined, sensitivity
 from steadyslip.figures.maps import map_figure
 from steadyslip.figures.mode_chart import mode_chart
 from steadyslip.figures.motion import history, phase_plane

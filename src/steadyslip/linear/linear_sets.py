@@ -9,9 +9,9 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.crossing import APART, linear_split
+from steadyslip.linear.delay_stable_sets import delay_set, delay_set_among, empty_set, linear_windows
 from steadyslip.linear.polynomials import StableSet, columns, most_intervals, stable_set
 from steadyslip.linear.roots import Array, quietly
-from steadyslip.linear.windows import delay_set, delay_set_among, empty_set, linear_windows
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.posed import late_on_springs, spare_powers
 from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial

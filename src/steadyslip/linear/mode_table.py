@@ -16,8 +16,8 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
+from steadyslip.files.html_document import write_page
 from steadyslip.files.output import FIGURES, write_by_ending, write_columns
-from steadyslip.files.standalone import write_page
 from steadyslip.linear.mode_changes import ModeChange, changes_of
 from steadyslip.linear.mode_origin import Origin, origin_of
 from steadyslip.linear.modes import Mode, matrix_mode, mode_of

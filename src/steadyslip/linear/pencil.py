@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.linear.argument import count_by_argument
-from steadyslip.linear.digits import matrix_entries, precise_eigenvalues, precise_root
+from steadyslip.linear.high_precision_eigenvalues import matrix_entries, precise_eigenvalues, precise_root
 from steadyslip.linear.neutral import can_vanish
 from steadyslip.linear.quasipolynomial import nondimensional
 from steadyslip.linear.roots import Array, ComplexArray

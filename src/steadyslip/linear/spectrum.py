@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasipolynomial as with_delays, rightmost as late_roots
 from steadyslip.linear.argument import UNKNOWN
-from steadyslip.linear.digits import precise_eigenvalues
+from steadyslip.linear.high_precision_eigenvalues import precise_eigenvalues
 from steadyslip.linear.polynomials import columns, damping_measures, is_hurwitz
 from steadyslip.linear.roots import Array, ComplexArray, quietly, roots
 from steadyslip.model.eigenvalues import digits_lost, eigenvalues_of

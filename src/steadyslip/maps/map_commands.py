@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.files.html_document import write_page
 from steadyslip.files.output import FIGURES, check_output, write_by_ending
-from steadyslip.files.standalone import write_page
 from steadyslip.maps.plan.axes import Axis, Generated
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.map_file import read_map

@@ -14,9 +14,9 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.progress import progress_text
 from steadyslip.core.roles import Parameter
+from steadyslip.files.html_document import write_page
 from steadyslip.files.output import FIGURES, write_by_ending
 from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
-from steadyslip.files.standalone import write_page
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.result import History, check_contact

@@ -22,8 +22,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.dead_time import USUAL_ORDER
+from steadyslip.model.delay_order import order_for
 from steadyslip.model.equations import EITHER, PULLED, Model
-from steadyslip.model.late_orders import order_for
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.posed import resolved, well_posed
 from steadyslip.model.range import in_range, require_range

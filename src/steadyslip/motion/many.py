@@ -24,7 +24,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.late_orders import finer_order
+from steadyslip.model.delay_order import finer_order
 from steadyslip.motion.engine import (
     ILL_POSED,
     INTERRUPTED,

@@ -20,7 +20,7 @@ from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.late_orders import finer_order
+from steadyslip.model.delay_order import finer_order
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single

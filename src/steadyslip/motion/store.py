@@ -11,8 +11,8 @@ import numpy as np
 from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, SteadyslipError
 from steadyslip.files.output import write_columns
+from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
-from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.machine.machine import Machine

@@ -18,9 +18,9 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import parse
+from steadyslip.files.html_document import write_page
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
-from steadyslip.files.standalone import write_page
 from steadyslip.linear.boundary import margins, oscillatory_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

@@ -13,9 +13,9 @@ from types import MappingProxyType
 from steadyslip.core.errors import NotAvailable, ParameterError, RigFileError
 from steadyslip.core.version import version
 from steadyslip.explorer.assembly import document, fragment, style
+from steadyslip.files.html_document import HtmlDocument
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.read import read_whole, text_of
-from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -54,7 +54,7 @@ body { background: #fff; }
 """
 
 
-class Report(Standalone):
+class Report(HtmlDocument):
     """Printable HTML document in one file."""
 
 

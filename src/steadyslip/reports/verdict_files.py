@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip import figures
+from steadyslip.files.html_document import write_page
 from steadyslip.files.output import write_by_ending
-from steadyslip.files.standalone import write_page
 from steadyslip.machine.slider import Slider
 from steadyslip.reports.recommendation import Order
 from steadyslip.reports.rig import chart_pairs

@@ -1,4 +1,4 @@
-"""Teaching with a page: stories to begin with, and verdicts that are guessed first."""
+"""Teaching with a page: presets to begin with, and verdicts that are guessed first."""
 
 import re
 
@@ -60,16 +60,16 @@ def test_no_element_tells_the_verdict_before_it_is_guessed(browser, tmp_path, ri
 
 
 def test_a_story_is_what_it_says(browser, tmp_path):
-    """Each begins from the rig of the file; edges' stories are just on the side that they name."""
+    """Each begins from the rig of the file; edges' presets are just on the side that they name."""
     rig = INCLINED
     ss.explore(rig).save(tmp_path / "rig.html")
     with Visit(browser, tmp_path / "rig.html") as visit:
-        stories, h1 = visit.page.get_by_label("stories"), visit.sentence()
-        names = [one for one in stories.locator("option").all_inner_texts() if one != "stories …"]
+        presets, h1 = visit.page.get_by_label("presets"), visit.sentence()
+        names = [one for one in presets.locator("option").all_inner_texts() if one != "presets …"]
         assert len(names) > 3
         assert names[0] == "the rig of the file"
         for name in names[1:]:
-            stories.select_option(label=name)
+            presets.select_option(label=name)
             if name.startswith("just"):
                 assert visit.sentence().lower().startswith("stable" if name.startswith("just stable") else "unstable")
             changed = re.findall(
@@ -78,5 +78,5 @@ def test_a_story_is_what_it_says(browser, tmp_path):
             assert len([one for one in changed if not one.startswith("~")]) == 1, name
             if "fast" in name or "speed" in name:
                 assert changed[0] == "drive.velocity"
-        stories.select_option(label=names[0])
+        presets.select_option(label=names[0])
         assert visit.sentence() == h1

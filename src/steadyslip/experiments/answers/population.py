@@ -36,8 +36,8 @@ from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import DRAWS, STRESS
 from steadyslip.experiments.numerics.pooling import Pooled, pooled
+from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
-from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
 FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
 ENDS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, and 68 % and 95 % intervals

@@ -25,8 +25,8 @@ from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.experiments.numerics.pooling import run_walkers, spread_of_chains
+from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
-from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
 REFITS_AT_ONCE = 32  # refits at a time: four SIMD vectors of eight lanes, which bounds the memory
 BOOTSTRAPS = ("auto", "block", "residual")

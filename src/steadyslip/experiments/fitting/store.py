@@ -29,8 +29,8 @@ from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.experiments.numerics.smoothing import Smooth
+from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
-from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
 FIT = FileKind("fit", 9, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 RESULT_ATTRIBUTES = {"ssq": float, "search": str, "unidentified": str, "noise": str, "steadyslip": str}
@@ -50,7 +50,7 @@ RESULT_FORMS: dict[str, Any] = {
     "unidentified": [{"weights": {str: float}, "deviation": float}],
     "noise": [(float, bool, float)],
 }
-"""Types of the attributes of any fit in JSON; see `steadyslip.files.tables.fits_form`."""
+"""Types of the attributes of any fit in JSON; see `steadyslip.files.result_tables.fits_form`."""
 _FORMS = RESULT_FORMS | {
     "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
     "records": [(str, [str], bool)],

@@ -8,10 +8,10 @@ import { Facts } from "./facts.js";
 import { leaving } from "./leaving.js";
 import { STABLE } from "./linear.js";
 import { Chart } from "./map.js";
+import { presets } from "./presets.js";
 import { unitFor } from "./quantities.js";
 import { Rig, inside, nearestOf, rangeOf, scaleOf } from "./rig.js";
 import { changes } from "./search.js";
-import { stories } from "./stories.js";
 import { all, choose, chosen, chosenIn } from "./view.js";
 import { kindOf, kindWords } from "./words.js";
 
@@ -80,7 +80,7 @@ export class Page {
     const near = this.edges().filter((edge) => !edge.far && edge.at).map((edge) => edge.i);
     if (data.phrases && near.length) [rig.bar] = near; // show the parameter with the nearest edge
     const k = Math.max(0, rig.bar), across = near.find((i) => i !== k) ?? (k === 0 ? 1 % data.parameters.length : 0);
-    const tales = stories(this);
+    const menu = presets(this);
     rig.values = values;
     this.fit(values);
     this.trace();
@@ -89,7 +89,7 @@ export class Page {
     this.facts = new Facts(this);
     this.course = new Course(this, library);
     root.append(make("main", {}, this.controls.box, make("div", { className: "middle" }, this.chart.box, this.course.box), this.facts.box), this.foot());
-    this.tools.prepend(tales);
+    this.tools.prepend(menu);
     this.tools.append(...leaving(this), make("button", { type: "button", textContent: "guess first", title: "hide the verdict until it is guessed, for teaching", "aria-pressed": "false", onclick: (event) => this.guess(event.currentTarget) }), button("◐", "light or dark", () => {
       const dark = getComputedStyle(root).colorScheme.includes("dark");
       root.dataset.theme = dark ? "light" : "dark";

@@ -3,7 +3,7 @@
 Loops around the compiled step: `lanes.advance` (each lane runs its own job) and `table.through_table` (all lanes follow
 one table of inputs). `states` evaluates outputs at given states without a loop. `holding` follows a rig that holds a
 place, with `bristles` for laws with memory; it is compiled apart from the others. Other modules: `segments`
-(breakpoints, jumps) with `balance` (force balance), `crossings` (events) with `slip` (log and statistics of slip
+(breakpoints, jumps) with `balance` (force balance), `event_detection` with `slip` (log and statistics of slip
 events), `interpolate` (dense output), `samples` (output at requested times), `jobs` (start and end of a job).
 
 All that depends on a model is called through `Routines`; sizes and indices are in `Layout`. The modules run as they

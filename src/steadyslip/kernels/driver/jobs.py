@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from steadyslip.core.arrays import Array
-from steadyslip.kernels.driver.crossings import events_of_jump, process_events, save_before_jump
+from steadyslip.kernels.driver.event_detection import events_of_jump, process_events, save_before_jump
 from steadyslip.kernels.driver.interpolate import state_now
 from steadyslip.kernels.driver.places import (
     events_per_contact,

@@ -20,9 +20,9 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.version import version
 from steadyslip.files.inputs import read_bytes
+from steadyslip.files.result_tables import fits_form
 from steadyslip.files.sealed import fingerprint
 from steadyslip.files.specifications import stored_text
-from steadyslip.files.tables import fits_form
 from steadyslip.maps.plan.axes import COMPLETE, MOST_POINTS, SAMPLE, Generated
 from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
 from steadyslip.maps.plan.measures import NOT_DONE

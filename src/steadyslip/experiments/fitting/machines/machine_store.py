@@ -20,8 +20,8 @@ from steadyslip.experiments.fitting.store import (
     result_variables,
 )
 from steadyslip.experiments.measured.motion_record import MotionRecord
+from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
-from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.responses import ResponseData
 

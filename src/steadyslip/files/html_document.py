@@ -18,7 +18,7 @@ FRAME = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;
 
 
 @dataclass(frozen=True)
-class Standalone:
+class HtmlDocument:
     """HTML document in one file, which loads nothing from outside.
 
     Attributes
@@ -79,4 +79,4 @@ def write_page(result: Any, path: Path, kind: str, **options: Any) -> None:
         If it cannot be written.
     """
     title = kind if path.stem.lower() == kind.lower() else f"{kind}: {path.stem}"
-    Standalone(whole(result, title=title, **options), title).save(path)
+    HtmlDocument(whole(result, title=title, **options), title).save(path)

@@ -184,7 +184,7 @@ def test_bad_words(text, words):
 
 def test_changes_may_come_from_a_generator(tmp_path):
     """They reach the rig and the protocol."""
-    from steadyslip.motion.commands import run_file
+    from steadyslip.cli.run_files import run_file
 
     path = tmp_path / "rig.toml"
     example = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"

@@ -184,7 +184,7 @@ def test_maps(rig, tmp_path):
 
 
 def test_a_file_without_a_map_is_told_so(rig, tmp_path):
-    from steadyslip.maps.map_commands import map_file, sensitivity_file
+    from steadyslip.cli.map_files import map_file, sensitivity_file
 
     path = tmp_path / "rig.toml"
     ss.write_rig(rig, path)

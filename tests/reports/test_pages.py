@@ -17,13 +17,13 @@ from fuzz_rigs import DRIVES, FRICTION
 from public_names import public_results
 from read_pages import words
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
+from steadyslip.cli.run_files import write_history
 from steadyslip.core.format import format_quantity
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.files.html_document import write_page
 from steadyslip.machine.letters import said, worded, words_of
-from steadyslip.motion.commands import write_history
-from steadyslip.nonlinear.cycle_commands import Thresholds
+from steadyslip.nonlinear.kicks.several_kicks import Thresholds
 from steadyslip.reports.brief import _HIDDEN, DIMENSIONLESS, RESULT_UNIT, UNITS, brief, result_html, unit_of
 from steadyslip.reports.results import MAX_ROWS, _distinct_rows, protocol_table
 from steadyslip.reports.rig import input_table

@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 import steadyslip as ss
 from read_pages import words
 from steadyslip import figures
+from steadyslip.cli import verdict_files
 from steadyslip.cli.program import app
-from steadyslip.reports import verdict_files
 
 AXIS = ss.read_rig("examples/stick-slip.toml")
 PAD = ss.read_rig("examples/machines/brake-pad.toml")
@@ -92,7 +92,9 @@ def test_two_rigs_have_one_chart(rigs, over, measure):
 def test_the_picture_of_a_verdict_has_what_can_be_changed(monkeypatch, tmp_path, name, first):
     """It was drawn over b, which nobody buys, while the document had the preload."""
     drawn = []
-    monkeypatch.setattr(figures, "stability_chart", lambda rig, *over: drawn.append(over) or figures.root_locus(rig))
+    monkeypatch.setattr(
+        verdict_files, "stability_chart", lambda rig, *over: drawn.append(over) or figures.root_locus(rig)
+    )
     path = Path(f"examples/{name}.toml")
     verdict_files.write_verdict(ss.analyze(ss.read_rig(path)), None, tmp_path / "a.svg", path)
     assert [over[0] for over in drawn] == [first]

@@ -12,11 +12,11 @@ import lab_records as lab
 import steadyslip as ss
 from rigs_of_theory import rig
 from steadyslip import cli, reproduce as reproducing
+from steadyslip.cli.run_files import write_history
 from steadyslip.experiments.answers import laws, predict as predicting, uncertainty
 from steadyslip.experiments.fitting import forward, search
 from steadyslip.files import output
 from steadyslip.maps.sensitivity import LEAST
-from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
 

@@ -65,7 +65,7 @@ def analyze(
     within = tolerate(read, tolerances) if tolerances else None
     anywhere = stable_within(read, tolerances.unknown) if tolerances.unknown else None
     if output:
-        from steadyslip.reports.verdict_files import write_verdict
+        from steadyslip.cli.verdict_files import write_verdict
 
         for path in output:
             write_verdict(result, within, path, rig, journal)

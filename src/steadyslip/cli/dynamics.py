@@ -33,9 +33,9 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """What does this rig do, under the protocol of its file and of the command line?"""
+    from steadyslip.cli.run_files import ENDINGS, run_file, write_history
     from steadyslip.files.output import check_output
     from steadyslip.linear.status import stability
-    from steadyslip.motion.commands import ENDINGS, run_file, write_history
 
     check_output(output or (), ENDINGS)
     history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol, contact)
@@ -70,8 +70,8 @@ def cycles(
     as_json: AsJson = False,
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
+    from steadyslip.cli.cycle_files import ENDINGS, cycles_of_file, write_branch
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.cycle_commands import ENDINGS, cycles_of_file, write_branch
 
     check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings, partial(typer.secho, err=True))
@@ -104,8 +104,8 @@ def threshold(
     as_json: AsJson = False,
 ) -> None:
     """How large a kick does steady sliding survive? Ctrl-C keeps what there is."""
+    from steadyslip.cli.cycle_files import KICKED, thresholds_of_file, write_thresholds
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.cycle_commands import KICKED, thresholds_of_file, write_thresholds
 
     check_output(output or (), KICKED)
     found = thresholds_of_file(rig, changes or (), kick or (), reverse, reference, at, up_to)
@@ -141,8 +141,8 @@ def response(
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Gain and phase of steady sliding under an input that swings: exact for small amplitudes, simulated for large."""
+    from steadyslip.cli.cycle_files import ANSWERED, response_of_file, write_answers
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.cycle_commands import ANSWERED, response_of_file, write_answers
 
     check_output(files or (), ANSWERED)
     found = response_of_file(rig, changes or (), periods, points, amplitudes or (), swings, answers, on, limits)
@@ -164,8 +164,8 @@ def hunt(
     as_json: AsJson = False,
 ) -> None:
     """Does an axis that is held (velocity = 0) hunt about its target, how far and how often, or settle?"""
+    from steadyslip.cli.cycle_files import ANSWERED, hunt_of_file, write_answers
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.cycle_commands import ANSWERED, hunt_of_file, write_answers
 
     check_output(output or (), ANSWERED)
     found = hunt_of_file(rig, changes or (), pieces or (), until, rtol)
@@ -184,8 +184,8 @@ def verdicts(
     as_json: AsJson = False,
 ) -> None:
     """Is it stable at every moment of a protocol of slow changes, and when does motion depart?"""
+    from steadyslip.cli.cycle_files import ANSWERED, verdicts_of_file, write_answers
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.cycle_commands import ANSWERED, verdicts_of_file, write_answers
 
     check_output(output or (), ANSWERED)
     found = verdicts_of_file(rig, changes or (), pieces or (), until, rtol)

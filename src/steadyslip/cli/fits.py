@@ -45,9 +45,7 @@ def fit(
     if law is not None:
         _fit_speeds(files, law, changes or (), output or (), as_json)
         return
-    from steadyslip.core.errors import ParameterError, Problem
-    from steadyslip.experiments import bootstrap as resample, fit_files, population_files, step_table
-    from steadyslip.experiments.fit_commands import (
+    from steadyslip.cli.fit_files import (
         ENDINGS,
         TABLES,
         as_json as plain,
@@ -56,6 +54,8 @@ def fit(
         write_population,
         write_table,
     )
+    from steadyslip.core.errors import ParameterError, Problem
+    from steadyslip.experiments import bootstrap as resample, fit_files, population_files, step_table
     from steadyslip.experiments.from_files import fitted, records_of, spec_of
     from steadyslip.experiments.machine_spec import MachineSpec
     from steadyslip.files.output import check_output
@@ -139,7 +139,7 @@ def fit(
 
 def _fit_speeds(files: Sequence[Path], law: str, changes: Sequence[str], output: Sequence[Path], as_json: bool) -> None:
     """Fit a law to a table of speeds, and write the rig."""
-    from steadyslip.experiments.fit_commands import SPEED_ENDINGS, write_speeds
+    from steadyslip.cli.fit_files import SPEED_ENDINGS, write_speeds
     from steadyslip.experiments.from_speeds import fit_speed_files
     from steadyslip.files.output import check_output
 

@@ -32,8 +32,8 @@ def map_(
     as_json: AsJson = False,
 ) -> None:
     """Any analysis over many rigs, kept on disk; the same command again goes on after an interruption."""
+    from steadyslip.cli.map_files import STORE, map_file, write_map
     from steadyslip.maps import refine as refined
-    from steadyslip.maps.map_commands import STORE, map_file, write_map
 
     figure: dict[str, Any] = {"x": x, "y": y, "show": show, "facet": facet}
     about: dict[str, Any] = {"of": of, "level": level}
@@ -69,8 +69,8 @@ def sensitivity(
     as_json: AsJson = False,
 ) -> None:
     """Which parameters decide? Sobol indices over the ranges of the file's [map]."""
+    from steadyslip.cli.map_files import SHARES, sensitivity_file, write_sensitivity
     from steadyslip.files.output import check_output
-    from steadyslip.maps.map_commands import SHARES, sensitivity_file, write_sensitivity
 
     check_output(output or (), SHARES)
     found = sensitivity_file(rig, changes or (), of or (), points)

@@ -30,9 +30,9 @@ from steadyslip.motion import History
 from steadyslip.motion.events import ContactSlip
 from steadyslip.motion.sentence import drop_of
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
-from steadyslip.nonlinear.cycle_commands import Thresholds
 from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
+from steadyslip.nonlinear.kicks.several_kicks import Thresholds
 from steadyslip.protocol import Protocol
 from steadyslip.reports import held, machine_parts as machine_report, rig as rig_report
 from steadyslip.reports.brief import kind_of, result_html, sketch_of, text_html

@@ -232,8 +232,8 @@ def _kicks(rig: Slider | Machine, kinds: Sequence[str], branch: int) -> tuple[Th
     """Thresholds of kicks given as text such as ``force at table``."""
     if not kinds:
         return ()
-    from steadyslip.nonlinear.cycle_commands import thresholds_shown  # compiles; only where asked for
     from steadyslip.nonlinear.kicks.kicks import kick_problems
+    from steadyslip.nonlinear.kicks.several_kicks import thresholds_shown  # compiles; only where asked for
 
     asked = [(kick.strip(), at.strip() or None) for kick, _, at in (words.partition(" at ") for words in kinds)]
     if problems := [one for kick, at in asked for one in kick_problems(rig, kick, at)]:

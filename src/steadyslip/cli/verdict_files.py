@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from steadyslip import figures
+from steadyslip.figures import journal as journal_style, root_locus, stability_chart
 from steadyslip.files.html_document import write_page
 from steadyslip.files.output import write_by_ending
 from steadyslip.machine.slider import Slider
@@ -28,12 +28,12 @@ def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source:
     shown: Any = found if within is None else within
 
     def drawn() -> Any:
-        with figures.journal() if journal else nullcontext():
+        with journal_style() if journal else nullcontext():
             if found.rig.in_forces:
                 return found.plot()
             rig: Slider = found.rig
             adjustable = getattr(within.tolerances, "adjust", {}) if within is not None else {}
             pairs = chart_pairs(found, Order((), adjustable))
-            return figures.stability_chart(rig, *pairs[0]) if pairs else figures.root_locus(rig)
+            return stability_chart(rig, *pairs[0]) if pairs else root_locus(rig)
 
     write_by_ending(path, {".html": lambda p: write_page(shown, p, "Verdict", source=source)}, drawn, found)

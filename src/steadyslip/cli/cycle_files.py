@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from steadyslip.cli.run_files import progress_of, read_experiment
 from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, QuantityError
 from steadyslip.core.format import format_quantity
-from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import parse
 from steadyslip.files.html_document import write_page
@@ -24,15 +20,13 @@ from steadyslip.files.specifications import read_rig
 from steadyslip.linear.boundary import margins, oscillatory_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.motion.commands import progress_of, read_experiment
 from steadyslip.nonlinear.forced import amplitude_unit, response
 from steadyslip.nonlinear.frequency_response import FrequencyResponse
 from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
-from steadyslip.nonlinear.kicks.basin import Basin, basin
-from steadyslip.nonlinear.kicks.kicks import kick_problems, kicks_of
-from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
+from steadyslip.nonlinear.kicks.kicks import kicks_of
+from steadyslip.nonlinear.kicks.several_kicks import Thresholds, thresholds_shown
 from steadyslip.nonlinear.orbits.at_value import own_motion
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
@@ -98,30 +92,6 @@ def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) ->
     write_by_ending(path, writers, branch.plot, branch)
 
 
-@dataclass(frozen=True)
-class Thresholds(Displayed):
-    """Thresholds of several kinds of kick of one rig."""
-
-    rig: Slider | Machine
-    found: tuple[Threshold, ...]
-    interrupted: bool = False
-
-    def __str__(self) -> str:
-        return "\n".join(map(str, self.found))
-
-    def to_dict(self) -> list[dict[str, Any]]:
-        """One entry for each kind of kick."""
-        return [one.to_dict() for one in self.found]
-
-    @cached_property
-    def basin(self) -> Basin:
-        """The basin of the same rig, computed once; of a machine in the plane of the body that is kicked."""
-        at = next((one.at for one in self.found if one.at), None)
-        if at is not None and at in self.rig.contacts:
-            at = self.rig.contacts[at].held
-        return basin(self.rig, at=at)
-
-
 def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
     at: str | None = None, up_to: float | None = None,
@@ -131,32 +101,6 @@ def thresholds_of_file(
     usual = tuple(name for name, kick in kicks_of(rig).items() if kick.usual)
     options = {"at": at, "direction": -1 if reverse else 1, "reference": reference, "up_to": up_to}
     return thresholds_shown(rig, tuple(kicks) or usual, **options)
-
-
-def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any) -> Thresholds:
-    """`steadyslip.threshold` for several kinds of kick; shows progress on a terminal, and ends with Ctrl-C."""
-    problems = [one for kick in dict.fromkeys(kicks) for one in kick_problems(rig, kick, options.get("at"))]
-    if problems:
-        raise ParameterError(problems)
-    found: list[Threshold] = []
-    with progress_text("starting") as said:
-        for kick in kicks:
-            which = f"{kick} kicks ({len(found) + 1} of {len(kicks)})"
-
-            def told(tried: int, low: float, high: float, which: str = which) -> None:
-                bracket = f"survived up to size {low:.6g}" + (f", not at {high:.6g}" if math.isfinite(high) else "")
-                said(f"{which}: {tried} run, {bracket}; Ctrl-C keeps what there is")
-
-            told(0, 0.0, math.inf)
-            try:
-                found.append(threshold(rig, kick, **options, progress=told))
-            except KeyboardInterrupt:  # before this kick had an answer; those before it keep theirs
-                if not found:
-                    raise
-                return Thresholds(rig, tuple(found), True)
-            if found[-1].interrupted:
-                break
-    return Thresholds(rig, tuple(found), found[-1].interrupted)
 
 
 def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = None) -> bool:

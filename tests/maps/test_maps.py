@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 import steadyslip as ss
 from charts import ANGLES, LINEAR, RANGES, chart, made, rig, sampling
 from dimensionless import unit_rig
+from steadyslip.maps.plan.measures import Measure
 from steadyslip.maps.work.chunk import do_chunk, job_of
 from steadyslip.nonlinear.onset.hopf import onset_map
 
@@ -248,3 +249,19 @@ def test_what_a_map_says_of_itself(tmp_path):
     assert statistics["growth_rate"]["high"] == data["growth_rate"].max()
     assert statistics["growth_rate"]["share"] == pytest.approx(float(np.isfinite(data["growth_rate"]).mean()))
     assert "no steady sliding" in str(found)
+
+
+@pytest.mark.parametrize("name", sorted(set(Measure.registry) - {"hunt"}))
+def test_numbers_that_can_be_missing_say_why(tmp_path, name):
+    """Where there is no steady sliding: unless words beside a number tell it, its declaration does."""
+    pushed = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=1.0, to=2e-6),), until=5.0)
+    plan = ss.Map(rig(), {"angle": ["-80 deg", "-20 deg"]}, [name], protocol=pushed)
+    found = made(plan, tmp_path)
+    told = any(output.flags for output in plan.outputs())
+    for output in plan.outputs():
+        if output.flags:
+            continue
+        assert np.isnan(found.dataset[output.name].values[0]).all(), output.name
+        assert output.missing or told, output.name
+        assert found.why_missing(output.name) == output.missing
+        assert (f"{output.name} " in str(found)) and ("compute status as well" in str(found)) != told

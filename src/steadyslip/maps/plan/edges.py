@@ -17,7 +17,7 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.stable_values import edge_along, intervals_along, is_own_stiffness, name_along, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan.measures import Measure, Output
+from steadyslip.maps.plan.measures import NO_EDGE, NOT_SLIDING, Measure, Output
 from steadyslip.model.point import Vary, operating_point
 from steadyslip.nonlinear.onset.hopf import KINDS, onset_map
 from steadyslip.protocol import Protocol
@@ -36,7 +36,7 @@ class CriticalStiffness(Measure, name="critical_stiffness"):
     """Edge of the stable set nearest to the rig's own stiffness, of sliders; see `steadyslip.critical_stiffness`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("critical_stiffness", "Pa/m", "critical stiffness"),)
+        return (Output("critical_stiffness", "Pa/m", "critical stiffness", missing=NO_EDGE),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"critical_stiffness": critical_stiffness(cast(Slider, rig), vary)}
@@ -53,7 +53,8 @@ class StableStiffness(Measure, name="stable_stiffness"):
         one = has_closed_form(values.model)
         most = 1 if one else most_values(values)
         extra = (("interval", most), ("end", 2))
-        return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
+        meaning = "ends of the intervals of stable stiffness"
+        return (Output("stable_stiffness", "Pa/m", meaning, extra=extra, missing=NOT_SLIDING),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"stable_stiffness": stable_stiffness(cast(Slider, rig), vary)}
@@ -112,7 +113,7 @@ class Edge(Along, name="edge"):
     """Edge of the stable set of any parameter nearest to its own value, exactly; see `steadyslip.stable_values`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("edge", self.unit(rig)[1], f"edge of stability in {self.name_of(rig)}"),)
+        return (Output("edge", self.unit(rig)[1], f"edge of stability in {self.name_of(rig)}", missing=NO_EDGE),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"edge": self.edge(rig, vary)[0] * self.unit(rig)[0]}
@@ -124,7 +125,7 @@ class StableValues(Along, name="stable_values"):
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         extra = (("interval", self.room(rig, varied)), ("end", 2))
         meaning = f"ends of the intervals in which {self.name_of(rig)} is stable"
-        return (Output("stable_values", self.unit(rig)[1], meaning, extra=extra),)
+        return (Output("stable_values", self.unit(rig)[1], meaning, extra=extra, missing=NOT_SLIDING),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"stable_values": np.asarray(self.intervals(rig, vary)) * self.unit(rig)[0]}
@@ -135,7 +136,7 @@ class SafetyFactor(Along, name="safety_factor"):
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         what = "stiffness over critical stiffness" if self.is_own(rig) else f"{self.name_of(rig)} over its edge"
-        return (Output("safety_factor", "1", what),)
+        return (Output("safety_factor", "1", what, missing=NO_EDGE),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"safety_factor": safety_factor(rig, vary, along=self.along)}
@@ -146,7 +147,7 @@ class LogMargin(SafetyFactor, name="margin"):
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         (factor,) = super().outputs(rig, varied)
-        return (Output("margin", "1", f"logarithm of {factor.meaning}"),)
+        return (Output("margin", "1", f"logarithm of {factor.meaning}", missing=NO_EDGE),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         with np.errstate(all="ignore"):

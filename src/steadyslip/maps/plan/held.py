@@ -36,10 +36,10 @@ class Hunting(Measure, name="hunt"):
         words = ("settles", "hunts", "runs away", "not decided")
         return (
             Output("hunts", "1", "whether it hunts", words),
-            Output("hunt_amplitude", unit, "largest distance from the target while hunting"),
-            Output("hunt_period", "s", "period of hunting"),
-            Output("settling_time", "s", "time after which it rests"),
-            Output("rest_error", unit, "distance from the target at rest"),
+            Output("hunt_amplitude", unit, "largest distance from the target while hunting", missing="does not hunt"),
+            Output("hunt_period", "s", "period of hunting", missing="does not hunt"),
+            Output("settling_time", "s", "time after which it rests", missing="does not settle"),
+            Output("rest_error", unit, "distance from the target at rest", missing="does not settle"),
         )
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:

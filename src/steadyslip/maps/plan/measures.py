@@ -40,6 +40,10 @@ SECONDS_A_STEP = 4e-8  # CPU time of a step in a lane, measured; only sets the s
 SECONDS_OF_DELAY = 1e-2  # CPU time to count the roots of a rig with delay, measured; only sets the size of chunks
 PROBES = 64  # points at which the cost of a map is estimated; chosen by trial
 NOT_DONE = -1  # integer stored where nothing is computed
+NOT_SLIDING = "no steady sliding, or out of range"
+"""Why a result may be missing: only the result `status` tells which of the two it is."""
+NO_EDGE = "no steady sliding, out of range, or no edge"
+"""The same, or stable or unstable at every value; rigs at some of the points are analysed for the reason."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,11 @@ class Output:
         Meanings of the numbers 0, 1, ...; such arrays hold small integers, -1 where nothing is computed yet.
     extra : tuple of (str, int)
         Name and size of each dimension besides those of the map.
+    missing : str
+        Why a point may have no value, for figures and summaries: `NOT_SLIDING`, `NO_EDGE`, or words such as "does not
+        hunt"; empty if every point has one.
+    infinite : str
+        What an infinite value means, in words; empty if there is none.
     """
 
     name: str
@@ -60,6 +69,8 @@ class Output:
     meaning: str
     flags: tuple[str, ...] = ()
     extra: tuple[tuple[str, int], ...] = ()
+    missing: str = ""
+    infinite: str = ""
 
     @property
     def dtype(self) -> str:
@@ -120,7 +131,8 @@ class GrowthRate(Measure, name="growth_rate"):
     """Largest real part of the eigenvalues; see `steadyslip.growth_rate`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("growth_rate", "1/s", "growth rate of small disturbances"),)
+        meaning = "growth rate of small disturbances"
+        return (Output("growth_rate", "1/s", meaning, missing=NOT_SLIDING, infinite="ill-posed"),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"growth_rate": growth_rate(rig, vary)}
@@ -131,8 +143,8 @@ class Frequency(Measure, name="frequency"):
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (
-            Output("frequency", "Hz", "frequency of the leading mode"),
-            Output("damping_ratio", "1", "damping ratio of the leading mode"),
+            Output("frequency", "Hz", "frequency of the leading mode", missing=NOT_SLIDING),
+            Output("damping_ratio", "1", "damping ratio of the leading mode", missing=NOT_SLIDING),
         )
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
@@ -146,7 +158,8 @@ def _leading(point: OperatingPoint) -> Any:
     with np.errstate(all="ignore"):
         first = np.argmax(np.where(np.isnan(found.real), -np.inf, found.real), axis=-1)
         s = np.take_along_axis(found, first[..., None], axis=-1)[..., 0]
-        s = np.where(is_ill_posed(point), complex(np.nan, np.nan), s)  # what grows without limit has no frequency
+        # neither what grows without limit nor what does not slide steadily has a frequency
+        s = np.where(is_ill_posed(point) | np.isnan(s.real), complex(np.nan, np.nan), s)
         return np.stack([np.abs(s.imag) / (2 * np.pi), -s.real / np.abs(s)], axis=-1)
 
 
@@ -238,8 +251,9 @@ class KickThreshold(Measure, name="threshold"):
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         lost = "contact that is lost beyond, or fastest in a blow-up"
         names = ("none", *rig.contact_names) if rig.contact_names else ()
+        meaning = f"size of the smallest {self.kick} kick not survived, not given where undecided"
         return (
-            Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
+            Output("threshold", "1", meaning, infinite="no kick in the range fails"),
             Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),
             Output("threshold_high", "1", f"size of the smallest {self.kick} kick known not to be survived"),
             Output("threshold_limit", "1", f"what limits the {self.kick} kicks that are survived", BEYOND),

@@ -40,6 +40,8 @@ _FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # fill values: nothi
 _PACKED, _PLAIN = ("bytes", "blosc", "crc32c"), ("bytes",)
 
 
+REASONS = ("missing", "infinite")  # attributes of a result with words on points without a number, as in `Output`
+
 Form = tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]
 
 
@@ -265,6 +267,7 @@ def new_layout(plan: Map) -> MapLayout:
         if output.flags:
             attributes["flag_values"] = list(range(-1, len(output.flags)))
             attributes["flag_meanings"] = " ".join(word.replace(" ", "_") for word in ("not computed", *output.flags))
+        attributes |= {key: text for key in REASONS if (text := getattr(output, key))}
         layout.arrays[output.name] = StoredArray(output.dtype, *layout.form(output.name, output.extra), attributes)
     said = {"units": "1", "long_name": "checksum of each finished chunk, 0 until then"}
     layout.arrays[COMPLETE] = StoredArray("uint64", *layout.form(COMPLETE), said)

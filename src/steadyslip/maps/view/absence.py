@@ -7,12 +7,12 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.linear.status import ABSENT, STABLE, UNDAMPED, UNKNOWN, UNSTABLE, WORDS, status, without_edge
 from steadyslip.machine.machine import Machine
+from steadyslip.maps.plan.measures import NO_EDGE, NOT_SLIDING
 from steadyslip.maps.view.cut import View
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
 ASKED = 12  # points analysed for an explanation, evenly chosen; chosen by trial
-_ABOUT_EDGES = ("critical_stiffness", "safety_factor", "margin", "edge")
 _REASONS = {
     ABSENT: WORDS[ABSENT],
     UNKNOWN: WORDS[UNKNOWN],
@@ -20,10 +20,6 @@ _REASONS = {
     UNSTABLE: "stable at no value",
     UNDAMPED: "nothing damps it",
 }
-WITHOUT = dict.fromkeys(("hunt_amplitude", "hunt_period"), "does not hunt") | dict.fromkeys(
-    ("settling_time", "rest_error"), "does not settle"
-)
-_INFINITE = {"growth_rate": "ill-posed", "threshold": "no kick in the range fails"}
 
 
 def without_number(found: MapResult, view: View, name: str, hatched: bool = False) -> str:
@@ -36,14 +32,14 @@ def without_number(found: MapResult, view: View, name: str, hatched: bool = Fals
         values = np.where(np.isin(view.values["status"], (ABSENT, UNKNOWN)), 0.0, values)
     if np.isfinite(values).all():
         return ""
-    reasons = [_INFINITE.get(name, "without limit")] if np.isinf(values).any() else []
-    missing = np.argwhere(np.isnan(values))
-    if len(missing):
-        reasons += sorted(set(_reasons(found, view, missing)) - {""}) if name in _ABOUT_EDGES else []
+    reasons = [found.what_infinite(name)] if np.isinf(values).any() else []
+    missing, why = np.argwhere(np.isnan(values)), found.why_missing(name)
+    if len(missing) and why == NO_EDGE:
+        reasons += sorted(set(_reasons(found, view, missing)) - {""})
     if len(missing) and not found.complete:
         reasons.append("not computed yet")
-    if len(missing) and name in WITHOUT:
-        reasons.append(WITHOUT[name])
+    if len(missing) and why not in ("", NO_EDGE, NOT_SLIDING):
+        reasons.append(why)
     words = name.replace("_", " ")
     return f"no {words}" + (f" ({', '.join(reasons)})" if reasons else "")
 

@@ -18,15 +18,11 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan.measures import NO_EDGE, NOT_SLIDING
 from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.view import export
 
 BLOCK = 2**22  # values read at a time: 32 MiB
-LINEAR = (
-    "critical_stiffness", "safety_factor", "margin", "stable_stiffness", "growth_rate", "edge", "stable_values",
-    "frequency", "damping_ratio",
-)  # fmt: skip
-"""Results that are missing without steady sliding or out of range, which only `status` distinguishes."""
 
 
 class MapResult(Displayed):
@@ -133,6 +129,14 @@ class MapResult(Displayed):
             raise ParameterError([Problem("name", unknown_name("array", name, (*self.results, *self.parameters)))])
         return str(self._store.layout.arrays[name].attributes["units"])
 
+    def why_missing(self, name: str) -> str:
+        """Why points may have no value of a result, as its `Output` declares; empty for maps of earlier programs."""
+        return str(self._store.layout.arrays[name].attributes.get("missing", ""))
+
+    def what_infinite(self, name: str) -> str:
+        """What an infinite value of a result means, as its `Output` declares; else "without limit"."""
+        return str(self._store.layout.arrays[name].attributes.get("infinite", "without limit"))
+
     def along(self, name: str) -> str | None:
         """Parameter along which a result is an edge, if it was chosen; else None."""
         given = self._store.layout.definition["compute"].get(name, {})
@@ -217,7 +221,11 @@ class MapResult(Displayed):
                 text += "" if found["share"] == 1 else f", for {format_percent(found['share'])} of the points"
             else:
                 text = "nowhere"
-            if name in LINEAR and "status" not in self.results and found.get("share", 1) < 1:
+            if (
+                self.why_missing(name) in (NOT_SLIDING, NO_EDGE)
+                and "status" not in self.results
+                and found.get("share", 1) < 1
+            ):
                 text += "; compute status as well to know of the rest"
             lines.append(f"  {name:<{width}}{text}")
         return "\n".join(lines)

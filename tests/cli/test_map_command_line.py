@@ -94,6 +94,8 @@ def test_a_map_that_is_not_finished_says_what_finishes_it(tmp_path, capsys, monk
     ("arguments", "message"),
     [
         (("map", SAFE), "give one name for the map, such as -o safe-stiffness.zarr"),
+        (("map", SAFE, "-o", "x.nc"), "got x.nc; also give one for the map itself, such as -o x.zarr"),
+        (("map", SAFE, "-o", "x.zarr", "-o", "y.zarr"), "got 2 names for the map; give one name for the map, such as"),
         (("map", SAFE, "-o", "a.zarr", "-o", "b.zarr"), "got 2 names"),
         (("map", SAFE, "-o", "a.zarr", "-o", "a.csv"), "allowed endings"),
         (("map", SAFE, "-o", "a.zarr", "--cluster", "host"), "cluster: got 'host'"),

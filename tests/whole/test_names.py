@@ -43,7 +43,7 @@ def test_equations_are_the_same_under_any_name_of_a_memory_that_results_leave_fr
     for name in [name for name in NAMES if name not in (*OF_RESULTS, *PLAIN)][::5]:
         assert equations(renamed(((what, name),))) == plain, name
     for name in OF_RESULTS:
-        with pytest.raises(ss.ParameterError, match=f"calls a memory, state or observable '{name}', as results call"):
+        with pytest.raises(ss.ParameterError, match=f"observable '{name}', which in the results of every rig is"):
             build_model(renamed(((what, name),)))
 
 

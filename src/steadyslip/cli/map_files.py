@@ -47,8 +47,10 @@ def map_file(
             raise ParameterError([Problem(str(source), message)])
         return open_map(source)
     if len(stores) != 1:
-        came = "missing" if not stores else f"got {len(stores)} names"
-        message = f"{came}; give one name for the map, such as -o {source.with_suffix(STORE).name}"
+        came = f"got {len(stores)} names for the map" if stores else f"got {outputs[0].name}" if outputs else "missing"
+        name = (outputs[0] if outputs else source).with_suffix(STORE).name
+        wanted = f"also give one for the map itself, such as -o {name}" if outputs and not stores else ""
+        message = f"{came}; {wanted or f'give one name for the map, such as -o {name}'}"
         raise ParameterError([Problem("output", message)])
     check_path(stores[0])
     return run_map(read_map(source, changes), stores[0], workers=workers, cluster=cluster)

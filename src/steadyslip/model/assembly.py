@@ -266,12 +266,12 @@ class _Assembly(Forces):
 
 
 RESERVED_NAMES = {
-    "t": "the time", "time": "the time", "x": "how far a block is ahead of steady sliding", "v": "the velocity",
-    "acceleration": "the acceleration", "displacement": "the way of a body", "slip": "the slip",
-    "slip_rate": "the velocity of slip", "load_velocity": "the velocity of the load point",
-    "load_displacement": "the way of the load point", "disturbance": "what pushes the block",
+    "t": "the time", "time": "the time", "x": "the lead of a block over steady sliding", "v": "the velocity",
+    "acceleration": "the acceleration", "displacement": "the displacement of a body", "slip": "the slip",
+    "slip_rate": "the slip rate", "load_velocity": "the velocity of the load point",
+    "load_displacement": "the displacement of the load point", "disturbance": "the stress that pushes the block",
     "normal_disturbance": "the normal stress that a protocol adds", "injection": "the pressure of an injection",
-    "creep": "whether the drive is let go", "integral": "the integral of a controller",
+    "creep": "1 while a creep test releases the drive", "integral": "the integral of a controller's error",
     "friction": "the friction coefficient", "shear_stress": "the friction stress", "normal_stress": "the normal stress",
     "spring_stress": "the stress of the spring", "friction_force": "the friction force",
     "normal_force": "the normal force", "force": "the force of a link",
@@ -294,8 +294,9 @@ def check_names(place: str, law: FrictionLaw | ContactLaw, names: Iterable[str])
     given = list(names)
     for name in dict.fromkeys(given):
         if name in RESERVED_NAMES or name.startswith(EVENTS):
-            what = RESERVED_NAMES.get(name, "what is known of events")
-            problems.append(f"law {owner!r} calls a memory, state or observable {name!r}, as results call {what}")
+            what = RESERVED_NAMES.get(name, "a column on events")
+            named = f"law {owner!r} calls a memory, state or observable {name!r}"
+            problems.append(f"{named}, which in the results of every rig is {what}")
         elif given.count(name) > 1:
             problems.append(f"law {owner!r} calls two memories or states {name!r}")
         elif not name.isidentifier():

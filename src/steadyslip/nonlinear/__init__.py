@@ -7,10 +7,13 @@ How a cycle is found, and gets its period (`cycles`, one file per step):
 1. `onset/hopf.py`: `hopf` finds the edge of stability nearest to the rig, with its frequency ω and kind of onset.
 2. `orbits/follow.py`: `cycles` starts there, and joins the pieces of the branch that can be followed.
 3. `orbits/tracer.py`: `Tracer.small` makes the first cycle of the critical eigenvector, with period 2π/ω;
-   `Tracer.followed` goes on from cycle to cycle by `continuation.py` (pseudo-arclength, Newton's method).
+   `Tracer.followed` goes on from cycle to cycle by `SolutionCurve` in `continuation.py` (pseudo-arclength, Newton's
+   method).
 4. `orbits/shooting.py`: `Shooting.equations`. ln(period) is an unknown beside the starting state and the parameter; one
    more equation, that slip passes the load point's velocity at the start, determines it. `Shooting.orbit` reads it off.
-   `orbits/flow.py` integrates the motion and its derivatives for these equations.
+   Where a run takes long, `Shooting.retimed` first moves the period predicted to the nearest return of the motion.
+   `orbits/parameter_flow.py` is the rig with one free parameter; `orbits/flow.py`, below it, integrates the motion and
+   its derivatives for these equations.
 5. `orbits/cycle_from_motion.py`: `cycle_data` integrates the solved cycle once more, for velocities, stresses and
    stability (Floquet multipliers), into a `Cycle` (`orbits/cycle.py`).
 

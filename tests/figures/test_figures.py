@@ -12,7 +12,7 @@ from matplotlib.path import Path
 import steadyslip as ss
 from chart_areas import contains, inside, region
 from steadyslip import figures
-from steadyslip.figures import mass
+from steadyslip.figures import paper_figure_7
 from steadyslip.figures.axis import chart_axis
 from steadyslip.figures.style import display_unit, unmanaged_axes
 from steadyslip.reproduce import paper_rig
@@ -123,7 +123,7 @@ def test_only_locked_up_angles_still_draw():
 def test_the_preload_or_the_steady_stress_give_the_same_curves():
     given = rig_with(contact=ss.laws.InclinedSpring(steady_normal_stress=7 * MPa, angle=0.0))
     m_star = np.geomspace(1e-4, 1e-2, 5)
-    curves = [mass.dimensionless_critical_stiffness(rig, -0.5, m_star) for rig in (paper_rig(), given)]
+    curves = [paper_figure_7.dimensionless_critical_stiffness(rig, -0.5, m_star) for rig in (paper_rig(), given)]
     np.testing.assert_allclose(*curves, rtol=32 * np.finfo(float).eps)
 
 
@@ -131,7 +131,7 @@ def test_rigs_with_other_friction_have_the_figure_too():
     for rig in (STRENGTHENING, rig_with(TWO_STATES), rig_with(PRAKASH_CLIFTON)):
         ax = figures.critical_stiffness_against_mass(rig, m_star=np.geomspace(1e-4, 1e-1, 9), ax=unmanaged_axes())
         assert len(legend_texts(ax)) == len(ANGLES)
-    strengthening = mass.dimensionless_critical_stiffness(STRENGTHENING, 0.0, 1e-3)
+    strengthening = paper_figure_7.dimensionless_critical_stiffness(STRENGTHENING, 0.0, 1e-3)
     assert np.isnan(strengthening)
 
 

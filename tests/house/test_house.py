@@ -55,7 +55,7 @@ def test_modules_name_the_module_they_need():
 
 KNOWS_LAWS = ("laws", "machine", "testing", "reproduce")
 """Folders that may name a law; and the figure of the paper that is about one."""
-OF_THE_PAPER = {Path("figures/mass.py"), Path("figures/critical.py"), Path("linear/paper.py")}
+OF_THE_PAPER = {Path("figures/paper_figure_7.py"), Path("linear/paper.py")}
 FOUNDED = {"velocity", "stiffness", "axial_stiffness", "mass", "damping", "radiation_damping", "area"}
 """Parameters of every rig: the slider's own, and the velocity of its drive."""
 

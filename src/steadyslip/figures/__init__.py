@@ -15,7 +15,6 @@ from steadyslip.core.written import in_written_units
 from steadyslip.experiments import Draws, Fit, LawComparison, MachineFit, Population, Prediction, Profile, Record
 from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
-from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.experiments.answers import comparison, kicks, prediction, profile, ranking
 from steadyslip.figures.experiments.corners import corner
 from steadyslip.figures.experiments.fits import fit, steps
@@ -32,6 +31,7 @@ from steadyslip.figures.maps import map_figure
 from steadyslip.figures.mode_chart import mode_chart
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
+from steadyslip.figures.paper_figure_7 import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.style import journal, save_with_footer
 from steadyslip.figures.tolerance_bars import tolerances
 from steadyslip.figures.two_rigs import two_rigs

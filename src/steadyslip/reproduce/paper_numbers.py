@@ -15,7 +15,12 @@ from functools import lru_cache
 import numpy as np
 
 from steadyslip import figures
-from steadyslip.figures import mass
+from steadyslip.figures.paper_figure_7 import (
+    dimensionless_critical_stiffness,
+    mass_at,
+    mass_of_equal_stiffness,
+    mass_of_no_stiffness,
+)
 from steadyslip.linear import boundary, critical_stiffness, eigenvalues
 from steadyslip.protocol import NormalStressStep, VelocityStep
 from steadyslip.reproduce.drawings import (
@@ -149,12 +154,10 @@ def paper_table() -> PaperTable:
     ]
     lock_up = next(edge.value for edge in boundary(paper_rig(), "contact.angle") if edge.kind == "lock-up")
     rows.append(PaperNumber("eq. 27", "lock-up angle", "deg", _LOCK_UP, lock_up / deg))
-    crossing = mass.mass_of_equal_stiffness(paper_rig(), figures.ANGLES)
+    crossing = mass_of_equal_stiffness(paper_rig(), figures.ANGLES)
     rows.append(PaperNumber("eq. 30", "m*_cr1", "1", _MASS_1, crossing, printed="0.0036"))
     rows += [
-        PaperNumber(
-            "eq. 31", _quantity("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg)
-        )
+        PaperNumber("eq. 31", _quantity("m*_cr2", angle), "1", value, mass_of_no_stiffness(paper_rig(), angle * deg))
         for angle, value in _MASS_2.items()
     ]
     return PaperTable((*rows, *_motion_numbers()))
@@ -166,12 +169,12 @@ def _quantity(symbol: str, angle: int, m_star: float | None = None) -> str:
 
 
 def _kappa(angle: float, m_star: float = 0.0) -> float:
-    return float(mass.dimensionless_critical_stiffness(paper_rig(), angle * deg, m_star))
+    return float(dimensionless_critical_stiffness(paper_rig(), angle * deg, m_star))
 
 
 def _frequency(angle: float, m_star: float = 0.0) -> float:
     """Dimensionless angular frequency β d_c/v0, from the eigenvalues at the critical stiffness (angle in degrees)."""
-    heavy = mass.mass_at(paper_rig(), angle * deg, m_star)
+    heavy = mass_at(paper_rig(), angle * deg, m_star)
     rig = paper_rig(angle * deg).with_values({"slider.mass": float(heavy)})
     found = eigenvalues(rig, {"slider.stiffness": critical_stiffness(rig)})
     return float(np.nanmax(found.imag)) * D_C / V0

@@ -17,7 +17,7 @@ from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.settings import RecordSettings
 from steadyslip.experiments.spec import TABLES as FIT_TABLES, spec_from_text
 from steadyslip.files.specifications.read import read_contents
-from steadyslip.files.specifications.write import settings_to_text
+from steadyslip.files.specifications.write import table_text
 from steadyslip.maps.plan.map_file import TABLE as MAP_TABLE
 from steadyslip.maps.plan.measures import Measure
 
@@ -78,7 +78,7 @@ def record_of(draw, family):
 @settings(max_examples=25, deadline=None)
 def test_every_table_comes_back_from_its_text(section, data):
     table = data.draw(record_of(section.family))
-    text = settings_to_text(section, table)
+    text = table_text(f"[{section.name}]", table, [], section.name, None)
     found = read_contents(RIG + text, "test", (), EVERY)
     faults = [p for p in found.problems if p.name != "map"]  # missing where it is not the one written
     assert faults == []

@@ -45,15 +45,3 @@ FORCED: Final = {
     "blow-up": "Highlight", "none": "Canvas", "unknown": "GrayText",
 }  # fmt: skip
 """System colours by role, where the reader's system sets all colours."""
-
-
-def lightness(colour: str) -> float:
-    """Lightness L* (0 to 100, CIE 1976) of a colour such as ``#D55E00``, that of its grey.
-
-    >>> lightness("#000000"), round(lightness("#ffffff"), 6), round(lightness("#777777"))
-    (0.0, 100.0, 50)
-    """
-    shares = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in shares]
-    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-    return 116 * luminance ** (1 / 3) - 16 if luminance > (6 / 29) ** 3 else luminance * (29 / 3) ** 3

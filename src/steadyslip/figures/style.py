@@ -127,16 +127,16 @@ def unmanaged_axes(width: float = 6.4, height: float = 4.8) -> Axes:
     return axes
 
 
-def save_figure(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -> list[Path]:
-    """Save the figure of `ax` as ``stem.png``, ...; return the paths. Equal figures give equal SVG bytes."""
-    paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
+def save_figure(ax: Axes, stem: Path) -> list[Path]:
+    """Save the figure of `ax` as ``stem.png`` and ``stem.svg``; return the paths. Equal figures give equal SVGs."""
     figure = ax.get_figure(root=True)
     if figure is None:
         raise ValueError("the Axes have been removed from their figure")
     with rc_context({"svg.hashsalt": "steadyslip", "svg.fonttype": "path"}):
-        for path, kind in zip(paths, kinds, strict=True):
-            figure.savefig(path, dpi=200, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
-    return paths
+        png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
+        figure.savefig(png, dpi=200, facecolor="white")
+        figure.savefig(svg, dpi=200, facecolor="white", metadata={"Date": None})
+    return [png, svg]
 
 
 @contextmanager

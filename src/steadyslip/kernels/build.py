@@ -153,6 +153,11 @@ def compiled(programs: Sequence[Program], layout: Layout) -> Code:
     return Code(layout, Routines(**cast(Any, found)), False)
 
 
+def code_of(programs: Sequence[Program], layout: Layout, plain: bool) -> Code:
+    """Programs as Python functions if `plain`, else as machine code."""
+    return (interpreted if plain else compiled)(programs, layout)
+
+
 # -- where machine code is kept
 
 

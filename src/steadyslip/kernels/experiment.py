@@ -19,7 +19,7 @@ import sympy as sp
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
-from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
+from steadyslip.kernels.build import Code, code_of, interpreting
 from steadyslip.kernels.formulation import Choice, Formulation
 from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
@@ -191,7 +191,7 @@ class ExperimentProgram:
     @cached_property
     def code(self) -> Code:
         """Machine code, or Python functions if `plain`."""
-        return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
+        return code_of(self.kernel.programs, self.kernel.layout, self.plain)
 
     @cached_property
     def through_table(self) -> Callable[..., object]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.questions import question
-from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
+from steadyslip.kernels.build import Code, code_of, interpreting
 from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.formulation import Choice
@@ -46,7 +46,7 @@ class Runner:
     @cached_property
     def code(self) -> Code:
         """Machine code, or Python functions if `plain`."""
-        return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
+        return code_of(self.kernel.programs, self.kernel.layout, self.plain)
 
     @cached_property
     def _constants(self) -> Any:

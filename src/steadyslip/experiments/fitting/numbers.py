@@ -76,8 +76,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
         """What follows from them, with errors: ``a - b``, critical stiffness ``k_c`` (Pa/m), ``k/k_c``, ``k/k_cal``."""
-        minimum = Minimum(self.space, self.coordinates, self.covariance, self.degrees)
-        return derived_estimates(minimum, [part.rig for part in self.comparison.parts], self.plan.calibrated)
+        return derived_estimates(self._minimum, [part.rig for part in self.comparison.parts], self.plan.calibrated)
 
     def derived_at(self, coordinates: Array) -> dict[str, Array]:
         """Values (m,) of what `derived` has at coordinates (m, p), by name; NaN where one does not exist."""
@@ -139,11 +138,11 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     def _equal_memories(self) -> list[Rival]:
         parts = zip(self.comparison.slices, self.noise, strict=True)
         independent = sum((where.stop - where.start) / max(noise.inflation, 1.0) for where, noise in parts)
-        return equal_memories(self.plan, self.ssq, self.values, self._deviations, independent)
+        return equal_memories(self.plan, self.ssq, self.values, self._minimum.deviations, independent)
 
     @property
-    def _deviations(self) -> Array:
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+    def _minimum(self) -> Minimum:
+        return Minimum(self.space, self.coordinates, self.covariance, self.degrees)
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:

@@ -15,7 +15,6 @@ from steadyslip.files.output import write_text
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
     TOLD_IN,
-    Section,
     has_choice,
     machine_sections,
     own_fields,
@@ -98,9 +97,11 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
             word = _law_name(record, section.name)
             first = [] if word == default else [f'{key} = "{word}"']
         own = rig.parameters() if isinstance(rig, Machine) and section.name == "drive" else {}
-        blocks.append(_table(f"[{section.name}]", record, first, section.name, area, own))
+        blocks.append(table_text(f"[{section.name}]", record, first, section.name, area, own))
     if protocol is not None:
-        blocks.append(_table(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, rig.protocol_area))
+        blocks.append(
+            table_text(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, rig.protocol_area)
+        )
     return "\n".join(blocks)
 
 
@@ -110,11 +111,6 @@ def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     return f"{TOLD_IN}{units}\n{rig_to_text(rig, protocol)}"
 
 
-def settings_to_text(section: Section, settings: FrozenRecord) -> str:
-    """A further table as TOML text."""
-    return _table(f"[{section.name}]", settings, [], section.name, None)
-
-
 def _law_name(record: FrozenRecord, where: str) -> str:
     if not record.name:
         kind = type(record).__name__
@@ -122,7 +118,7 @@ def _law_name(record: FrozenRecord, where: str) -> str:
     return record.name
 
 
-def _table(
+def table_text(
     header: str, record: FrozenRecord, first: list[str], path: str, area: float | None,
     own: Mapping[str, Address] | None = None,
 ) -> str:  # fmt: skip
@@ -143,16 +139,16 @@ def _table(
         elif role.keyed:
             below.append(_members(role.family, value, f"{path}.{key}"))
         elif role.by_name:
-            below += [_table(f"[{path}.{one.name}]", one, [], f"{path}.{one.name}", area) for one in value]
+            below += [table_text(f"[{path}.{one.name}]", one, [], f"{path}.{one.name}", area) for one in value]
         elif role.many:
             below += [_member(role.family, member, f"{path}.{key}", path, area) for member in value]
         elif role.inline:
             lines.append(f'{key} = "{_law_name(value, path)}"')
-            lines += _table("", value, [], path, area).splitlines()[1:]
+            lines += table_text("", value, [], path, area).splitlines()[1:]
         else:
             name = f"{path}.{key}"
             words = [f'law = "{_law_name(value, name)}"'] if has_choice(role.family) else []
-            below.append(_table(f"[{name}]", value, words, name, area))
+            below.append(table_text(f"[{name}]", value, words, name, area))
     return "\n".join(["\n".join(lines) + "\n", *below])
 
 
@@ -165,7 +161,7 @@ def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], pa
             key, default = selector(family)
             word = _law_name(one, f"{path}.{name}")
             first = [] if word == default else [f'{key} = "{word}"']
-        blocks.append(_table(f"[{path}.{name}]", one, first, f"{path}.{name}", None))
+        blocks.append(table_text(f"[{path}.{name}]", one, first, f"{path}.{name}", None))
     return "\n".join(blocks)
 
 
@@ -174,7 +170,7 @@ def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
     lines = [f"[{path}]"]
     for name, one in values.items():
         if isinstance(one, role.family):
-            inner = (line.partition("  #")[0] for line in _table("", one, [], path, None).splitlines()[1:])
+            inner = (line.partition("  #")[0] for line in table_text("", one, [], path, None).splitlines()[1:])
             text = f"{{ {', '.join(inner)} }}"
         else:
             text = f"[{', '.join(json.dumps(v) if isinstance(v, str) else repr(float(v)) for v in one)}]"
@@ -185,4 +181,4 @@ def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
 def _member(family: type[FrozenRecord], member: FrozenRecord, name: str, path: str, area: float | None) -> str:
     """TOML text of one table of a list."""
     first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
-    return _table(f"[[{name}]]", member, first, path, area)
+    return table_text(f"[[{name}]]", member, first, path, area)

@@ -18,7 +18,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.records import parameters, shape_of, with_values
 from steadyslip.core.symbols import inner_symbol
-from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
+from steadyslip.kernels.build import Code, code_of, interpreting
 from steadyslip.kernels.layout import Held, Routines, make_layout
 from steadyslip.kernels.methods import rodas5p
 from steadyslip.kernels.nodes import Program
@@ -224,7 +224,7 @@ class _Routine:
         for k, value in enumerate(Formulas(written, {})(loads)):
             program.store(len(variables) + k, value, "y")
         layout = make_layout(lanes=1, size=0, kept=0, constants=len(constants.all), inputs=0)
-        self.code = (interpreted if interpreting() else compiled)([program], layout)
+        self.code = code_of([program], layout, interpreting())
 
     def constants(self, contacts: Sequence[HeldContact]) -> Array:
         """Constants of the routine for contacts with such laws."""

@@ -1,4 +1,4 @@
-"""Joint fits: a record counts once, and records of unequal noise are told."""
+"""Joint fits: a record counts once, and weighs by its own noise."""
 
 from dataclasses import replace
 
@@ -23,16 +23,59 @@ def test_a_record_counts_once():
             ss.fit(ss.lab_rig(), [one, again])
 
 
-@pytest.mark.parametrize(("noise", "told"), [(lab.NOISE, False), (8 * lab.NOISE, True)])
-def test_unequal_noise_is_told_unless_weights_are_given(noise, told):
-    records = [stepped(1), stepped(2, noise)]
-    fit = ss.fit(ss.lab_rig(), records, starts=9)
-    assert ("and records weigh alike" in str(fit)) is told
-    if told:
-        weights = [np.full(400, 1.0), np.full(400, lab.NOISE / noise)]
-        weighted = ss.fit(ss.lab_rig(), records, starts=9, weights=weights)
-        assert "weigh alike" not in str(weighted)
-        assert weighted["a"].error < 0.6 * fit["a"].error
+@pytest.fixture(scope="module")
+def unequal():
+    return [stepped(1), stepped(2, 8 * lab.NOISE)]
+
+
+@pytest.fixture(scope="module")
+def weighed(unequal):
+    return ss.fit(ss.lab_rig(), unequal, starts=9)
+
+
+def test_records_weigh_by_their_own_noise(unequal, weighed):
+    """Errors are below those of each record alone; with weights by the true noise they are the same."""
+    level = [np.median(row) for row in weighed.plan.weights]
+    assert level[0] / level[1] == pytest.approx(8, rel=0.15)
+    alone = ss.fit(ss.lab_rig(), unequal[0], starts=9)
+    given = ss.fit(ss.lab_rig(), unequal, starts=9, weights=[np.full(400, 1.0), np.full(400, 1 / 8)])
+    for name in ("a", "b", "d_c", "stiffness"):
+        assert weighed[name].error < 1.02 * alone[name].error
+        assert weighed[name].error == pytest.approx(given[name].error, rel=0.03)
+    assert "records weigh by their noise: 1, 0.12" in str(weighed)
+
+
+def test_weights_are_saved(weighed, tmp_path):
+    weighed.save(tmp_path / "joint.nc")
+    again = ss.load_fit(tmp_path / "joint.nc")
+    assert again.errors == weighed.errors
+    assert str(again) == str(weighed)
+
+
+def test_equal_noise_weighs_alike():
+    assert ss.fit(ss.lab_rig(), [stepped(1), stepped(2)], starts=9).plan.weights is None
+
+
+def test_outliers_do_not_lessen_the_weight_of_a_record():
+    quiet, loud = stepped(1), stepped(2, 3 * lab.NOISE)
+    friction = quiet.friction.copy()
+    friction[np.random.default_rng(1).choice(400, 20, replace=False)] += 30 * lab.NOISE
+    fit = ss.fit(ss.lab_rig(), [replace(quiet, friction=friction), loud], starts=9, loss="huber")
+    level = [np.median(row) for row in fit.plan.weights]
+    assert level[0] / level[1] == pytest.approx(3, rel=0.25)
+
+
+def test_criteria_do_not_depend_on_the_unit_of_weights(unequal, weighed):
+    other = replace(weighed, plan=replace(weighed.plan, weights=tuple(7 * row for row in weighed.plan.weights)))
+    assert other.criteria(weighed.noise) == pytest.approx(weighed.criteria(weighed.noise), rel=1e-12)
+
+
+def test_a_quiet_end_off_the_model_is_told_beside_a_loud_record(unequal):
+    quiet, loud = unequal
+    friction = quiet.friction.copy()
+    friction[-6:] += 10 * lab.NOISE
+    fit = ss.fit(ss.lab_rig(), [replace(quiet, friction=friction), loud], starts=9)
+    assert "friction ends" in str(fit)
 
 
 @pytest.mark.parametrize(("calibrated", "said"), [

@@ -224,7 +224,11 @@ class StepTable(Displayed):
             if any(one.plan.beginnings for one in self.steps)
             else "",
             f"Outliers weighed less ({plan.loss} loss)." if plan.loss != "linear" else "",
-            "Samples were weighted." if plan.weights is not None else "",
+            ""
+            if plan.weights is None
+            else "Samples were weighted."
+            if any(np.ptp(row) > 0 for row in plan.weights)
+            else "Records weigh by their noise.",
         ]
         left = sum(one.whiteness.p < STRUCTURE for one in (*self.steps, self.joint))
         open_ones = any(not one.determined for line in self.lines for one in line.estimates().values())

@@ -19,19 +19,18 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import check_friction, make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import (
-    MAX_ITERATIONS,
     Progress,
     SearchResult,
     find_minimum,
-    first_computable,
+    minima_near,
     with_states_sorted,
 )
 from steadyslip.experiments.fitting.settings import STARTS
+from steadyslip.experiments.fitting.weighing import weighed_by_residuals, weighed_by_scatter
 from steadyslip.experiments.loading.loading import as_followed
 from steadyslip.experiments.measured.clipped import without_outliers
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.waves import WAVE
-from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -119,7 +118,8 @@ def fit(
     width : float, optional
         Residual at which that begins; 1.345 standard deviations of most residuals unless given.
     weights : array_like, optional
-        One over each sample's standard deviation, up to a factor; one array for each record.
+        One over each sample's standard deviation, up to a factor; one array for each record. Unless they (or a width)
+        are given, records of unequal noise weigh by their own, its correlation counted, which their residuals tell.
     calibrated : float or str, optional
         Stiffness of the machine from a calibration, Pa/m, to which the fitted one is compared (``k/k_cal``).
     errors : str, optional
@@ -184,14 +184,22 @@ def search_fit(
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
+    alike = plan if len(plan.records) > 1 and options.get("weights") is None and plan.width is None else None
+    plan = weighed_by_scatter(alike) if alike else plan
     if plan.loss == "linear" or plan.width is not None:
         found = find_minimum(plan, starts, allowed, progress)
         if plan.loss == "linear" and options.get("weights") is None:
             kept = _without_outliers(plan, found)
             if any(map(operator.is_not, kept, plan.records)):
                 return search_fit(rig, kept, free, **search, **options)
+        if alike:
+            plan, found = weighed_by_residuals(alike, plan, found, allowed)
     else:  # outliers shift the first fit and widen its scatter; the width shrinks as their weight does
-        found = find_minimum(replace(plan, loss="linear"), starts, allowed, progress)
+        simple = replace(plan, loss="linear")
+        found = find_minimum(simple, starts, allowed, progress)
+        if alike:
+            simple, found = weighed_by_residuals(alike, simple, found, allowed)
+            plan = replace(plan, weights=simple.weights)
         last = np.inf
         for _ in range(MAX_WIDTHS):
             plan = with_width(plan, _weighted_residuals(found))
@@ -265,13 +273,10 @@ def refit_from(result: Fit, others: Sequence[Fit]) -> Fit:
     begin = begin.reshape(-1, len(own))
     if not len(begin):
         return result
-    budget = Budget.of_fit(result.samples, len(space))
-    comparison = plan.comparison(Effort(budget=budget))
+    effort = Effort(budget=Budget.of_fit(result.samples, len(space)))
+    comparison = plan.comparison(effort)
     z = space.coordinates(np.clip(begin, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
-    ends = minimise(
-        lambda x, _: comparison.residuals(x), z, *result.bounds, most=MAX_ITERATIONS, stop=budget.part(np.inf)
-    )
-    ends = first_computable(comparison, ends.sorted())
+    ends = minima_near(comparison, z, result.bounds, effort)
     if not ends.ssq[0] < result.ssq * (1 - MIN_GAIN):
         return result
     found, _ = with_states_sorted(comparison, ends)

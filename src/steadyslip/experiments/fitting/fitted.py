@@ -210,9 +210,11 @@ class Fitted(ReadOnly):
         """AIC and BIC with the number of independent samples that a noise model of each record gives."""
         deviance = independent = 0.0
         for i, one in enumerate(noise):
-            r = self.part(self.residuals * self.comparison.weights, i)
+            weights = self.part(self.comparison.weights, i)
+            r = self.part(self.residuals, i) * weights
             worth = len(r) / max(one.inflation, 1.0)
-            deviance += worth * float(np.log(np.mean(r**2)))
+            unit = np.mean(np.log(weights[weights > 0]))  # in which weights are, which fits need not have in common
+            deviance += worth * float(np.log(np.mean(r**2)) - 2 * unit)
             independent += worth
         size = len(self.space)
         return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))

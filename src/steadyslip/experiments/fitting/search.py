@@ -403,6 +403,14 @@ def first_computable(comparison: Comparison, found: Minima) -> Minima:
     return found
 
 
+def minima_near(comparison: Comparison, begin: Array, bounds: tuple[Array, Array], effort: Effort) -> Minima:
+    """Minima on all samples from starting points (m, p), the best computable one first."""
+    ends = minimise(
+        lambda z, _: comparison.residuals(z), begin, *bounds, most=MAX_ITERATIONS, stop=effort.budget.part(np.inf)
+    )
+    return first_computable(comparison, ends.sorted())
+
+
 def with_states_sorted(comparison: Comparison, found: Minima) -> tuple[Array, float]:
     """Coordinates and sum of squares of the first minimum, its states numbered by rising slip distance.
 

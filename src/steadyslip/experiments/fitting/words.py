@@ -31,9 +31,9 @@ from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 
-MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of all, above which an end is off the model
+MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of the record's, above which an end is off the model
 END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
-UNEQUAL = 3.0  # ratio of noise at which two records that weigh alike have errors 1.7 times those with weights
+UNLIKE = 0.1  # relative difference of weights of records from which they are told; means of samples make less
 OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
 MAX_JUMP_ERROR = (
     0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
@@ -83,9 +83,19 @@ def _quality(fit: FitNumbers) -> list[str]:
     return [
         f"residuals       rms {fit.rms:.3g}, sum of squares {fit.ssq:.6g}, lag-1 autocorrelation {lag:.2g}",
         *quality(fit),
+        *_weights(fit),
         *textwrap.wrap(f"driven by       {drive_line(fit)}", WIDTH, subsequent_indent=" " * 16),
         in_words(residual_checks(fit)),
     ]
+
+
+def _weights(fit: FitNumbers) -> list[str]:
+    """Line on the weights of records, relative to the largest; none where they weigh alike."""
+    levels = np.array([np.mean(fit.part(fit.comparison.weights, i)) for i in range(len(fit.plan.records))])
+    if np.allclose(levels, levels[0], rtol=UNLIKE):
+        return []
+    shares = ", ".join(f"{x:.2g}" for x in levels / np.max(levels))
+    return textwrap.wrap(f"weights         records weigh by their noise: {shares}", WIDTH, subsequent_indent=" " * 16)
 
 
 def _left_out(fit: FitNumbers) -> list[str]:
@@ -107,28 +117,10 @@ def warnings(fit: FitNumbers) -> list[str]:
     follows = fit.at_bounds if best is not None and best.p >= STRUCTURE else ()
     first = _structure(fit) if best is not None else []
     found = [one for one in fitted_warnings(fit) if one not in follows]
-    found += _open_memory(fit) + _left_out(fit) + _unequal_noise(fit) + _ends_off_model(fit)
+    found += _open_memory(fit) + _left_out(fit) + _ends_off_model(fit)
     found += _vague_jumps(fit) + _possible_ramps(fit) + loading_warnings(fit)
     last = _structure(fit) if best is None else []
     return first + found + last + _drained_at_once(fit) + version_warnings(fit)
-
-
-def _unequal_noise(fit: FitNumbers) -> list[str]:
-    """Warning on records of unequal noise that weigh alike in a joint fit."""
-    if fit.plan.weights is not None or len(fit.plan.records) < 2:
-        return []
-    spreads = [
-        float(np.std(fit.residuals[where]) * np.sqrt(max(noise.inflation, 1.0)))
-        for where, noise in zip(fit.comparison.slices, fit.noise, strict=True)
-    ]
-    least, most = int(np.argmin(spreads)), int(np.argmax(spreads))
-    if spreads[most] <= UNEQUAL * spreads[least]:
-        return []
-    noisy, quiet = (fit.plan.records[k].source for k in (most, least))
-    return [
-        f"{noisy} has {spreads[most] / max(spreads[least], 1e-300):.0f} times the noise of {quiet}, its correlation "
-        f"counted, and records weigh alike: errors may be larger than those of {quiet} alone; give weights (in Python)"
-    ]
 
 
 def _ends_off_model(fit: FitNumbers) -> list[str]:
@@ -136,9 +128,9 @@ def _ends_off_model(fit: FitNumbers) -> list[str]:
     found = []
     for i, record in enumerate(fit.plan.records):
         own = fit.part(fit.residuals, i)
-        few = {END_SAMPLES, max(END_SAMPLES, len(own) // 200)}
+        few, usual = {END_SAMPLES, max(END_SAMPLES, len(own) // 200)}, float(np.sqrt(np.mean(own**2)))
         begins, ends = (max((float(np.mean(side[:n])) for n in few), key=abs) for side in (own, own[::-1]))
-        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > MAX_END_OFFSET * fit.rms:
+        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > MAX_END_OFFSET * usual:
             if fit.plan.beginnings:
                 begun, cure = "as the step before left it", "fit this part alone (between), its beginning"
             else:
@@ -147,7 +139,7 @@ def _ends_off_model(fit: FitNumbers) -> list[str]:
                 f"{record.source}: friction begins {begins:+.2g} beside the model, which begins {begun}; {cure} free "
                 "(initial = 'free'), or cut it off (between)"
             )
-        if abs(ends) > MAX_END_OFFSET * fit.rms:
+        if abs(ends) > MAX_END_OFFSET * usual:
             found.append(
                 f"{record.source}: friction ends {ends:+.2g} beside the model; where the loading changed at the very "
                 "end, cut that off (between)"

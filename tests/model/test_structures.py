@@ -1,5 +1,7 @@
 """Structures given by matrices or modes: theory 13's reed, limits that are known machines, and equations by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import io
@@ -19,6 +21,7 @@ from steadyslip.machine import (
     Surface,
     reduced,
 )
+from steadyslip.model.numeric.machine_point import machine_point
 from structures_at_random import ROCK, compared, random_structure, reed, reed_file, reed_matrices
 
 # --- theory 13 --------------------------------------------------------------------------------------
@@ -140,6 +143,61 @@ def test_a_free_structure_moves_with_what_pulls_it():
     chain = Machine(bodies=bodies, links=links, contacts={"c": Surface(body="p1", friction=ROCK, contact=load)},
                     drive=Pull(velocity=0.05))  # fmt: skip
     np.testing.assert_allclose(ss.eigenvalues(machine), ss.eigenvalues(chain), rtol=1e-11)
+
+
+def pulled_row(count):
+    """A row of masses on dashpots, pulled at its first end, and at its last pressed onto the surface."""
+    chance = np.random.default_rng(5)
+    stiffness = np.zeros((count + 2, count + 2))
+    for i in range(count - 1):
+        stiffness[i : i + 2, i : i + 2] += 2e6 * np.array([[1, -1], [-1, 1]])
+    stiffness[count:, count:] = 1e6 * np.array([[4, -1], [-1, 2]])
+    damping = 1e-5 * stiffness + np.diag(chance.uniform(0.0, 0.15, count + 2))
+    damping[count, 20:60] = 0.2  # what moves lifts the last one
+    data = StructureData(0.05 * np.eye(count + 2), damping, stiffness, 0 * stiffness)
+    points = {"p0": StructurePoint(x=1, force=3.0), "p1": StructurePoint(x=count, y=count + 1, press=200.0)}
+    points["p2"] = StructurePoint(x=50, y=count + 2, force=7.0, press=40.0)
+    contact = ss.laws.Compliant(normal_stiffness=4e6)
+    surface = Surface(body="s.p1", friction=ROCK, contact=contact)
+    pull = Spring(between=("drive", "s.p0"), stiffness=3e5, damping=2.0)
+    body = StructureBody(matrices=data, points=points)
+    return Machine(bodies={"s": body}, links={"pull": pull}, contacts={"c": surface}, drive=Pull(velocity=0.05))
+
+
+def pressed_structure(size):
+    """A random structure with two contacts, pressed by forces at both."""
+    machine, _ = random_structure(np.random.default_rng(3), size, 2)
+    forces = {f"bodies.s.points.{name}.press": 3e4 for name in ("p0", "p1")}
+    contacts = {name: replace(one, contact=replace(one.contact, steady_normal_stress=None))
+                for name, one in machine.contacts.items()}  # fmt: skip
+    return replace(machine, contacts=contacts).with_values(forces)
+
+
+@pytest.mark.parametrize("which", ["pulled", "pressed"])
+def test_what_nothing_touches_may_be_left_out(which):
+    """Along each parameter: steady sliding and equations of motion are those of the whole machine at each value."""
+    machine = pulled_row(100) if which == "pulled" else pressed_structure(110)
+    point, left = machine_point(machine), 0
+    for name, one in machine.parameters().items():
+        if not one.value:
+            continue
+        values = one.value * np.array([0.7, 1.0, 1.2])
+        machines = point.along(name, values)
+        left += machines.a.shape[-1] < len(point.pencil.a)
+        for i, value in enumerate(values):
+            whole = machine_point(machine.with_values({name: float(value)}))
+            np.testing.assert_allclose(machines.balance.sigma[i], whole.balance.sigma, rtol=1e-9)
+            pencil = machines.pencil(i)
+            for own, other in ((pencil.e, whole.pencil.e), (pencil.a, whole.pencil.a)):
+                np.testing.assert_allclose(own, other, rtol=1e-9, atol=1e-9 * np.max(np.abs(other[-1])))
+    assert left >= 8
+
+
+def test_a_moving_structure_has_edges_in_the_speed_of_the_drive():
+    machine = pulled_row(100)
+    (edge,) = ss.boundary(machine, "drive.velocity")
+    rates = ss.growth_rate(machine, {"drive.velocity": [edge.value * (1 - 1e-6), edge.value * (1 + 1e-6)]})
+    assert (rates[0] < 0) != (rates[1] < 0)
 
 
 def test_a_pressed_structure_is_the_planar_body():

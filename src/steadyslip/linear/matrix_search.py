@@ -122,10 +122,10 @@ class MatrixSearch:
             return machines.growing(sure)
         found = np.full(len(machines.posed), ILL_POSED)
         for i in np.flatnonzero(machines.balance.exists & machines.posed):
-            pencil = machines.pencil(int(i))
-            if pencil is not None and np.all(np.isfinite(pencil.a)):
-                more = self.turns.more_growing(pencil)
-                found[i] = pencil.growing(sure) if more is None else self.own.growing + more
+            if np.all(np.isfinite(machines.a[i])):
+                more = self.turns.more_growing(self.turns.change.core(machines.e[i], machines.a[i], machines.at))
+                whole = machines.pencil(int(i)) if more is None else None
+                found[i] = self.own.growing + (more or 0) if whole is None else whole.growing(sure)
         return found
 
     @cached_property

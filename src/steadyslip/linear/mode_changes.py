@@ -71,7 +71,7 @@ class Perturbation:
         if not np.all(machines.balance.exists):
             return complex(np.nan, np.nan)
         pencils = self.s * machines.e - machines.a
-        change = np.einsum("i,pij,j,p->", self.left, pencils, self.right, _STENCIL)
+        change = np.einsum("i,pij,j,p->", self.left[machines.at], pencils, self.right[machines.at], _STENCIL)
         return complex(-change / (_STEP * value * self.scale))
 
     def by_addition(self, row: Array, power: int) -> complex:

@@ -512,11 +512,11 @@ def _combined(*parts: tuple[Any, Mapping[str, Any]]) -> dict[str, Any]:
 def _structure_part(name: str, body: StructureBody, speeds: Mapping[str, Any]) -> StructurePart:
     """Matrices of a structure, and its rigid motion with the given speeds of its points."""
     data = body.data
-    moving = np.zeros(data.size)
+    motion, pace = np.zeros(data.size), 0
     if data.rigid_motions.shape[1] == 1:
         motion = data.rigid_motions[:, 0]
         points = [(float(body.rows(one)[0] @ motion), speeds[f"{name}.{one}"]) for one in body.point_names()]
         share, speed = max(points, key=lambda pair: abs(pair[0]))
-        moving = motion * (speed / share)
+        pace = speed / share
     places = tuple(coordinate(name, i) for i in range(data.size))
-    return StructurePart(name, places, data.mass, body.damping_matrix(), data.stiffness, body.forces(), moving)
+    return StructurePart(name, places, data.mass, body.damping_matrix(), data.stiffness, body.forces(), motion, pace)

@@ -147,8 +147,10 @@ class StructurePart:
     coordinates : tuple of str
         Names that rows use, one for every degree of freedom.
     mass, damping, stiffness : ndarray (n, n)
-    force, speeds : ndarray (n,)
-        Constant forces, and speeds in steady sliding.
+    force, motion : ndarray (n,)
+        Constant forces, and the motion as a rigid body in steady sliding.
+    pace
+        Its speed: degrees of freedom move at `motion` · `pace`.
     """
 
     name: str
@@ -157,7 +159,8 @@ class StructurePart:
     damping: Any
     stiffness: Any
     force: Any
-    speeds: Any
+    motion: Any
+    pace: Any
 
 
 @dataclass(frozen=True)

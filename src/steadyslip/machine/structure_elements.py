@@ -60,7 +60,11 @@ def _with_elements(own: Mechanism, part: StructurePart) -> Mechanism:
     coordinates = [
         DegreeOfFreedom(name, float(inertia), _plain(speed), _plain(force), inner=True)
         for name, inertia, speed, force in zip(
-            part.coordinates, basis.inertia, basis.inverse @ part.speeds, basis.vectors.T @ part.force, strict=True
+            part.coordinates,
+            basis.inertia,
+            (basis.inverse @ part.motion) * part.pace,
+            basis.vectors.T @ part.force,
+            strict=True,
         )
     ]
     elements = [replace(one, acts=written(one.acts), senses=written(one.senses)) for one in own.elements]

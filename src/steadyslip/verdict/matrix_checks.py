@@ -73,7 +73,7 @@ def _growing_by_turns(point: MachinePoint) -> int | None:
     if np.any(np.abs(roots.real) <= ON_THE_EDGE * np.abs(roots)):
         return None
     change = change_between(free, [point.pencil])
-    more = 0 if change is None else Turns(change).more_growing(point.pencil)
+    more = 0 if change is None else Turns(change).more_growing(change.core_of(point.pencil))
     return None if more is None else int(np.sum(roots.real > 0)) + more
 
 

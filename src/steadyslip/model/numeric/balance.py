@@ -29,6 +29,7 @@ class Balance:
     sigma, tau : ndarray (..., contacts)
         Stresses (Pa); NaN without steady sliding.
     displacement : ndarray (..., n)
+        Of the coordinates that are not left out.
     integral : ndarray (...)
     gain : ndarray (...)
         Largest factor by which friction raises itself through the normal stresses; >= 1 is lock-up.
@@ -97,7 +98,7 @@ class _Newton:
         """Matrix of the balances and of the controller's integral, without contacts."""
         n, own = self.size, self.machine
         found = np.zeros((*own.several, n + self.more, n + self.more))
-        found[..., :n, :n] = own.stiffness
+        found[..., :n, :n] = own.stiffness - own.followed
         if self.more:
             found[..., :n, n], found[..., n, :n] = own.integral_acts, own.integral_senses
         return found

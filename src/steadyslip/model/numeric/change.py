@@ -49,11 +49,15 @@ class LowRankChange:
         """True if the directions are perhaps more than were found, as for what damps or turns a whole structure."""
         return bool(self.into.shape[1] > _SKETCH)
 
-    def core(self, other: StatePencil) -> tuple[Array, Array]:
+    def core(self, e: Array, a: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Be and Ba (k, k) of another pencil whose rows and columns at places `at` (K,) are `e` and `a` (K, K)."""
+        both = np.ix_(at, at)
+        before, after = self.rows[at].T, self.columns[at]
+        return before @ (e - self.own.e[both]) @ after, before @ (a - self.own.a[both]) @ after
+
+    def core_of(self, other: StatePencil) -> tuple[Array, Array]:
         """Be and Ba (k, k) of another pencil."""
-        return tuple(
-            self.rows.T @ (new - old) @ self.columns for new, old in ((other.e, self.own.e), (other.a, self.own.a))
-        )
+        return self.core(other.e, other.a, np.arange(len(other.a)))
 
     def response(self, omega: Array) -> ComplexArray:
         """Vᵀ (iω E − A)⁻¹ U at frequencies (p,), (p, k, k)."""
@@ -115,21 +119,22 @@ class Turns:
         self.omega = frequencies(change.own)
         self.response = change.response(self.omega)
 
-    def more_growing(self, other: StatePencil) -> int | None:
-        """Number of growing roots of another pencil minus those of the own; None if a root is too near the axis."""
-        core = self.change.core(other)
-        omega, response = self.omega, self.response
-        ratio = self.change.ratio(omega, response, core)
+    def more_growing(self, core: tuple[Array, Array]) -> int | None:
+        """Number of growing roots after a change (Be, Ba) minus those before; None if a root is too near the axis.
+
+        Frequencies that it needs besides are kept: the next one along a parameter mostly needs the same.
+        """
+        ratio = self.change.ratio(self.omega, self.response, core)
         for _ in range(_ROUNDS):
             turn = np.angle(ratio[1:] * np.conj(ratio[:-1]))
             steep = np.flatnonzero(~(np.abs(turn) <= _TURN))
             if not steep.size:
                 whole = (np.sum(turn) + self._ends(core, ratio)) / np.pi
                 return -round(float(whole)) if abs(whole - round(float(whole))) < 0.25 else None
-            middle = np.sqrt(omega[steep] * omega[steep + 1])
+            middle = np.sqrt(self.omega[steep] * self.omega[steep + 1])
             fresh = self.change.response(middle)
-            omega = np.insert(omega, steep + 1, middle)
-            response = np.insert(response, steep + 1, fresh, axis=0)
+            self.omega = np.insert(self.omega, steep + 1, middle)
+            self.response = np.insert(self.response, steep + 1, fresh, axis=0)
             ratio = np.insert(ratio, steep + 1, self.change.ratio(middle, fresh, core))
         return None
 
@@ -142,18 +147,13 @@ class Turns:
 
         return to_axis(complex(ratio[0])) - to_axis(complex(ratio[-1]))
 
-    def nearest(self, other: StatePencil) -> float:
-        """Frequency (rad/s) at which Δ comes nearest to 0, where a root crosses the axis."""
-        ratio = self.change.ratio(self.omega, self.response, self.change.core(other))
-        return float(self.omega[int(np.argmin(np.abs(ratio)))])
-
 
 def rank_one(change: LowRankChange, steps: list[float], others: list[StatePencil]) -> tuple[Array, Array] | None:
     """Be and Ba for a unit of the parameter if all changes are proportional to it and of rank one; None otherwise.
 
     `steps` are the changes of the parameter, from its own value, that lead to `others`.
     """
-    cores = [[own / step for own in change.core(other)] for step, other in zip(steps, others, strict=True)]
+    cores = [[own / step for own in change.core_of(other)] for step, other in zip(steps, others, strict=True)]
     units = []
     for several in zip(*cores, strict=True):
         largest = max(float(np.max(np.abs(one))) for one in several)

@@ -8,12 +8,13 @@ with a leading axis: shapes (...) are () for one machine, (p,) for p values of a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
@@ -23,6 +24,7 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
 from steadyslip.model.numeric.contact_laws import ContactFunctions, functions_of, numbers_of
+from steadyslip.model.numeric.left_out import LeftOut, left_out
 
 _VARIED = inner_symbol("n_varied", real=True)
 NO_PULL = (
@@ -81,6 +83,10 @@ class MachineMatrices:
     integral_acts, integral_senses : ndarray (..., n)
         Integral action of a controller: force −acts · I with I' = senses · q; zero without one.
     sites : tuple of Site
+    kept : ndarray of int (n,) or None
+        Places of these coordinates among all of the machine, if others are left out.
+    followed : ndarray (n, n) or ()
+        Stiffness that those left out take away in steady sliding.
     """
 
     names: tuple[str, ...]
@@ -92,6 +98,8 @@ class MachineMatrices:
     integral_acts: Array
     integral_senses: Array
     sites: tuple[Site, ...]
+    kept: NDArray[np.int64] | None = None
+    followed: Array = field(default_factory=lambda: np.zeros(()))
 
     @property
     def integrates(self) -> bool:
@@ -122,21 +130,25 @@ def assemble(machine: Machine) -> MachineMatrices:
 
 
 class VariedMachine:
-    """A machine as a function of one parameter."""
+    """A machine as a function of one parameter, with the coordinates that it touches alone where these are few."""
 
     def __init__(self, machine: Machine, name: str) -> None:
         kind, _, rest = name.partition(".")
         self.machine, self.name = machine, name
+        self.own = machine.mechanism()
         self.of_structure = kind == "bodies" and machine.bodies[rest.partition(".")[0]].is_structure
         if not self.of_structure:  # whose methods take numbers only
             self.mechanism = with_values(machine, {name: _VARIED}).mechanism()
+            self.left = left_out([self.own])
 
-    def matrices(self, values: Array) -> MachineMatrices:
-        """Matrices of the machines with values (p,), SI, which are not checked."""
+    def matrices(self, values: Array, whole: bool = False) -> MachineMatrices:
+        """Matrices of the machines with values (p,), SI, which are not checked; if `whole`, of all coordinates."""
         if self.of_structure:
-            machines = (with_values(self.machine, {self.name: float(one)}) for one in values)
-            return _stacked([assemble(one) for one in machines])
-        return _Assembler(self.mechanism, values).matrices()
+            mechanisms = [with_values(self.machine, {self.name: float(one)}).mechanism() for one in values]
+            left = None if whole else left_out([self.own, *mechanisms])
+            nothing = np.zeros(())
+            return _stacked([_Assembler(one, nothing, left).matrices() for one in mechanisms])
+        return _Assembler(self.mechanism, values, None if whole else self.left).matrices()
 
 
 def _stacked(several: list[MachineMatrices]) -> MachineMatrices:
@@ -161,8 +173,9 @@ def _function_of(given: sp.Expr) -> ArrayFunction:
 class _Assembler:
     """Builder of one `MachineMatrices`; numbers of the mechanism may contain the varied parameter."""
 
-    def __init__(self, mechanism: Mechanism, values: Array) -> None:
-        self.mechanism, self.values = mechanism, values
+    def __init__(self, mechanism: Mechanism, values: Array, left: LeftOut | None = None) -> None:
+        mechanism = mechanism if left is None else left.of(mechanism)
+        self.mechanism, self.values, self.left = mechanism, values, left
         self.known: dict[sp.Expr, Array] = {}
         parts = mechanism.structures
         self.names = tuple(one.name for one in mechanism.coordinates) + tuple(n for p in parts for n in p.coordinates)
@@ -173,7 +186,8 @@ class _Assembler:
             self.speeds[..., i] = self.number(one.speed)
         start = len(mechanism.coordinates)
         for part in parts:
-            self.speeds[..., start : start + len(part.coordinates)] = part.speeds
+            pace = np.asarray(self.number(part.pace))[..., None]
+            self.speeds[..., start : start + len(part.coordinates)] = part.motion * pace
             start += len(part.coordinates)
 
     def number(self, given: Any) -> Any:
@@ -200,7 +214,7 @@ class _Assembler:
         return self.number(shares.get(LOAD_POINT, 0)) * self.velocity
 
     def matrices(self) -> MachineMatrices:
-        own, size = self.mechanism, len(self.names)
+        own, size, left = self.mechanism, len(self.names), self.left
         mass, damping, stiffness = self.zeros(size, size), self.zeros(size, size), self.zeros(size, size)
         force = self.zeros(size)
         for i, body in enumerate(own.coordinates):
@@ -221,8 +235,14 @@ class _Assembler:
                 raise NotAvailable(_DELAYED)
             acts = self.row(own.integral.acts) * np.asarray(self.number(own.integral.gain))[..., None]
             senses = self.row(own.integral.senses)
-        sites = tuple(map(self._site, own.contacts))
-        return MachineMatrices(self.names, mass, damping, stiffness, force, self.speeds, acts, senses, sites)
+        sites, followed = tuple(map(self._site, own.contacts)), np.zeros(())
+        if left is not None:
+            paces = np.stack([np.broadcast_to(self.number(one.pace), self.values.shape) for one in own.structures], -1)
+            force, followed = force - left.force - paces @ left.force_by_pace.T, left.stiffness
+        return MachineMatrices(
+            self.names, mass, damping, stiffness, force, self.speeds, acts, senses, sites,
+            None if left is None else left.kept, followed,
+        )  # fmt: skip
 
     def _add_element(self, one: Element, stiffness: Array, damping: Array, force: Array) -> None:
         spring, dashpot = self.number(one.stiffness), self.number(one.damping)

@@ -33,9 +33,14 @@ class MachinesAlong:
         Steady sliding.
     size : int
         Number of coordinates.
-    e, a : ndarray (p, N, N)
+    e, a : ndarray (p, K, K)
+        Rows and columns of the pencils that the parameter may change.
     posed : ndarray of bool (p,)
         As of `StatePencil`.
+    own : StatePencil or None
+        Pencil of the machine itself, if these are not all.
+    at : ndarray of int (K,)
+        Their places in it.
     """
 
     balance: Balance
@@ -43,14 +48,25 @@ class MachinesAlong:
     e: Array
     a: Array
     posed: NDArray[np.bool_]
+    own: StatePencil | None
+    at: NDArray[np.int64]
 
     def pencil(self, i: int) -> StatePencil | None:
         """Pencil of one of them; None without steady sliding."""
-        return StatePencil(self.e[i], self.a[i], self.size, bool(self.posed[i])) if self.balance.exists[i] else None
+        return self._pencil(i) if self.balance.exists[i] else None
+
+    def _pencil(self, i: int) -> StatePencil:
+        if self.own is None:
+            return StatePencil(self.e[i], self.a[i], self.size, bool(self.posed[i]))
+        e, a, both = self.own.e.copy(), self.own.a.copy(), np.ix_(self.at, self.at)
+        e[both], a[both] = self.e[i], self.a[i]
+        return StatePencil(e, a, self.size, bool(self.posed[i]))
 
     def growing(self, sure: bool) -> NDArray[np.int64]:
         """How many eigenvalues grow, (p,); `ILL_POSED`, or if `sure` `UNDECIDED` where rounding hides it."""
-        return growing_roots(self.e, self.a, self.size, self.posed, sure)
+        if self.own is None:
+            return growing_roots(self.e, self.a, self.size, self.posed, sure)
+        return np.array([self._pencil(i).growing(sure) for i in range(len(self.posed))])
 
 
 class MachinePoint(Keeper):
@@ -81,18 +97,24 @@ class MachinePoint(Keeper):
 
     def along(self, name: str, values: Array) -> MachinesAlong:
         """The machine with several values (p,), SI, of a parameter, which are not checked."""
-        matrices = self._matrices_along(name, values)
+        whole = not self.balance.exists  # without a pencil of its own
+        matrices = self._matrices_along(name, values, whole)
         found = balances(matrices)
-        return MachinesAlong(found, len(matrices.names), *pencils(matrices, found))
+        e, a, posed = pencils(matrices, found)
+        size = len(self.matrices.names)
+        if matrices.kept is None:
+            return MachinesAlong(found, size, e, a, posed, None, np.arange(e.shape[-1]))
+        at = np.concatenate([matrices.kept, size + matrices.kept, np.arange(2 * size, len(self.pencil.a))])
+        return MachinesAlong(found, size, e, a, posed, self.pencil, at)
 
     def balances_along(self, name: str, values: Array) -> Balance:
         """Steady sliding with several values (p,), SI, of a parameter."""
         return balances(self._matrices_along(name, values))
 
-    def _matrices_along(self, name: str, values: Array) -> MachineMatrices:
+    def _matrices_along(self, name: str, values: Array, whole: bool = False) -> MachineMatrices:
         if name not in self._varied:
             self._varied[name] = VariedMachine(self.machine, name)
-        return self._varied[name].matrices(np.asarray(values, dtype=float))
+        return self._varied[name].matrices(np.asarray(values, dtype=float), whole)
 
     @property
     def growing(self) -> int:

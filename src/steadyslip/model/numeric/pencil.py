@@ -56,8 +56,15 @@ class StatePencil:
     @cached_property
     def inertial(self) -> bool:
         """True if E can be inverted: every coordinate has inertia."""
+        from scipy.linalg import lapack  # slow to import
+
         rows, columns = self.scale
-        sizes = np.linalg.svd(self.e * rows[:, None] * columns, compute_uv=False)
+        even = self.e * rows[:, None] * columns
+        factors, _, _ = lapack.dgetrf(even)
+        estimate, _ = lapack.dgecon(factors, np.max(np.sum(np.abs(even), axis=0)))
+        if estimate > _MASSLESS * len(even):  # in sums of entries, up to n times the singular values, which take longer
+            return True
+        sizes = np.linalg.svd(even, compute_uv=False)
         return bool(sizes[-1] > _MASSLESS * sizes[0])
 
     @cached_property

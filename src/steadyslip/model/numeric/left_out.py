@@ -1,0 +1,120 @@
+"""Coordinates of structures that no link, contact or controller touches, left out of machines along a parameter.
+
+A parameter of a link, contact or drive changes entries of the equations among touched coordinates alone. The others
+follow in steady sliding, K_ii q_i = f_i − K_ik q_k, and are added to the balances of those that are kept (k); the rows
+and columns of the kept ones in the equations of motion are what they are in the whole machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.core.arrays import Array
+from steadyslip.machine.mechanism import Mechanism, StructurePart
+
+MANY = 64  # coordinates from which leaving them out costs less than carrying them along
+_REGULAR = 1e-10  # reciprocal condition of K_ii, made even, above which the rounding of what follows does not matter
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Which coordinates of the structures are kept, and what the others add to their steady sliding.
+
+    Attributes
+    ----------
+    parts : tuple of StructurePart
+        Structures of the kept coordinates alone.
+    kept : ndarray of int (k,)
+        Their places among all coordinates of the machine; bodies come first.
+    stiffness : ndarray (k, k)
+        K_ki K_ii⁻¹ K_ik, to be taken from the stiffness.
+    force, force_by_pace : ndarray (k,), (k, structures)
+        To be taken from the forces, and for every unit of the pace of a structure.
+    """
+
+    parts: tuple[StructurePart, ...]
+    kept: NDArray[np.int64]
+    stiffness: Array
+    force: Array
+    force_by_pace: Array
+
+    def of(self, mechanism: Mechanism) -> Mechanism:
+        """The mechanism without the others; its structures have the paces that they have there."""
+        pairs = zip(self.parts, mechanism.structures, strict=True)
+        return replace(mechanism, structures=tuple(replace(part, pace=one.pace) for part, one in pairs))
+
+
+def left_out(mechanisms: Iterable[Mechanism]) -> LeftOut | None:
+    """What can be left out of mechanisms with the same structures; None if that is little, or follows nothing."""
+    from scipy.linalg import block_diag  # slow to import
+
+    several = list(mechanisms)
+    first, touched = several[0], set().union(*map(_touched, several))
+    if any(not _alike(one.structures, first.structures) for one in several[1:]):
+        return None
+    count = sum(len(part.coordinates) for part in first.structures)
+    if count - len(touched) < MANY:
+        return None
+    at = len(first.coordinates)
+    kept, parts = list(range(at)), []
+    stiffness, force, by_pace = [np.zeros((at, at))], [np.zeros(at)], [np.zeros((at, 0))]
+    for part in first.structures:
+        outer = np.array([name in touched for name in part.coordinates])
+        followed = _followed(part, outer)
+        if followed is None:
+            return None
+        moved = part.damping[np.ix_(outer, ~outer)] @ part.motion[~outer]
+        back = part.stiffness[np.ix_(outer, ~outer)] @ followed
+        stiffness.append(back[:, :-2])
+        force.append(back[:, -2])
+        by_pace.append((back[:, -1] + moved)[:, None])
+        parts.append(_among(part, outer))
+        kept += (at + np.flatnonzero(outer)).tolist()
+        at += len(outer)
+    return LeftOut(tuple(parts), np.array(kept), block_diag(*stiffness), np.concatenate(force), block_diag(*by_pace))
+
+
+def _touched(mechanism: Mechanism) -> set[str]:
+    """Coordinates in rows of links, contacts and controllers."""
+    rows = [row for one in mechanism.elements for row in (one.acts, one.senses)]
+    rows += [row for one in mechanism.contacts for row in (one.slip, one.separation)]
+    if mechanism.integral is not None:
+        rows += [mechanism.integral.acts, mechanism.integral.senses]
+    return {name for row in rows for name in row}
+
+
+def _alike(some: tuple[StructurePart, ...], others: tuple[StructurePart, ...]) -> bool:
+    pairs = zip(some, others, strict=True)
+    names = ("mass", "damping", "stiffness", "force", "motion")
+    return all(np.array_equal(getattr(one, name), getattr(two, name)) for one, two in pairs for name in names)
+
+
+def _followed(part: StructurePart, outer: NDArray[np.bool_]) -> Array | None:
+    """Solutions of K_ii X = (K_ik, f_i, −C_i: motion), (i, k + 2); None if the coordinates left out are free."""
+    from scipy.linalg import solve  # slow to import
+
+    inner = ~outer
+    matrix = part.stiffness[np.ix_(inner, inner)]
+    dragged = -part.damping[inner] @ part.motion
+    known = np.column_stack([part.stiffness[np.ix_(inner, outer)], part.force[inner], dragged])
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    if not np.all(size > 0):
+        return None
+    even = matrix / size[:, None] / size
+    if not np.linalg.cond(even) < 1 / _REGULAR:
+        return None
+    return np.asarray(solve(even, known / size[:, None])) / size[:, None]
+
+
+def _among(part: StructurePart, chosen: NDArray[np.bool_]) -> StructurePart:
+    """The structure with some of its coordinates."""
+    both = np.ix_(chosen, chosen)
+    return replace(
+        part, coordinates=tuple(name for name, one in zip(part.coordinates, chosen, strict=True) if one),
+        mass=part.mass[both], damping=part.damping[both], stiffness=part.stiffness[both],
+        force=part.force[chosen], motion=part.motion[chosen],
+    )  # fmt: skip

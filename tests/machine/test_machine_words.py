@@ -10,12 +10,13 @@ import pytest
 import steadyslip as ss
 from command import run
 from machines import brake, rate_state, two_mass
+from steadyslip.cli import cycle_files as commands
 from steadyslip.core.errors import ParameterError
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.written import display_units
 from steadyslip.model.point import operating_point
 from steadyslip.motion.status import remedy
-from steadyslip.nonlinear import cycle_commands as commands
+from steadyslip.nonlinear.kicks import several_kicks
 from steadyslip.nonlinear.kicks.kicks import OF_MACHINES
 from steadyslip.nonlinear.kicks.threshold import Threshold
 from steadyslip.verdict.words import threshold_words
@@ -50,13 +51,13 @@ def test_every_kick_of_a_machine_can_be_told(kick, size):
 
 
 def test_all_kicks_are_checked_before_the_first_is_computed(monkeypatch):
-    monkeypatch.setattr(commands, "threshold", lambda *_, **__: pytest.fail("computed"))
+    monkeypatch.setattr(several_kicks, "threshold", lambda *_, **__: pytest.fail("computed"))
     with pytest.raises(ss.NotAvailable, match="infinite force"):
         ss.analyze(two_mass(kp=4.0), kick=["velocity", "displacement"])
     with pytest.raises(ParameterError, match="unknown body 'tble'"):
         ss.analyze(two_mass(kp=4.0), kick=["velocity", "force at tble"])
     with pytest.raises(ParameterError, match="unknown kick 'push'"):
-        commands.thresholds_shown(two_mass(kp=4.0), ("velocity", "push"))
+        several_kicks.thresholds_shown(two_mass(kp=4.0), ("velocity", "push"))
 
 
 def test_cycles_follow_the_drive_or_link_nearest_to_an_edge(monkeypatch, tmp_path):

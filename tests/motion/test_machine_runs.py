@@ -12,7 +12,7 @@ import steadyslip as ss
 from command import run as cli
 from machines import same_block
 from moving_machines import TIMES, two_tables
-from steadyslip.motion import commands
+from steadyslip.cli import run_files as commands
 
 ROOT = Path(__file__).parents[2]
 

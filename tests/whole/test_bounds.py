@@ -305,14 +305,15 @@ def test_an_interrupted_run_is_what_there_is(times, tmp_path):
 
 
 def test_interrupted_thresholds_keep_those_found(monkeypatch, tmp_path):
-    from steadyslip.nonlinear import cycle_commands as commands
+    from steadyslip.cli import cycle_files as commands
+    from steadyslip.nonlinear.kicks import several_kicks
 
     def threshold(rig, kick, **options):
         if kick == "displacement":
             raise KeyboardInterrupt
         return SimpleNamespace(kick=kick, interrupted=False)
 
-    monkeypatch.setattr(commands, "threshold", threshold)
+    monkeypatch.setattr(several_kicks, "threshold", threshold)
     path = tmp_path / "rig.toml"
     path.write_text(RIG)
     found = commands.thresholds_of_file(path, (), ("velocity", "displacement", "impulse"), False, "before")

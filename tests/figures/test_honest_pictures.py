@@ -78,11 +78,7 @@ def test_a_dollar_in_a_name_is_a_dollar(tmp_path):
 
 
 def lightness(colour: str) -> float:
-    """Lightness L* (0 to 100, CIE 1976) of a colour such as ``#D55E00``, that of its grey.
-
-    >>> lightness("#000000"), round(lightness("#ffffff"), 6), round(lightness("#777777"))
-    (0.0, 100.0, 50)
-    """
+    """Lightness L* (0 to 100, CIE 1976) of a colour such as ``#D55E00``, that of its grey."""
     shares = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in shares]
     luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -100,7 +100,7 @@ def check_file(path: str | PathLike[str], most: int) -> int:
 
 
 def inside(root: Path, key: str) -> Path:
-    """Path of the file below a folder for a `key`, names joined by ``/``; it need not exist.
+    """Path below the folder `root` for a `key`, names joined by ``/`` as in ``rate/c/0/1``; it need not exist.
 
     Raises
     ------

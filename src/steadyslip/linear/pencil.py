@@ -126,10 +126,14 @@ def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexAr
 def _checked(
     point: OperatingPoint, matrix: _Matrix, values: ComplexArray, errors: Array, refined: bool
 ) -> CheckedSpectrum:
+    """Spectrum with its completeness: as many eigenvalues grow as are counted by an independent route.
+
+    Under delays that is the argument principle; else none may be missing, and those that grow are counted in the list.
+    """
     surely, perhaps = (int(np.sum(values.real > edge * errors)) for edge in (1, -1))
     if point.model.delays:
         growing = _count(point)
-        some = len(values) if growing > len(values) else growing  # of many that grow, not all are in the list
+        some = len(values) if growing > len(values) else growing  # the list ends before all that grow are in it
         return CheckedSpectrum(values, errors, growing, growing >= 0 and surely <= some <= perhaps, refined)
     complete = refined or matrix.has_all(values)
     return CheckedSpectrum(values, errors, int(np.sum(values.real > 0)) if complete else -1, complete, refined)

@@ -161,6 +161,6 @@ def control_for(control: str, turns: bool) -> str:
 
 
 def wrong_control(control: str, body: str, turns: bool) -> Problem:
-    """Problem of a drive of the other kind of motion than the body on which it acts."""
+    """Problem to report if a drive for rotation acts on a body that slides, or the reverse; names the right one."""
     does = "turns" if turns else "slides"
     return Problem("drive.control", f"got {control!r}, but {body!r} {does}; write {control_for(control, turns)!r}")

@@ -14,11 +14,12 @@ from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 
 HARMONICS = 4.0
-"""Multiple of the fastest vibration up to which late signals are exact: slips are sharper than swings."""
+"""Delayed signals are accurate up to this multiple of the rig's fastest vibration: in a slip event velocity changes
+faster than in a vibration. Each motion is checked by `finer_order`."""
 LATE_ACCURACY = 1e-6
-"""Error of the late signal at that frequency, relative to the signal."""
-_MASSLESS = 1
-"""Least index in `ORDERS` without mass, where slips may be as sharp as they please."""
+"""Error allowed in the delayed signal at that frequency, relative to the signal."""
+_LEAST_WITHOUT_MASS = 1
+"""Least index in `ORDERS` for rigs without mass, in which nothing limits how fast velocity changes in a slip event."""
 
 
 def order_for(point: OperatingPoint) -> int:
@@ -28,7 +29,7 @@ def order_for(point: OperatingPoint) -> int:
     squares, delays = found[: -len(point.model.delays)], found[-len(point.model.delays) :]
     fastest, longest = (max((float(np.nanmax(one)) for one in part), default=0.0) for part in (squares, delays))
     turn = HARMONICS * np.sqrt(fastest) * longest
-    least = 0 if point.model.inertial else _MASSLESS
+    least = 0 if point.model.inertial else _LEAST_WITHOUT_MASS
     fit = [i for i, order in enumerate(ORDERS) if pade_error(order, turn) <= LATE_ACCURACY]
     return ORDERS[max(min([*fit, len(ORDERS) - 2]), least)]
 

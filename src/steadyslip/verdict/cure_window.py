@@ -89,7 +89,7 @@ class Window(Displayed):
     def written(self, value: float, beside: float | None = None) -> str:
         """Format a value in the unit of the rig's own, with digits that tell it from that, or from one `beside` it."""
         if 0 == self.limits[0] < value < LEAST * self.limits[1]:
-            return "anything above 0"  # the edge is zero itself, as of what damps an undamped machine
+            return "anything above 0"  # the edge is 0 itself, as for the damping of a machine that nothing damps yet
         factor, unit = self.told or (1.0, self.unit)
         with of_load(self.load):
             digits = digits_apart(value, self.value if beside is None else beside)

@@ -324,7 +324,10 @@ def _ranges(judged: Sequence[_Outcomes]) -> dict[str, tuple[float, float]]:
 def _otherwise(
     spreads: Spreads, corners: Mapping[str, Array], varied: Mapping[str, Array], every: _Outcomes
 ) -> dict[str, float]:
-    """A rig within the ranges that is not judged as all those drawn: a corner, or near the least decided rig."""
+    """Values of a rig within the ranges whose verdict differs from that of all rigs drawn; empty if none is found.
+
+    Corners of the ranges are tried first, then values around the drawn rig, or corner, that is closest to the edge.
+    """
     sign = 1.0 if every.stable[0] else -1.0  # a growth rate of the other sign is sought
 
     def judged(rigs: Mapping[str, Array]) -> tuple[Array, Array]:

@@ -24,10 +24,10 @@ F = TypeVar("F", bound=Fitted)
 
 
 def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Array]:
-    """Changes (n,) of the weighted model by one standard deviation of each thing uncertain in the commanded loading.
+    """Changes (n,) of the weighted model as an uncertain number of the commanded loading moves by its standard error.
 
-    These are levels of velocity and normal stress, the course of a load point, its servo, and known beginnings; none
-    where the loading is not found in the records, or the model cannot follow it.
+    One array for each of them: levels of normal stress, the measured motion of the load point, settings of its
+    servo, and states at the beginning that are known with an error. None if the loading is not found in the records.
     """
     if not plan.follows:
         return

@@ -347,7 +347,7 @@ def seconds(name: str, value: Any) -> float:
 
 @question
 def transient_rows(record: Record, count: int) -> Array:
-    """Rows to keep of a record: as many after every change as before the next, evenly in the logarithm of time."""
+    """Indices of about `count` rows to keep: dense just after each change of the loading, then ever sparser."""
     cumulated = np.cumsum(_samples_wanted(record, count))
     last = len(record) - 1
     chosen = np.searchsorted(cumulated, np.arange(0.5, cumulated[-1], 1.0))
@@ -355,7 +355,7 @@ def transient_rows(record: Record, count: int) -> Array:
 
 
 def bin_starts(record: Record, count: int) -> Array:
-    """First rows of the ranges whose means are the samples of a decimated record; no range crosses a change."""
+    """Index of the first row of each group that is averaged to one sample; no group spans a change of the loading."""
     cumulated = np.cumsum(_samples_wanted(record, count))
     fresh = np.flatnonzero(np.diff(np.floor(cumulated - 1e-9), prepend=-1.0))
     moments = [m for step in record.steps for m in (step.time, step.time + step.duration)]
@@ -364,7 +364,7 @@ def bin_starts(record: Record, count: int) -> Array:
 
 
 def binned(record: Record, starts: Array) -> Record:
-    """Record of means over ranges of samples that begin at given rows."""
+    """Record whose samples are the means of groups of rows; `starts` has the first row of each group."""
     counts = np.diff(starts, append=len(record))
     weights = np.ones(len(record)) if record.worth is None else record.worth
     total = np.add.reduceat(weights, starts)
@@ -383,7 +383,7 @@ def binned(record: Record, starts: Array) -> Record:
 
 
 def _samples_wanted(record: Record, count: int) -> Array:
-    """Samples wanted per row (at most one), for `count` in all: dense after every change, evenly in ln(time)."""
+    """Number of samples, at most 1, that each row is worth, `count` in all: per second as 1/(time since a change)."""
     time, n = record.time, len(record)
     usual = float(np.median(np.diff(time)))
     weight = np.full(n, 1.0 / (time[-1] - time[0]))  # samples wanted per second

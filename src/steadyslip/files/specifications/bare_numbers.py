@@ -39,7 +39,7 @@ class Largest(NamedTuple):
     of: str = "in use"
 
 
-ABSURD = 1e4
+ABSURD = 1e4  # times the questioned value: mm for m, 1e3, and ten more; numbers beyond are of rigs without dimensions
 LARGEST = {
     ("slip distance", "m"): Largest(0.1, 0.5, "measured"),
     ("stress share", "1"): Largest(0.6, 3.0, "measured"),  # a and b may be of forces, without a load
@@ -68,7 +68,8 @@ REMEDIES = {
 }
 """What to write instead, by last part of the name, else by SI unit, else for all."""
 UNDAMPED = 1e-4  # of critical damping, below which nobody gives a dashpot: steel alone has some 1e-4 to 1e-3
-IDLE, GEARED = 1e-4, 5.0  # rad/s (a turn in 17 h) of a motor, and its least reduction: none is geared down to stand
+SLOWEST_MOTOR = 1e-4  # rad/s, a turn in 17 h: below it the speed given for a motor may be that behind its gear
+LEAST_REDUCTION = 5.0  # of a gear in front of a motor that is asked about so; direct drives do turn as slowly
 BENT = 2e-4  # m: by how much friction bends bristles at most before it slides; measured are some um to 0.1 mm
 LIGHTEST = 1000.0  # Pa: 10 cm of water; faults and laboratories have ten times as much and more
 LIGHT = 0.05  # share of its weight by which a body is hardly ever pressed
@@ -196,11 +197,16 @@ def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 def _idle(rig: Rig) -> Iterator[str]:
     """Question about a motor that turns as slowly as only what is behind its gear does."""
-    if not isinstance(rig, Machine) or not rig.drive.turns or rig.fed is not None or not 0 < rig.drive.velocity < IDLE:
+    if (
+        not isinstance(rig, Machine)
+        or not rig.drive.turns
+        or rig.fed is not None
+        or not 0 < rig.drive.velocity < SLOWEST_MOTOR
+    ):
         return
     behind = {name: float(speed) for name, speed in rig.speeds().items() if rig.turns_on(name)}
     name = min(behind, key=lambda one: abs(behind[one]), default="")
-    if name and 0 < behind[name] <= rig.drive.velocity / GEARED:
+    if name and 0 < behind[name] <= rig.drive.velocity / LEAST_REDUCTION:
         motor, axis = (format_quantity(speed, "rad/s") for speed in (rig.drive.velocity, behind[name]))
         at = rig.drive.driven() or "the drive"
         yield (

@@ -30,7 +30,7 @@ _WORDS = {"M": ("M", "MASS"), "K": ("K", "STIF"), "C": ("C", "DMPV"), "G": ("G",
 _CALCULIX = {"M": ".mas", "K": ".sti"}
 _FREEDOMS = "freedoms"  # variable of a NumPy file: names of the degrees of freedom
 _MARKET = b"%%MatrixMarket"  # how such a file begins
-_SI = (1.0, 1.0, 1.0)
+_SI = (1.0, 1.0, 1.0)  # m, kg and s over the units of length, mass and time of a file in SI units
 _ROTATIONS = (".4", ".5", ".6")  # directions of rotations in finite-element programs
 
 

@@ -116,13 +116,13 @@ class HeldPiece:
 
     @cached_property
     def pulls(self) -> tuple[tuple[Load, Array], ...]:
-        """Loads that press contacts, of one contact after the other, and their rows."""
+        """Loads that press contacts, contact by contact, each with the row that gives its force from the state Y."""
         loads = [load for contact in self.plant.contacts for load in contact.loads]
         return tuple((load, self.plant.passive(load) + load.controller * self.force) for load in loads)
 
     @cached_property
     def pressing(self) -> tuple[list[tuple[Load, Array]], ...]:
-        """Loads of every contact, and rows of the normal stresses that they add."""
+        """For each contact, its loads, each with the row of the normal stress that it adds."""
         sides = iter(zip(self.mode.loads, self.pulls, strict=True))
         found = []
         for contact in self.plant.contacts:

@@ -38,6 +38,7 @@ _NEWTON = 12  # steps of Newton's method at most; its convergence is quadratic
 _LIKELY = 3  # eigenvalues nearest to the axis, by either measure, that are tried as the one that crosses
 _REACH = 4.0  # widths of the bracket that Newton's method may go
 _LAST = 4 * np.finfo(float).eps  # relative step at which Newton's method has ended
+_ROUNDING = 1e-11  # relative step up to which one that no longer falls is rounding of large matrices
 _APART = 1e-7  # relative step of differences of the determinant along a nonlinear parameter: the root of rounding
 _PROBES = (0.5, 2.0, 7.0)  # multiples of a parameter at which it is asked whether it enters linearly
 
@@ -107,10 +108,14 @@ class MatrixSearch:
             found[part] = np.where(balance.exists, slides, known)
         return found
 
+    @cached_property
+    def _rows(self) -> int:
+        """Rows of the pencils that the parameter may change."""
+        return len(self.own.along(self.name, np.array([self.value])).a[0])
+
     def _parts(self, count: int) -> list[slice]:
         """Parts of so many machines that are treated together."""
-        size = len(self.own.pencil.a) if self.own.balance.exists else 2 * len(self.own.matrices.names)
-        together = max(_TOGETHER // size**2, 1)
+        together = max(_TOGETHER // self._rows**2, 1)
         return [slice(start, start + together) for start in range(0, count, together)]
 
     def _growing(self, machines: MachinesAlong, sure: bool) -> NDArray[np.int64]:
@@ -293,14 +298,16 @@ class MatrixSearch:
         likely = np.concatenate([np.argsort(real / np.maximum(size, 1e-300))[:_LIKELY], np.argsort(real)[:_LIKELY]])
         reach = _REACH * (high - low) + 1e-9 * abs(middle)
         for beta in (float(roots[i].imag) for i in dict.fromkeys(likely.tolist())):
-            value = middle
+            value, last = middle, np.inf
             for _ in range(_NEWTON):
                 moved = self._crossing_step(value, beta)
                 if moved is None or not abs(value + moved[0] - middle) <= reach:
                     break
                 value, beta = value + moved[0], abs(beta + moved[1])
-                if abs(moved[0]) <= _LAST * abs(value):
+                step = abs(moved[0])
+                if step <= _LAST * abs(value) or 0.5 * last <= step <= _ROUNDING * abs(value):
                     return value, beta
+                last = step
             else:
                 return value, beta
         return middle, float(roots[likely[0]].imag)

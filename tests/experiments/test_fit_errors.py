@@ -346,3 +346,19 @@ def test_stiffness_and_slip_distance_of_a_short_record():
     assert "friction.d_c" in lost_names
     with pytest.raises(ss.NotAvailable, match="does not determine"):
         ss.experiments.normal_draws(fit)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_window_much_wider_than_the_error_of_a_time_hardly_lessens_errors(seed):
+    """A noisy displacement makes it so wide; the search, which does not know of it, scatters as without."""
+    seen = lab.record(lab.rig(), lab.STEP, seed, 8 * lab.NOISE, count=400)
+    place = seen.displacement + 5e-8 * np.random.default_rng(3).standard_normal(400)
+    record = ss.record_from_arrays(seen.time, friction=seen.friction, normal=seen.normal, displacement=place)
+    fit = ss.fit(ss.lab_rig(), record, starts=9)
+    rows = fit.comparison.residuals(fit.coordinates[None])[1][0]
+    inverse = np.linalg.inv(rows @ rows.T)
+    alone = np.sqrt(np.diag(inverse @ fit.noise[0].spread(rows) @ inverse))
+    wide = alone[fit.names.index("step.1.at")]
+    assert 0.1 < wide < 0.25  # of the window
+    k = fit.names.index("slider.stiffness")
+    assert 0.97 * alone[k] < np.sqrt(fit.covariance[k, k]) < 1.01 * alone[k]

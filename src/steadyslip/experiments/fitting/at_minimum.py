@@ -116,7 +116,8 @@ def fit_with_errors(
         noises.append(noise)
     spread = spread_of_gradient(plan, comparison, z, rows, noises)
     known = prior_information(comparison.space)
-    scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
+    counted = np.maximum(np.diag(information), 1e-300)
+    scale = np.diag(spread) / counted  # variance of the data, as information on each unknown counts it
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
     if not search.converged:
         if _is_minimum(comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))):

@@ -140,7 +140,7 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
         lost = np.abs(direction) > 1e-3 * np.max(np.abs(direction))
         found.append(combination(direction, np.inf, space, lost))
         undetermined |= lost
-    usable = np.flatnonzero(~undetermined)
+    usable, times = np.flatnonzero(~undetermined), np.array([is_time(one) for one in space.unknowns])
     if len(usable):
         deviations, axes = np.linalg.eigh(covariance[np.ix_(usable, usable)])
         for variance, axis in sorted(zip(deviations, axes.T, strict=True), key=lambda pair: -pair[0]):
@@ -150,10 +150,10 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
                 part = min(variance, MOST_REACH**2) * full**2
                 rest = np.maximum(np.diag(covariance) - variance * full**2, 0.0)
                 lost = (part > OPEN_SHARE * (part + rest)) & (part > LEAST_CHANGE**2)
-                lost &= ~np.array([is_time(one) for one in space.unknowns])
+                lost &= ~times
                 undetermined |= lost
                 found.append(combination(full, float(np.sqrt(variance)), space, lost))
-    undetermined |= np.diag(covariance) > UNDETERMINED**2
+    undetermined |= (np.diag(covariance) > UNDETERMINED**2) & ~times
     covariance[undetermined, :] = covariance[:, undetermined] = 0.0
     covariance[undetermined, undetermined] = np.inf
     return covariance, tuple(found)
@@ -173,9 +173,14 @@ def combination(direction: Array, deviation: float, space: Space, lost: Array) -
 
 
 def prior_information(space: Space) -> Array:
-    """Prior information (p, p) on times between two samples: inverse variances of uniform distributions."""
+    """Prior information (p, p) on times, from the windows in which they are searched: inverse variances.
+
+    A time that the data do not tell ends at either end of its window, half of its width, 1 in coordinates, from the
+    middle. Windows are several errors wide where a noisy displacement made them, so that a uniform distribution, whose
+    variance is a third of that, would make errors too small: the search does not know of it.
+    """
     known = np.zeros((len(space), len(space)))
     for i, one in enumerate(space.unknowns):
         if is_time(one):
-            known[i, i] = 12.0  # 1 / variance of a uniform distribution of width 1, the width in coordinates
+            known[i, i] = 4.0
     return known

@@ -41,6 +41,26 @@ def test_xlook_files_are_read(tmp_path, layout):
     assert any("XLOOK" in note for note in record.notes)
 
 
+@pytest.mark.parametrize("counted", [True, False])
+@pytest.mark.parametrize("large", [10, 10**6])
+def test_xlook_texts_are_read(tmp_path, monkeypatch, counted, large):
+    """With and without the column that counts rows, which has no name; large ones are parsed by NumPy."""
+    monkeypatch.setattr("steadyslip.experiments.measured.formats.text.LARGE", large)
+    time, friction, normal, moved = columns()
+    about = [("LP_Disp", "micron", moved), ("Nor_stress", "MPa", normal), ("Time", "sec", time), ("mu", ".", friction)]
+    heads = [[f"col {k}" for k in range(1, 5)], *zip(*(one[:2] for one in about), strict=True), [f"{ROWS} recs"] * 4]
+    lines = [f"number of records = {ROWS}", *("     " + "".join(f"{cell:12s}" for cell in row) for row in heads)]
+    for k, row in enumerate(zip(*(one[2] for one in about), strict=True)):
+        lines.append((f"{k:5d} " if counted else "") + " ".join(f"{x:15.9g}" for x in row))
+    path = tmp_path / "p1.txt"
+    path.write_text("\n".join(lines) + "\n")
+    record = ss.read_record(path)
+    np.testing.assert_allclose(record.time, time, rtol=1e-8)
+    np.testing.assert_allclose(record.friction, friction, rtol=1e-8)
+    np.testing.assert_allclose(record.normal, 1e6 * normal, rtol=1e-8)
+    np.testing.assert_allclose(record.displacement, 1e-6 * moved, rtol=1e-8)
+
+
 def test_a_damaged_xlook_file_is_refused(tmp_path):
     whole = xlook("f4")
     for damaged in (whole[:-3], whole[: len(whole) // 2], whole + b"\0"):

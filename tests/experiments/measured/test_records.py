@@ -63,6 +63,7 @@ def test_a_column_named_d_is_a_displacement_only_as_a_small_letter_with_a_length
     [
         (("ms", "um", "MPa"), ""),
         (("ms", "m", "MPa"), "the load point moves"),
+        (("ms", "mm", "MPa"), "the load point moves"),
         (("s", "um", "MPa"), "samples come every"),
         (("ms", "um", "kPa"), "the normal stress is"),
     ],

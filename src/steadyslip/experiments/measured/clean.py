@@ -17,8 +17,8 @@ LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay
 ASSUMED = "(assumed; give area)"  # in the note on a force without an area, so that its stress says nothing
 PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside, a unit is wrong
 USUAL = {
-    "the load point moves at": ("m/s", (5e-9, 3e-3), "displacement and time in the units that are said here (um, s)"),
-    "the load point moves": ("m", (0.0, 1.0), "displacements in the unit that is said here (mm for um)"),
+    "the load point moves at": ("m/s", (5e-9, 1e-3), "displacement and time in the units that are said here (um, s)"),
+    "the load point moves": ("m", (0.0, 0.1), "displacements in the unit that is said here (mm for um)"),
     "samples come every": ("s", (5e-5, 10.0), "times in the unit that is said here (ms for s)"),
     "the normal stress is": ("Pa", (2e5, 2e9), "stresses in the unit that is said here (kPa for MPa)"),
 }

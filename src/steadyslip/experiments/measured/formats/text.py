@@ -26,7 +26,7 @@ from steadyslip.experiments.measured.formats.cells import (
 from steadyslip.experiments.measured.formats.labview import BEGIN, read_labview
 from steadyslip.experiments.measured.formats.remarks import Line, harmless_lines
 from steadyslip.experiments.measured.formats.table import Table, check_size, count_moments, names_and_units
-from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
+from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook, with_plain_head
 from steadyslip.files.inputs import read_bytes
 
 SHOWN = 8  # damaged lines listed in a message
@@ -59,7 +59,7 @@ def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes]
     ParameterError
         If lines are damaged.
     """
-    raw = mended(read_bytes(path, MOST_TEXT))
+    raw = with_plain_head(mended(read_bytes(path, MOST_TEXT)))
     if is_xlook(raw):
         names, units, values = read_xlook(raw, str(path))
         known = [None if unit is None else known_unit(unit) for unit in units]

@@ -1,13 +1,17 @@
-"""Reader of binary files of XLOOK, with which many rock-friction laboratories process their records.
+"""Reader of files of XLOOK, with which many rock-friction laboratories process their records: binary, or as text.
 
 A header of 36 bytes (name, numbers of records and columns, two settings), 32 channel descriptions of 84 bytes (name,
 unit, gain, comment, number of elements), then the columns one after another, as floats of four or eight bytes. Until
 2007 there were 16 channels. Headers are big-endian, as were the machines on which XLOOK ran,
 but for files of versions compiled elsewhere; the byte order of columns is the one that gives plausible numbers.
+
+Texts have lines of column numbers, names, units and numbers of records above the numbers, whose first column, without a
+name, counts rows.
 """
 
 from __future__ import annotations
 
+import re
 import struct
 
 import numpy as np
@@ -15,10 +19,34 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
+MOST_HEAD = 2**14  # bytes of the lines above a text; 32 columns need a tenth
 HEAD, CHANNEL = 36, 84  # bytes of the header and of each channel's description
 LAYOUTS = ((32, 4), (32, 8), (16, 4), (16, 8))  # numbers of channels, and bytes per number
 UNUSED = "no_val"
+TEXT_HEAD = re.compile(
+    rb"\s*number of records[^\n]*\n(?:\s*col\b[^\n]*\n)?([^\n]*)\n([^\n]*)\n((?:\s*\d+ recs\b[^\n]*\n)?)", re.IGNORECASE
+)
+"""Head of a text: names, units, and numbers of records."""
 NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
+
+
+def with_plain_head(raw: bytes) -> bytes:
+    """Text of XLOOK with names and units only above the numbers, the column that counts rows among them.
+
+    Anything else is returned as it is. Lines keep their numbers.
+    """
+    found = TEXT_HEAD.match(raw[:MOST_HEAD])
+    if found is None:
+        return raw
+    names, units = ([cell.strip() for cell in re.split(rb"\s{2,}|\t", own.strip())] for own in found.groups()[:2])
+    first = raw[found.end() :].partition(b"\n")[0].split()
+    more = len(first) - len(names)
+    if more not in (0, 1) or len(units) > len(names):
+        return raw
+    units = [b"1" if unit in (b".", b"-", b"") else unit for unit in units]
+    rows = [[b"record"] * more + names, [b"1"] * more + units + [b"1"] * (len(names) - len(units))]
+    above = b"\n" * (found.group().count(b"\n") - 2)
+    return above + b"".join(b"\t".join(row) + b"\n" for row in rows) + raw[found.end() :]
 
 
 def is_xlook(raw: bytes) -> bool:

@@ -1,6 +1,7 @@
 """Table of steps: each alone and all together, in numbers that other programs read, and beside a calibration."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -186,3 +187,25 @@ def test_a_later_step_is_fitted_alike_at_any_reference_velocity():
         for name in ("friction.a", "friction.d_c", "slider.stiffness", "initial.Theta"):
             if name in one.values and one[name].determined:
                 assert other.values[name] == pytest.approx(one.values[name], abs=0.2 * one.errors[name])
+
+
+def test_a_printed_table_fits_a_terminal_and_the_csv_has_all(tmp_path):
+    records = [
+        replace(lab.record(lab.rig(), lab.STEP, seed, count=400), source=f"{'long ' * 12}p{seed}.csv")
+        for seed in (1, 2)
+    ]
+    options = {"separate": ["mu_ref", "stiffness"], "calibrated": lab.STIFFNESS, "starts": 9}
+    table = ss.experiments.step_table(ss.fit(ss.lab_rig(), records, **options), starts=9)
+    text = str(table)
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 120
+    assert lines[0].split()[:3] == ["a", "b", "d_c"]
+    for line, row in zip(table.lines, lines[1:], strict=False):
+        assert f"{line.fit['a'].value:.4g} ± " in row
+        assert " weakens" in row
+    plain = " ".join(text.split())
+    for one in (*table.joint.estimates, *table.joint.derived):
+        assert one.name.startswith("step.") or one.shown() in plain
+    table.to_csv(tmp_path / "t.csv")
+    head = (tmp_path / "t.csv").read_text().splitlines()[0]
+    assert all(f"{name} (" in head for name in ("mu_ref@1", "k@2", "k/k_cal@1", "k_c", "a - b"))

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.at_minimum import fit_with_errors
+from steadyslip.experiments.fitting.remedies import Remedy
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.measured.clipped import clipped, flattened
 from steadyslip.experiments.numerics.noise import whiteness
@@ -132,6 +133,18 @@ def test_law_and_memory_are_found_together():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("ahead", "told"), [(2.0, True), (5.9, True), (6.1, False)])
+def test_models_that_nearly_tie_are_both_named(ahead, told):
+    fit = lab.stepped()
+    both = [Remedy(f"friction.evolution = {n!r}", 0.5 * fit.ssq, 40.0 - by, 0.4, fit.values | {"friction.a": a})
+            for n, by, a in (("prz", 0.0, 0.02), ("aging", ahead, 0.03))]  # fmt: skip
+    fit = replace(fit)
+    fit.__dict__["remedies"] = tuple(both)
+    said = " ".join(str(fit).split())
+    assert "with friction.evolution = 'prz' the sum of squares" in said
+    assert (f"hardly told from that: friction.evolution = 'aging' (BIC {ahead:.1f} more, a +" in said) is told
+
+
 def test_what_nothing_mends_is_told():
     found = noisy(stepped())
     hum = np.sin(2 * np.pi * found["time"] / 0.7) * (found["time"] > 130)

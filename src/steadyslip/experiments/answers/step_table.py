@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import enumerated, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.experiments.fitting.beginning import Beginning
@@ -40,6 +42,7 @@ DRIVEN = {
     "smoothed": "a smooth curve through the measured displacement",
 }
 """What drives the model, by `drive` of a fit, where it is not found in the record."""
+PRINTED, LABEL = 120, 20  # characters of a line of a printed table, and of a file's name in it
 TYPESET = {one: f"\\{one}" for one in "_%&#$"} | {
     "±": r"$\pm$", "−": "$-$", "×": r"$\times$", "²": "$^2$", "<": "$<$", ">": "$>$",
     "α": r"$\alpha$", "μ": r"$\mu$", "σ": r"$\sigma$", "Σ": r"$\Sigma$", "Θ": r"$\Theta$", "τ": r"$\tau$",
@@ -81,6 +84,24 @@ class FittedStep:
         values = (self.record, kind, None if step is None else step.time, self.displacement, *self.rates,
                   self.normal_stress, self.fit.samples, self.fit.rms)  # fmt: skip
         return dict(zip(ABOUT, values, strict=True))
+
+    def label(self) -> str:
+        """Name of the line in a printed table: file, time and change of the step; where too long, its end."""
+        if self.step is None:
+            return "all together"
+        when = str(self.step).removeprefix("velocity step at ")
+        name = Path(self.record).name
+        return f"{name if len(name) <= LABEL else '...' + name[3 - LABEL :]}, {when}"
+
+    def verdict(self, notes: list[str]) -> str:
+        """Whether friction weakens with velocity, by a − b and its interval, and numbers of what the fit warns of."""
+        numbers = ",".join(str(1 + notes.index(text)) for text in warnings(self.fit))
+        found = next((one for one in self.fit.derived if one.name.startswith("a - ")), None)
+        if found is None:
+            return f"[{numbers}]" if numbers else ""
+        sure = found.determined and not found.low <= 0 <= found.high
+        said = ("strengthens" if found.value > 0 else "weakens") if sure else "not told"
+        return f"{said} [{numbers}]" if numbers else said
 
     def estimates(self) -> dict[str, Estimate]:
         """Estimates of the rig's parameters and what follows from them, by name."""
@@ -249,14 +270,38 @@ class StepTable(Displayed):
             f"standard deviation, {noise}." + "".join(f" {text}" for text in said if text)
         )
 
+    def _rows(self) -> tuple[list[list[str]], list[str]]:
+        """Rows of the printed table, its head first, and names of estimates that do not fit beside each other."""
+        notes, level = self.notes, self.joint.plan.rig.of_kind("friction level")
+        own = [line.estimates() for line in self.lines]
+        order = sorted(self._estimated(), key=lambda name: ("@" in name, f"friction.{name}" in level))
+        verdicts = [line.verdict(notes) for line in self.lines]
+        rows = [["", *(line.label() for line in self.lines)]]
+        room = PRINTED - max(map(len, rows[0])) - max(map(len, verdicts)) - 2
+        beside = []
+        for name in order:
+            cells = [name, *(_value(one[name]) if name in one else "" for one in own)]
+            if "@" not in name and max(map(len, cells)) + 2 <= room:
+                room -= max(map(len, cells)) + 2
+                rows.append(cells)
+            else:
+                beside.append(name)
+        return list(map(list, zip(*rows, ["", *verdicts], strict=True))), beside
+
     def __str__(self) -> str:
-        lines = []
-        for line in self.lines:
-            where = f"{line.record}: {line.step}" if line.step else f"all together ({line.record})"
-            lines.append(where)
-            lines.append("  " + ", ".join(f"{name} {_value(one)}" for name, one in line.estimates().items()))
-            lines += [f"  ! {text}" for text in (warnings(line.fit) if line.step else ())]
-        return "\n".join([*lines, *(f"! {text}" for text in self.left_out), "", self.methods])
+        rows, beside = self._rows()
+        wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(f"{cell:<{n}}" for cell, n in zip(row, wide, strict=True)).rstrip() for row in rows]
+        joint = self.lines[-1].estimates()
+        more = ", ".join(f"{name} {_value(joint[name])}" for name in beside if name in joint)
+        alone = enumerated([name for name in beside if "@" not in name])
+        told = [f"all together, besides: {more}{f'; of steps {alone}: in the CSV (-o table.csv)' if alone else ''}"]
+        told = told if beside else []
+        told += [f"[{k}] {text}" for k, text in enumerate(self.notes, start=1)]
+        told += [f"! {text}" for text in (*self.left_out, self.methods)]
+        told[-1] = "\n" + told[-1].removeprefix("! ")
+        return "\n".join([*lines, *(textwrap.fill(text, PRINTED, subsequent_indent="  ", replace_whitespace=False)
+                                    for text in told)])  # fmt: skip
 
 
 @checked()

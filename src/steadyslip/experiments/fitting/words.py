@@ -229,11 +229,22 @@ def _structure(fit: FitNumbers) -> list[str]:
             said = f"only the normal stress changes in {enumerated(changing)}"
         return [f"{said}; {_equal_memories(fit)}"] if forgets or fit.remedies else []
     rest = "noise is left" if best.p >= STRUCTURE else f"structure is left (whiteness {chance(best.p)})"
+    follows = f"{', '.join([rest, *_moved(fit, best)])};{_rivals(fit, best)} {_consequence(fit, best)}"
     return [
         f"{said}: with {_asked(fit, best)} the sum of squares is {best.ssq / fit.ssq:.2g} of this, "
-        f"BIC {best.gain:.0f} less, {', '.join([rest, *_moved(fit, best)])}; {_consequence(fit, best)} "
+        f"BIC {best.gain:.0f} less, {follows} "
         "fit again with that, by --set or in the file (lab_rig and fit in Python)"
     ]
+
+
+def _rivals(fit: FitNumbers, best: Remedy) -> str:
+    """Clause on other models that the records hardly tell from the best of those that were tried."""
+    near = [one for one in fit.remedies if one is not best and best.gain - one.gain < STRONG_EVIDENCE <= one.gain]
+    said = [
+        f"{_asked(fit, one)} (BIC {best.gain - one.gain:.1f} more, {', '.join(_moved(fit, one)) or 'the rest alike'})"
+        for one in near
+    ]
+    return f" hardly told from that: {enumerated(said)};" if near else ""
 
 
 def _consequence(fit: FitNumbers, best: Remedy) -> str:

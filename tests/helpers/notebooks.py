@@ -1,6 +1,6 @@
 """Run the cells of a notebook without Jupyter, and write what they print into it.
 
-python tests/helpers/notebooks.py examples/notebooks/*.ipynb     in a folder beside a copy of the examples
+cd examples/notebooks; python ../../tests/helpers/notebooks.py *.ipynb
 """
 
 import ast

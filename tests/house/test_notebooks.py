@@ -16,7 +16,7 @@ NOTEBOOKS = sorted((ROOT / "examples/notebooks").glob("*.ipynb"))
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_shows_what_its_cells_print(path, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(tmp_path / "examples/notebooks")  # where a notebook is opened
     names: dict = {}
     for cell in cells_of(path):
         assert run_cell("".join(cell["source"]), names) == shown(cell)

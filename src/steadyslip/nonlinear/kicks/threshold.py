@@ -393,7 +393,7 @@ class KickMargin(Displayed):
         The protocol piece.
     threshold : Threshold
     ratio : float
-        Threshold over the step's own size; NaN where there is no threshold to compare with.
+        Threshold over the step's own size, of velocities as logarithms ln(v/v₀); NaN where there is no threshold to compare with.
     outcome : str
         What comes of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
         ``undecided``. Beyond the threshold larger kicks may return again.
@@ -414,7 +414,8 @@ class KickMargin(Displayed):
 
     def __str__(self) -> str:
         words = {True: "survives it", False: f"does not survive it ({self.outcome})", None: f"undecided ({self.doubt})"}
-        ratio = f": the limit is {self.ratio:.4g} times this step" if np.isfinite(self.ratio) else ""
+        of = ", as logarithms of velocity" if self.threshold.kick == "velocity" else ""
+        ratio = f": the limit is {self.ratio:.4g} times this step{of}" if np.isfinite(self.ratio) else ""
         return f"{words[self.survives]}{ratio}\n{self.threshold}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -446,7 +447,7 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
     >>> rig = ss.read_rig("examples/inclined-spring.toml", ["stiffness=40 GPa/m"])
     >>> step = ss.protocol.VelocityStep(at=0, to="2 um/s")
     >>> print(ss.margin_to_kick(rig, step))
-    survives it: the limit is 2.94 times this step
+    survives it: the limit is 2.94 times this step, as logarithms of velocity
     velocity kick that lasts: survives up to 7.67288... um/s; beyond: blow-up
     """
     possible = kicks_of(rig)

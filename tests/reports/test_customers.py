@@ -298,6 +298,16 @@ def test_the_first_chart_has_what_is_recommended_first():
         assert first in chart
 
 
+def test_machines_have_a_chart_of_what_is_set_first_or_was_asked_for():
+    machine = ss.read_rig("examples/machines/telescope.toml")
+    asked = {"charts": [("drive.velocity", "drive.kp")]}
+    for options, over in (({}, ("proportional gain", "derivative gain")), (asked, ("velocity", "proportional gain"))):
+        captions = words(ss.report(machine, **options).html).split("Where sliding is stable over ")[1:]
+        assert captions
+        for one in captions:
+            assert all(f"drive {name}" in one.partition("; the dot is this machine")[0] for name in over)
+
+
 def test_changes_come_in_a_designers_order():
     """A setting before a part, the speed of the task last; what is ten times away is named only."""
     found = ss.analyze(ss.read_rig("examples/slow-axis.toml"))

@@ -32,7 +32,7 @@ def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order:
         heading("The machine"), sketch_of(machine),
         rig_report.input_table(machine, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), *_verdict_section(analysis),
-        heading("How far is the edge?"), _verdict_figure(analysis),
+        heading("How far is the edge?"), _verdict_figure(analysis), *rig_report.charts_over(analysis, order),
         *rig_report.edge_table(analysis), *rig_report.checks_line(analysis),
         *rig_report.tolerance_section(tolerated),
         *motion(analysis), heading("The formulas"), *rig_report.motion_equations(machine), *references(machine),

@@ -189,12 +189,10 @@ def _machine(
 ) -> Parts:  # fmt: skip
     if result.holds:
         return _of_held(result, source, fit is not None or branch or tolerances or charts)
-    if branch or fit is not None or charts:
-        raise NotAvailable(
-            "a machine has one steady sliding, and fits and charts are of a slider; leave branch, fit and charts out"
-        )
+    if branch or fit is not None:
+        raise NotAvailable("a machine has one steady sliding, and fits are of a slider; leave branch and fit out")
     within = tolerate(result, tolerances) if tolerances else None
-    order = Order((), getattr(tolerances, "adjust", {}), source, getattr(tolerances, "unknown", {}))
+    order = Order(charts, getattr(tolerances, "adjust", {}), source, getattr(tolerances, "unknown", {}))
     return machine_report.verdict_parts(analyze(result), within, order)
 
 

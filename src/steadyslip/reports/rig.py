@@ -49,6 +49,7 @@ from steadyslip.reports.sections import (
     tolerances_of,
 )
 from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict.change_costs import unit_cost
 from steadyslip.verdict.whole_text import facts, meaning
 from steadyslip.verdict.words import EDGE_WORDS, edge_rows, headline
 
@@ -140,24 +141,35 @@ def checks_line(analysis: Analysis) -> Iterator[str]:
 
 
 def chart_pairs(analysis: Analysis, order: Order) -> list[tuple[str, str]]:
-    """Pairs of a parameter and the stiffness to draw stability over: what can be changed first, then nearest edges."""
-    stiffness = analysis.rig.stiffness_name()
+    """Pairs of parameters to draw stability over: what can be changed first, then nearest edges.
+
+    Of a slider two, each beside the stiffness; of a machine one, of what costs least; none if given by matrices.
+    """
     told = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
-    return [(name, stiffness) for name in dict.fromkeys(one.parameter for one in told) if name != stiffness]
+    names = list(dict.fromkeys(one.parameter for one in told))
+    if not analysis.rig.in_forces:
+        stiffness = analysis.rig.stiffness_name()
+        return [(name, stiffness) for name in names if name != stiffness][:2]
+    names.sort(key=unit_cost)
+    return [(names[0], names[1])] if len(names) > 1 and not by_matrices(analysis.rig) else []
+
+
+def charts_over(analysis: Analysis, order: Order) -> Iterator[str]:
+    """HTML charts of stability over the pairs that were asked for, else over `chart_pairs`."""
+    rig = analysis.rig
+    for x, y in order.charts or chart_pairs(analysis, order):
+        over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
+        words = f"Where sliding is stable over {over}; the dot is this {'machine' if rig.in_forces else 'rig'}."
+        chart = column_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words)  # type: ignore[misc]
+        yield figure(chart, words)
 
 
 def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
-    rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
-    drawn = []
-    for x, y in order.charts or chart_pairs(analysis, order)[:2]:
-        over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
-        words = f"Where sliding is stable over {over}; the dot is this rig."
-        chart = column_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words)  # type: ignore[misc]
-        drawn.append(figure(chart, words))
+    rig = analysis.rig
+    drawn = list(charts_over(analysis, order))
     if analysis.stable is not None:
-        words = (
-            f"Eigenvalues of small disturbances as {said(rig, stiffness)} varies; to the right of the axis they grow."
-        )
+        varied = said(rig, rig.stiffness_name())
+        words = f"Eigenvalues of small disturbances as {varied} varies; to the right of the axis they grow."
         drawn.append(figure(column_html(lambda: figures.root_locus(rig), "root locus"), words))
     if charts := beside(drawn):
         yield charts

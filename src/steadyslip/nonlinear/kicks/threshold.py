@@ -393,7 +393,7 @@ class KickMargin(Displayed):
         The protocol piece.
     threshold : Threshold
     ratio : float
-        Threshold over the step's own size, of velocities as logarithms ln(v/v₀); NaN where there is no threshold to compare with.
+        Threshold over the step's own size, of velocities as logarithms ln(v/v₀); NaN without a threshold.
     outcome : str
         What comes of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
         ``undecided``. Beyond the threshold larger kicks may return again.

@@ -23,8 +23,8 @@ from steadyslip.model.legend import legend, letters_in
 from steadyslip.reports.elements import _LINE, _PIECE, _lines, equation, math
 from steadyslip.reports.literature import PUBLICATIONS, cited
 from steadyslip.reports.recommendation import Order, recommendation
-from steadyslip.reports.rig import edge_table, input_table
-from steadyslip.reports.sections import letters, motion, notes_of
+from steadyslip.reports.rig import edge_table, input_table, motion_equations
+from steadyslip.reports.sections import letters, motion, notes_of, references
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
 RIGS = [path for path in EXAMPLES if "[drive]" in path.read_text() and not path.stem.startswith(("hunting", "reed"))]
@@ -54,6 +54,8 @@ def test_every_letter_of_the_equations_of_an_example_has_a_meaning(path):
     assert len(inputs) == sum(one.value is not None for one in own.parameters().values())
     assert len(besides) == len(set(besides))
     assert not set(inputs) & set(besides)
+    meanings = [row[1] for row in re.findall("<tr><td>(.*?)</td>(<td.*)</tr>", letters(own, equations))]
+    assert len(set(meanings)) == len(meanings)
     assert len(re.findall("<tr>", letters(own, equations))) == len(besides) + 1
 
 
@@ -62,6 +64,30 @@ def test_every_letter_of_any_slider_has_a_meaning(law, contact, mass):
     own = rig(friction=law, contact=contact, mass=mass, stiffness=9e9)
     model = build_model(own)
     assert set(letters_in(model.equations())) <= legend(model).keys()
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_letters_have_the_unit_and_the_reference_of_their_equations(path):
+    """Both sides of dx/dt = v - share v_lp have one unit, and "load point" is said where the share is not zero."""
+    model = build_model(ss.read_rig(path))
+    known, moves = legend(model), model.inputs["load_velocity"]
+    for one in model.coordinates:
+        unit, words = known[str(model.written(one.displacement))]
+        rate = model.rate_of[one.displacement]
+        assert ("load point" in words) == (moves in rate.free_symbols)
+        assert known[str(model.written(one.velocity))][0] == f"{unit}/s"
+        assert ".normal" not in words
+        if rate == one.velocity - moves:
+            assert known["v_lp"][0] == f"{unit}/s"
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_the_state_of_the_laws_is_told_in_the_letters_of_the_equations(path):
+    """No letter of the laws' descriptions is without a meaning: a Psi stands beside the Theta of its law."""
+    own = ss.read_rig(path)
+    text = "".join(motion_equations(own))
+    assert ("<mi>&#936;</mi>" in text or "<mi>Ψ</mi>" in text) <= ("<mi>Θ</mi>" in text or "<mi>&#920;</mi>" in text)
+    assert "B0 = " not in "".join(references(own))
 
 
 def test_reports_name_no_inner_symbol():

@@ -99,7 +99,8 @@ class _Assembly(Forces):
         site, motion = self.sites[i], self.motions[i]
         friction, contact = site.port.friction, site.port.contact
         own = f"{site.port.name}." if site.port.name else ""
-        units = friction.memory_units()
+        units, meanings = friction.memory_units(), friction.meanings()
+        at = f" (at {site.port.name})" if site.port.name and len(self.sites) > 1 else ""
         remembered = zip(friction.memory(), site.memory, units, strict=True)
         inertial = self.single and self.inertial[self.mechanism.coordinates[0].name]
         own_unknown = site.acceleration if inertial else site.velocity
@@ -112,7 +113,10 @@ class _Assembly(Forces):
             spring=site.spring,
             friction=site.tau,
             normal=site.sigma,
-            memory=tuple(Variable(f"{own}{n}", s, unit, "memory of friction", "memory") for n, s, unit in remembered),
+            memory=tuple(
+                Variable(f"{own}{n}", s, unit, f"{meanings.get(n, 'memory of friction')}{at}", "memory")
+                for n, s, unit in remembered
+            ),
             own_states=tuple(
                 Variable(f"{own}{n}", s, unit, "state of the contact", "state")
                 for n, s, unit in zip(contact.memory(), site.states, contact.memory_units(), strict=True)
@@ -149,10 +153,11 @@ class _Assembly(Forces):
         variables: list[Variable] = []
         rates: list[sp.Expr] = []
         for one, body in zip(coordinates, self.mechanism.coordinates, strict=True):
-            name, what = ("", "of the block") if self.bare else (f"{one.name}.", f"of {one.name}")
-            doc = "slip of the block" if self.bare else f"displacement {what}"
-            variables.append(Variable(f"{name}x", one.displacement, one.unit, f"{doc} ahead of the load point", "slip"))
-            rates.append(one.velocity - sp.sympify(body.speed) / self.mechanism.velocity * V_LP)
+            name, what = ("", "of the block") if self.bare else (f"{one.name}.", f"of {one.words}")
+            share = sp.sympify(body.speed) / self.mechanism.velocity
+            doc = f"{'slip' if self.bare else 'displacement'} {what} {_AHEAD_OF.get(share, AHEAD_OF_STEADY)}"
+            variables.append(Variable(f"{name}x", one.displacement, one.unit, doc, "slip"))
+            rates.append(one.velocity - share * V_LP)
             if one.inertial:
                 variables.append(Variable(f"{name}v", one.velocity, f"{one.unit}/s", f"velocity {what}", "velocity"))
                 rates.append(one.acceleration)
@@ -277,6 +282,9 @@ RESERVED_NAMES = {
     "normal_force": "the normal force", "force": "the force of a link",
 }  # fmt: skip
 """Names that results of every rig use, with their meanings; laws cannot use them."""
+_AHEAD_OF = {sp.Integer(0): "beyond its place in steady sliding", sp.Integer(1): "ahead of the load point"}
+"""Words for what a displacement is measured from, by the share of the speed of the load point."""
+AHEAD_OF_STEADY = "ahead of its steady motion with the load point"
 EVENTS = "event_"  # prefix of the columns of events in files of runs
 
 Observables = Mapping[str, tuple[sp.Expr, str]]

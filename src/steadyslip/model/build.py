@@ -57,7 +57,7 @@ def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
     Model, quasistatic; algebraic unknown v
     variables
       x          m        slip of the block ahead of the load point
-      Psi        1        memory of friction
+      Psi        1        b Θ with the part of the stresses, continuous where they jump
     parameters
       a              1        friction.a
       b              1        friction.b

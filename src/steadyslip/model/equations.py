@@ -14,7 +14,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import inner_symbols
-from steadyslip.machine.mechanism import Shares
+from steadyslip.machine.mechanism import NORMAL, Shares
 from steadyslip.model.dead_time import LateSignal
 from steadyslip.model.variables import Variable
 
@@ -54,6 +54,11 @@ class Coordinate:
     unit: str
     push: sp.Symbol
     inner: bool = False
+
+    @property
+    def words(self) -> str:
+        """Name of the body, and that the motion is away from the surface if it is: "pad away from the surface"."""
+        return self.name.replace(NORMAL, " away from the surface")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,8 @@ from steadyslip.model.equations import Contact, Coordinate, Model
 
 Meaning = tuple[str, str]
 """SI unit and words."""
+STATE_OF_LAW = "state of friction, as its law is described"
+"""Words for a state Θ that is no variable of the Model."""
 
 
 def legend(model: Model) -> dict[str, Meaning]:
@@ -20,8 +22,9 @@ def legend(model: Model) -> dict[str, Meaning]:
     >>> legend(build_model(paper_rig()))["v_lp"]
     ('m/s', 'velocity of the load point')
     """
+    speed = model.roles["drive.velocity"].unit
     found = {
-        model.inputs["load_velocity"]: ("m/s", "velocity of the load point"),
+        model.inputs["load_velocity"]: (speed, "velocity of the load point"),
         model.inputs["time"]: ("s", "time"),
     }
     for coordinate in model.coordinates:
@@ -35,7 +38,22 @@ def legend(model: Model) -> dict[str, Meaning]:
         found[late] = (unit, f"{words}, a delay ago")
     if model.letting_go is not None:
         found[model.letting_go.free] = ("1", "1 while the force of the drive is imposed, else 0")
-    return {str(model.written(symbol)): meaning for symbol, meaning in found.items()}
+    letters = {str(model.written(symbol)): meaning for symbol, meaning in found.items()}
+    return letters | {str(one.lhs): ("1", STATE_OF_LAW) for one in states_of_laws(model)}
+
+
+def states_of_laws(model: Model) -> Iterator[sp.Eq]:
+    """Equations of the states Θ by which laws are described, where the variables Ψ of the Model are others.
+
+    >>> from steadyslip.model import build_model
+    >>> from steadyslip.reproduce import paper_rig
+    >>> list(states_of_laws(build_model(paper_rig())))
+    [Eq(Theta, (Psi - alpha*log(sigma/sigma_ref))/b)]
+    """
+    for one in model.memory:
+        if (state := one.name.replace("Psi", "Theta")) != one.name:
+            letter = str(model.written(one.symbol)).replace("Psi", "Theta")
+            yield sp.Eq(sp.Symbol(letter), model.written(model.observables[state][0]), evaluate=False)
 
 
 def letters_in(expressions: Iterable[sp.Basic]) -> Iterator[str]:
@@ -51,10 +69,9 @@ def letters_in(expressions: Iterable[sp.Basic]) -> Iterator[str]:
 
 
 def _of_coordinate(one: Coordinate, only: bool) -> dict[sp.Symbol, Meaning]:
-    body, turns = "the block" if only else one.name, one.unit == "rad"
+    body, turns = "the block" if only else one.words, one.unit == "rad"
     push = ("Pa", "stress") if only else ("N m", "torque") if turns else ("N", "force")
     return {
-        one.displacement: (one.unit, f"displacement of {body} ahead of the load point"),
         one.velocity: (f"{one.unit}/s", f"velocity of {body}"),
         one.acceleration: (f"{one.unit}/s^2", f"acceleration of {body}"),
         one.push: (push[0], f"disturbance: {push[1]} on {body}"),

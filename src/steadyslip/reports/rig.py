@@ -25,6 +25,7 @@ from steadyslip.machine.letters import letter_of, said, worded, words_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
+from steadyslip.model.legend import states_of_laws
 from steadyslip.model.numeric import by_matrices
 from steadyslip.reports.brief import text_html
 from steadyslip.reports.document import Parts
@@ -196,12 +197,16 @@ def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> It
     if by_matrices(rig):
         yield paragraph("The equations of motion are matrices, too large to be printed.")
         return
-    equations = build_model(rig).equations()
+    model = build_model(rig)
+    equations = model.equations()
     told = [one for one in equations if _is_used(one, equations)]
     yield paragraph("The equations of motion:")
     for equation in told:
         yield equation_html(equation)
-    yield letters(rig, [*printed, *told])
+    if states := list(states_of_laws(model)):
+        yield paragraph("The state of friction in the descriptions of its laws, which are named below:")
+        yield from map(equation_html, states)
+    yield letters(rig, [*printed, *told, *states])
 
 
 def _is_used(equation: sp.Eq, others: Sequence[sp.Eq]) -> bool:

@@ -13,7 +13,7 @@ from steadyslip.laws.contact.law import ContactInputs, ContactLaw, Expression, P
 
 
 class ConstantNormalStress(PreloadedContact, name="constant"):
-    """A normal stress that never changes (dead weight, servo-controlled press): B0 = ... = B3 = 0."""
+    """A normal stress that never changes (dead weight, servo-controlled press)."""
 
 
 def pressed_at(stress: float, like: ContactLaw | None = None) -> ContactLaw:

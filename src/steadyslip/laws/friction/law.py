@@ -121,7 +121,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         }
 
     def meanings(self) -> dict[str, str]:
-        """Short explanations of `observables`, by name, for readers who do not know the law; may be incomplete."""
+        """Short explanations of `observables` and `memory` by name, for other readers; may be incomplete."""
         return {}
 
 

@@ -293,8 +293,8 @@ class RateState(FrictionLaw, name="rate-state"):
         count = len(self._all_states())
         found = self.normal_memory.meanings()
         for suffix in [""] if count == 1 else [f"_{i}" for i in range(1, count + 1)]:
-            found["Theta" + suffix] = (
-                f"state of friction, of which b{suffix} times Theta{suffix} is added to the coefficient"
-            )
+            found["Theta" + suffix] = f"state of friction, of which b{suffix} Θ{suffix} is added to the coefficient"
             found["theta" + suffix] = "the same state, told as a time"
+            if self._has_offset():
+                found["Psi" + suffix] = f"b{suffix} Θ{suffix} with the part of the stresses, continuous where they jump"
         return found

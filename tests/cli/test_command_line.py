@@ -107,6 +107,10 @@ def test_answers_come_in_the_units_of_the_file(tmp_path):
 
 def test_formula_schema_version():
     assert "k_cr = " in run("analyze", EXAMPLE, "--formula").stdout
+    parts = run("analyze", EXAMPLE.with_name("slow-axis.toml"), "--formula").stdout.partition("Critical stiffness\n")[2]
+    assert [line.split(" = ")[0].strip() for line in parts.splitlines()] == ["k_cr + k_p", "f", "S"]
+    assert max(map(len, parts.splitlines())) <= 120
+    assert "log(v_0)" not in parts
     of_mass = run("analyze", EXAMPLE, "--along", "mass", "--set", "mass=1e9 kg/m^2").stdout
     assert "Edge in slider.mass\n  m_cr = " in of_mass
     wrong = run("analyze", EXAMPLE, "--along", "nonsense")
@@ -276,3 +280,30 @@ def test_a_word_too_many_is_told_its_option(arguments, words):
     assert done.returncode == 2
     assert words in done.stderr
     assert (";" in done.stderr) == (";" in words)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("simulate", EXAMPLE, "--until", "1 s"), ("analyze", EXAMPLE), ("response", EXAMPLE, "--points", "3")],
+)
+def test_every_figure_can_be_as_wide_as_a_column_of_a_journal(tmp_path, command):
+    run(*command, "-o", tmp_path / "wide.svg")
+    run(*command, "-o", tmp_path / "narrow.svg", "--journal")
+    wide, narrow = (
+        float((tmp_path / name).read_text(encoding="utf-8").partition('width="')[2].partition("pt")[0])
+        for name in ("wide.svg", "narrow.svg")
+    )
+    assert narrow == pytest.approx(85 / 25.4 * 72, abs=0.1)
+    assert wide > 1.5 * narrow
+
+
+def test_every_command_that_draws_knows_the_width_of_a_journal():
+    from typer.main import get_command
+
+    from steadyslip.cli import app
+
+    for name, command in get_command(app).commands.items():
+        options = {text: one for one in command.params for text in getattr(one, "opts", ())}
+        draws = any(".pdf" in (getattr(one, "help", "") or "") for one in options.values())
+        draws |= name in {"cycles", "map", "threshold"}
+        assert ("--journal" in options) == draws, name

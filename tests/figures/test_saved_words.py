@@ -33,6 +33,40 @@ def test_below_a_chart_stand_its_file_and_what_it_holds(tmp_path):
     assert "proportional gain" not in text
 
 
+def test_below_a_run_stands_its_protocol_and_what_it_changes_is_not_held(tmp_path):
+    rig = ss.read_rig(EXAMPLES / "inclined-spring.toml", ["stiffness=32 GPa/m"])
+    step, wave = ss.protocol.VelocityStep(at=1.0, to="2 um/s"), ss.protocol.NormalStressStep(at=2.0, by=1e5)
+    run = ss.simulate(rig, step, until=3.0)
+    held, _, rest = footer_of(run.plot(), run, tmp_path).partition(". at first: ")
+    assert "drive velocity" not in held
+    assert "preload" in held
+    assert rest.startswith("drive velocity v₀ 1 µm/s. protocol: velocity step at 1 s, to 2 µm/s. steadyslip")
+    pressed = ss.simulate(rig, wave, until=3.0)
+    held, _, rest = footer_of(pressed.plot(), pressed, tmp_path).partition(". at first: ")
+    assert "drive velocity v₀ 1 µm/s" in held
+    assert rest.startswith("preload σ₀ 5 MPa. protocol: normal stress step at 2 s, by 100 kPa. steadyslip")
+
+
+def test_the_phase_plane_marks_where_a_run_ended_early():
+    rig = ss.read_rig(EXAMPLES / "inclined-spring.toml")
+    run = ss.simulate(rig, ss.protocol.VelocityStep(at=1.0, to="2 um/s"), until=60.0)
+    axes = figures.phase_plane(run)
+    (end,) = [line for line in axes.lines if line.get_label().startswith(f"{run.status} at ")]
+    curve = next(line for line in axes.lines if line.get_label() == "the run").get_xydata()
+    assert end.get_xydata()[0] == pytest.approx(curve[np.isfinite(curve).all(axis=1)][-1])
+
+
+def test_no_figure_has_a_bare_power_of_ten(tmp_path):
+    """It stands in the unit, as a number beside an axis touches the legend and says nothing of its own."""
+    rig = ss.read_rig(EXAMPLES / "lead-screw.toml")
+    axes = figures.root_locus(rig)
+    save_with_footer(axes, str(tmp_path / "locus.svg"), ss.analyze(rig))
+    assert axes.get_xlabel() == "growth rate Re s ($10^{4}$ 1/s)"
+    axes.figure.draw_without_rendering()
+    assert not axes.xaxis.offsetText.get_visible()
+    assert not axes.yaxis.offsetText.get_visible()
+
+
 def test_the_name_of_a_file_below_a_figure_is_no_mathematics(tmp_path):
     path = tmp_path / "5$ a_b $k_x$ {-z.toml"
     path.write_text((EXAMPLES / "slow-axis.toml").read_text())

@@ -17,6 +17,7 @@ from steadyslip.cli.options import (
     Branch,
     Changes,
     Fitted,
+    Journal,
     OtherRigFile,
     Project,
     Revision,
@@ -46,7 +47,7 @@ def analyze(
     ] = None,
     fitted: Fitted = None,
     output: Annotated[list[Path] | None, outputs("write .html, .png, .svg or .pdf")] = None,
-    journal: Annotated[bool, typer.Option("--journal", help="draw figures 85 mm wide, a column of a journal")] = False,
+    journal: Journal = False,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.files.output import FIGURES, check_output
@@ -68,7 +69,7 @@ def analyze(
         from steadyslip.cli.verdict_files import write_verdict
 
         for path in output:
-            write_verdict(result, within, path, rig, journal)
+            write_verdict(result, within, path, rig)
     if as_json:
         data = result.to_dict()
         if within is not None:
@@ -182,6 +183,7 @@ def modes(
         tuple[str, str] | None, typer.Option(metavar="LOW HIGH", help="range of it, such as '1 mm/s' '1 m/s'")
     ] = None,
     output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
+    journal: Journal = False,
     as_json: AsJson = False,
 ) -> None:
     """Frequencies, dampings and shapes of a machine's modes; what feeds the one that grows, and what to change."""

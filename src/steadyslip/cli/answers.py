@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import typer
 
 from steadyslip.core.version import stamped
+
+_WIDTH = 120  # characters of a line, those of printed tables
 
 
 def print_text(text: str) -> None:
@@ -36,14 +39,21 @@ def formula_data(result: Any, along: str | None) -> dict[str, str | None]:
 
 
 def print_formula(result: Any, along: str | None) -> None:
-    """Print the formula of an edge of stability, or the reason that there is none."""
+    """Print the formula of an edge of stability in the parts that a document has, or why there is none."""
     from steadyslip.core.errors import NotAvailable
     from steadyslip.core.progress import progress_text
+    from steadyslip.linear.formula import formula_in_parts
 
     try:
         with progress_text("simplifying the formula"):
-            equation = result.formula(along)
-        print_text(f"\n{f'Edge in {along}' if along else 'Critical stiffness'}\n  {equation.lhs} = {equation.rhs}")
+            parts = formula_in_parts(result.rig, along)
+        told = [
+            fill(
+                f"{one.lhs} = {one.rhs}", _WIDTH, initial_indent="  ", subsequent_indent="    ", break_long_words=False
+            )
+            for one in parts
+        ]
+        print_text("\n".join(["", f"Edge in {along}" if along else "Critical stiffness", *told]))
     except NotAvailable as reason:
         print_text(f"\nNo formula: {reason}")
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from steadyslip.cli.answers import output_result
-from steadyslip.cli.options import AsJson, Changes, Pieces, RigFile, Until, outputs
+from steadyslip.cli.options import AsJson, Changes, Journal, Pieces, RigFile, Until, outputs
 
 
 def simulate(
@@ -22,6 +22,7 @@ def simulate(
         typer.Option("--initial", metavar="NAME=VALUE", help="start elsewhere than in steady sliding; SI; repeatable"),
     ] = None,
     output: Annotated[list[Path] | None, outputs("write .nc, .csv, .html, .png, .svg or .pdf")] = None,
+    journal: Journal = False,
     samples: Annotated[int | None, typer.Option(min=2, max=10_000_000, help="report at this many even times")] = None,
     phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,
     contact: Annotated[
@@ -67,6 +68,7 @@ def cycles(
     ] = None,
     doublings: Annotated[int, typer.Option(min=0, help="how many period doublings to follow")] = 1,
     output: Annotated[list[Path] | None, outputs("write .nc, .csv, .html, .png, .svg or .pdf")] = None,
+    journal: Journal = False,
     as_json: AsJson = False,
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
@@ -101,6 +103,7 @@ def threshold(
     output: Annotated[
         list[Path] | None, outputs("write .html, or draw the basin in the phase plane: .png, .svg or .pdf")
     ] = None,
+    journal: Journal = False,
     as_json: AsJson = False,
 ) -> None:
     """How large a kick does steady sliding survive? Ctrl-C keeps what there is."""
@@ -138,6 +141,7 @@ def response(
     files: Annotated[
         list[Path] | None, typer.Option("-o", help="write .csv, .html, or a Bode plot: .png, .svg or .pdf; repeatable")
     ] = None,
+    journal: Journal = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Gain and phase of steady sliding under an input that swings: exact for small amplitudes, simulated for large."""
@@ -157,6 +161,7 @@ def hunt(
     ] = None,
     pieces: Pieces = None,
     output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
+    journal: Journal = False,
     rtol: Annotated[float, typer.Option(help="error of the motion allowed per step, with bristles")] = 1e-8,
     require_settled: Annotated[
         bool, typer.Option("--require-settled", help="exit with status 1 unless it settles")
@@ -180,6 +185,7 @@ def verdicts(
     until: Until = None,
     pieces: Pieces = None,
     output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
+    journal: Journal = False,
     rtol: Annotated[float, typer.Option(help="error of the motion allowed per step")] = 1e-7,
     as_json: AsJson = False,
 ) -> None:

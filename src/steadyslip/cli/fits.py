@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from steadyslip.cli.answers import output_result, print_json, print_text
-from steadyslip.cli.options import AsJson, outputs
+from steadyslip.cli.options import AsJson, Journal, outputs
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Fit, LawComparison
@@ -39,6 +39,7 @@ def fit(
             "the rig as .toml, or .json"
         ),
     ] = None,
+    journal: Journal = False,
     as_json: AsJson = False,
 ) -> None:
     """Which friction do these records show (or, with SPEC of a machine, which machine), and how sure is that?"""

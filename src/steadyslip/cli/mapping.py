@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from steadyslip.cli.answers import output_result, print_json, print_text
-from steadyslip.cli.options import AsJson, Changes, RigFile, outputs
+from steadyslip.cli.options import AsJson, Changes, Journal, RigFile, outputs
 
 
 def map_(
@@ -18,6 +18,7 @@ def map_(
     output: Annotated[
         list[Path] | None, outputs("the map (.zarr), and .nc, .parquet, .html, .png, .svg or .pdf")
     ] = None,
+    journal: Journal = False,
     workers: Annotated[int | None, typer.Option(min=1, help="processes; all cores unless given")] = None,
     cluster: Annotated[
         str | None, typer.Option(help="compute on Dask: address of a scheduler such as tcp://host:8786, or local")
@@ -66,6 +67,7 @@ def sensitivity(
     ] = None,
     points: Annotated[int, typer.Option(help="sets of points, a power of 2")] = 4096,
     output: Annotated[list[Path] | None, outputs("write .html, or draw: .png, .svg or .pdf")] = None,
+    journal: Journal = False,
     as_json: AsJson = False,
 ) -> None:
     """Which parameters decide? Sobol indices over the ranges of the file's [map]."""

@@ -37,6 +37,15 @@ def _print_in(context: typer.Context, values: Any) -> None:
     context.with_resource(display_units(sorted(units_in(values))))
 
 
+def _set_width(context: typer.Context, wanted: bool) -> bool:
+    """Draw the figures of files as wide as one column of a journal if `wanted`."""
+    from steadyslip.core.pictures import for_a_journal
+
+    if wanted:
+        context.with_resource(for_a_journal())
+    return wanted
+
+
 RigFile = Annotated[
     Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'", callback=_set_units)
 ]
@@ -55,6 +64,10 @@ Author = Annotated[str, typer.Option(help="author, for the title block")]
 Revision = Annotated[str, typer.Option(help="revision, for the title block")]
 Approval = Annotated[str, typer.Option(help="who approved it, for the title block")]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, in SI units")]
+Journal = Annotated[
+    bool,
+    typer.Option("--journal", help="draw figures 85 mm wide, a column of a journal", callback=_set_width),
+]
 Until = Annotated[str | None, typer.Option(help="end of the run, such as '200 s'; that of the file unless given")]
 Pieces = Annotated[
     list[str] | None,

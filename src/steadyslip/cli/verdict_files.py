@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from steadyslip.figures import journal as journal_style, root_locus, stability_chart
+from steadyslip.figures import root_locus, stability_chart
 from steadyslip.files.html_document import write_page
 from steadyslip.files.output import write_by_ending
 from steadyslip.machine.slider import Slider
@@ -15,7 +14,7 @@ from steadyslip.reports.rig import chart_pairs
 from steadyslip.verdict import Analysis, Tolerated
 
 
-def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source: Path, journal: bool = False) -> None:
+def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source: Path) -> None:
     """Write the verdict on a rig as .html, or as a picture: for machines the ranges, for sliders the stability chart.
 
     The chart is over what can be changed, as in the document.
@@ -28,12 +27,11 @@ def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source:
     shown: Any = found if within is None else within
 
     def drawn() -> Any:
-        with journal_style() if journal else nullcontext():
-            if found.rig.in_forces:
-                return found.plot()
-            rig: Slider = found.rig
-            adjustable = getattr(within.tolerances, "adjust", {}) if within is not None else {}
-            pairs = chart_pairs(found, Order((), adjustable))
-            return stability_chart(rig, *pairs[0]) if pairs else root_locus(rig)
+        if found.rig.in_forces:
+            return found.plot()
+        rig: Slider = found.rig
+        adjustable = getattr(within.tolerances, "adjust", {}) if within is not None else {}
+        pairs = chart_pairs(found, Order((), adjustable))
+        return stability_chart(rig, *pairs[0]) if pairs else root_locus(rig)
 
     write_by_ending(path, {".html": lambda p: write_page(shown, p, "Verdict", source=source)}, drawn, found)

@@ -5,7 +5,9 @@ Results must not import the figures above them, so the figures register their fu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextvars import ContextVar
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, keywords_of, refuse_unknown, unknown_name
@@ -14,6 +16,8 @@ from steadyslip.core.written import in_written_units
 _figures: dict[type, dict[str, Callable[..., Any]]] = {}
 _sources: list[Callable[[], object]] = []
 _savers: list[Callable[[Any, str, Any], object]] = []
+_columns: list[Callable[[], AbstractContextManager[None]]] = []
+_is_column: ContextVar[bool] = ContextVar("files are figures of one column", default=False)
 
 
 def register_figures(result: type, **figures: Callable[..., Any]) -> None:
@@ -30,15 +34,41 @@ def figures_from(load: Callable[[], object]) -> None:
     _sources.append(load)
 
 
-def saved_by(save: Callable[[Any, str, Any], object]) -> None:
-    """Set the function that saves drawn Axes to a file, given the path and the result that they show."""
-    _savers[:] = [save]
+def saved_by(save: Callable[[Any, str, Any], object], column: Callable[[], AbstractContextManager[None]]) -> None:
+    """Set the function that saves drawn Axes to a file, given the path and the result that they show.
+
+    In the context `column` figures are drawn as wide as one column of a journal.
+    """
+    _savers[:], _columns[:] = [save], [column]
+
+
+@contextmanager
+def for_a_journal() -> Iterator[None]:
+    """Context in which figures that are made for a file are as wide as one column of a journal."""
+    before = _is_column.set(True)
+    try:
+        yield
+    finally:
+        _is_column.reset(before)
+
+
+def drawn_for_file(figure: Callable[[], Any]) -> Any:
+    """Axes that `figure` draws, in the width that files have in this context."""
+    _load_figures()
+    with _columns[-1]() if _is_column.get() else nullcontext():
+        return figure()
 
 
 @in_written_units
 def save(axes: Any, path: str, result: Any) -> None:
     """Save the figure of Axes, or of an array of them, with what it shows: the rig of the result, version and date."""
     _savers[-1](axes, path, result)
+
+
+def _load_figures() -> None:
+    while _sources:
+        _sources[-1]()
+        _sources.pop()
 
 
 @in_written_units
@@ -52,9 +82,7 @@ def draw(result: Any, kind: str | None = None, **options: Any) -> Any:
     ParameterError
         If the figure does not take one of the options.
     """
-    while _sources:
-        _sources[-1]()
-        _sources.pop()
+    _load_figures()
     known: dict[str, Callable[..., Any]] = {}
     for base in reversed(type(result).__mro__):
         known |= _figures.get(base, {})

@@ -93,7 +93,7 @@ def _locus(found: Analysis, ax: Axes | None = None, stiffness: Any = None) -> Ax
 for _name in __all__:
     if isinstance(_drawn := globals()[_name], FunctionType):  # not the tuple ANGLES
         globals()[_name] = in_written_units(_drawn)
-saved_by(save_with_footer)
+saved_by(save_with_footer, journal)
 register_figures(
     Analysis, verdict=_verdict, locus=_locus, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane
 )

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 
 from steadyslip.core.format import format_quantity
-from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from steadyslip.figures.style import (
     add_arrowheads,
     add_legend_above,
@@ -33,6 +34,7 @@ MIN_BAND_SHARE = 4e-3  # least width of a shaded slip event, as share of the tim
 _MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
 _LOG_RATIO = 3.0  # highest over lowest slip rate above which the axis is logarithmic (by trial)
 _MIN_STEADY_RATIO = 1e-3  # least slip rate of the line of steady states over the highest of the run
+_SHADE = 0.4  # opacity of shading: 10 steps of lightness L* (of 100) from white, and curves stay in sight (by trial)
 LEAVES = 1e4  # slip rate over the steady one beyond which a run that ends early is not drawn: what the model leaves
 # out, such as mass, decides there
 
@@ -78,8 +80,10 @@ def phase_plane(
     own = steady_rate(rig, name)
     scale, unit = display_unit("m/s", abs(own))
     factor, force_unit = display_unit("N", float(np.nanmax(np.abs(force), initial=0.0)) or 1.0)
-    shown_rate = np.where(leaves(run, rate, own), np.nan, rate) / scale  # NaN: not drawn
+    left = leaves(run, rate, own)
+    shown_rate = np.where(left, np.nan, rate) / scale  # NaN: not drawn
     ax.plot(shown_rate, force / factor, color=color, label=label or "the run", linewidth=1)
+    mark_end(run, ax, shown_rate, force / factor, left)
     low, high = float(np.nanmin(shown_rate)), float(np.nanmax(shown_rate))
     logarithmic = low > 0 and high > _LOG_RATIO * low
     if ax.get_xlabel():  # Axes of another run: keep their scales and labels
@@ -131,6 +135,19 @@ def end_title(run: History, left: np.ndarray) -> str:
     return f"{how}{where} at {format_quantity(run.end, 's')}{limit}"
 
 
+def mark_end(run: History, ax: Axes, x: np.ndarray, y: np.ndarray, left: np.ndarray) -> None:
+    """Mark the last point that is drawn of a run that ended early, and say in the legend how and when it ended."""
+    drawn = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    if run.status != "done" and len(drawn):
+        at = x[drawn[-1:]], y[drawn[-1:]]
+        ax.plot(*at, "X", color=BLOW_UP, markersize=8, markeredgecolor="white", zorder=5, label=end_title(run, left))
+
+
+def shading(color: str) -> dict[str, Any]:
+    """Style of the shading of slip events: an outline tells it from a grid in grey, where a pale colour is white."""
+    return {"facecolor": to_rgba(color, _SHADE), "edgecolor": to_rgba(color, 1.0), "linewidth": 0.6}
+
+
 def _most_varying_contact(run: History, rig: Machine) -> str:
     """Name of the contact whose arcsinh(slip rate / steady slip rate) spans most; the first of equals."""
 
@@ -172,8 +189,7 @@ def _shade_slip_events(run: History, panels: np.ndarray, colors: dict[str, Any],
     for panel in panels:
         for one in slips if len(slips) < MAX_SHADED_EVENTS else ():
             wider = max(0.5 * (narrowest - one.duration), 0.0)
-            begin, end = (one.begin - wider) / factor, (one.end + wider) / factor
-            panel.axvspan(begin, end, color=colors[one.contact], alpha=0.12, linewidth=0)
+            panel.axvspan((one.begin - wider) / factor, (one.end + wider) / factor, **shading(colors[one.contact]))
         if run.status != "done":
             panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
     if slips:

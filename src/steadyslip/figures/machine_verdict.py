@@ -106,8 +106,8 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
     ax.set_xticks([0.01, 0.1, 1, 10, 100], ["1/100", "1/10", "1", "10", "100"])
     _label_rows(ax, [parameter_label(found.rig, margin.parameter) for margin in margins])
     left = len(undrawn_edges(found))
-    more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
-    ax.set_xlabel(f"value over its own, now at 1;\nits edge is beside it{more}")
+    more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn" if left else ""
+    ax.set_xlabel(f"value over its own, now at 1;\nat the right: the value at the nearest edge{more}")
     add_legend_above(ax, 3, 1.0, fontsize="small")
     return ax
 

@@ -103,8 +103,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
         panel.grid(color=GREY, linewidth=0.3)
         for slip in slips:
             wider = max(0.5 * (narrowest - (slip.end - slip.begin)), 0.0)
-            begin, end = (slip.begin - wider) / factor, (slip.end + wider) / factor
-            panel.axvspan(begin, end, color=ORANGE, alpha=0.15 if not wider else 0.4, linewidth=0)
+            panel.axvspan((slip.begin - wider) / factor, (slip.end + wider) / factor, **machine_motion.shading(ORANGE))
         if run.status != "done":
             panel.axvline(run.end / factor, color=BLOW_UP, linewidth=1.5, linestyle="--")
     if run.status != "done":
@@ -145,7 +144,7 @@ def _add_slip_legend(ax: Axes, count: int) -> None:
     if count >= MAX_SHADED_EVENTS:
         ax.plot([], [], " ", label=f"{count} slip events ({meaning}), too many to shade")
     elif count:
-        ax.fill_between([], [], color=ORANGE, alpha=0.3, linewidth=0, label=f"slip event ({meaning})")
+        ax.fill_between([], [], **machine_motion.shading(ORANGE), label=f"slip event ({meaning})")
     add_legend_above(ax, 3, 1.0, fontsize="small")
 
 
@@ -223,11 +222,13 @@ def phase_plane(
     moving = run["v"] > 0
     with np.errstate(all="ignore"):
         u = np.where(moving, np.log(np.where(moving, run["v"], 1.0) / drive), np.nan)
-    u[leaves(run, run["v"], drive)] = np.nan
+    left = leaves(run, run["v"], drive)
+    u[left] = np.nan
     factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), area)
     x, y = u, np.where(np.isnan(u), np.nan, run["spring_stress"] / factor)
     ax.plot(x, y, color=color, label=label or "the run", linewidth=1)
     add_arrowheads(ax, x, y, color)
+    machine_motion.mark_end(run, ax, x, y, left)
     if not ax.get_xlabel():
         _draw_steady_states(run, run.rig, ax, x, factor)
         ax.set_xlabel("ln($v/v_0$) (1)")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -35,6 +35,8 @@ from steadyslip.linear.status import (
 )  # fmt: skip
 from steadyslip.machine.letters import estimate_words, letter_of, said
 from steadyslip.machine.rig import Rig
+from steadyslip.motion.protocol_words import changed_by, protocol_words
+from steadyslip.protocol import Protocol
 
 OUT_OF_RANGE = "numbers out of the range of floating point"
 
@@ -174,8 +176,10 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
 
 
 def fit_words(figure: Any) -> None:
-    """Part ticks whose numbers touch, and put the unit of a vertical axis below a name that is longer than the axis."""
+    """Part ticks whose numbers touch, put powers of ten into units, and units of vertical axes below too long names."""
     figure.draw_without_rendering()
+    for axis in (one for ax in figure.axes for one in (ax.xaxis, ax.yaxis)):
+        _put_power_in_unit(axis)
     for ax in figure.axes:
         label = ax.yaxis.label
         share = ax.get_window_extent().height / (label.get_window_extent().height or 1.0)
@@ -187,6 +191,16 @@ def fit_words(figure: Any) -> None:
         if not _parts_ticks(figure, bins):
             return
         figure.draw_without_rendering()
+
+
+def _put_power_in_unit(axis: Axis) -> None:
+    """Write the power of ten beside an axis into the unit of its label: a bare 1e4 does not say of what it is."""
+    power = re.fullmatch(r"1e([-−]?\d+)", axis.get_offset_text().get_text())
+    name, bracket, counted = axis.get_label_text().rpartition(" (")
+    if power and bracket and axis.get_visible():
+        unit_name = "" if counted == "1)" else f" {counted[:-1]}"
+        axis.set_label_text(f"{name} ($10^{{{int(power[1].replace('−', '-'))}}}${unit_name})")
+        axis.offsetText.set_visible(False)
 
 
 def _parts_ticks(figure: Any, bins: int) -> bool:
@@ -212,7 +226,7 @@ def plain_log_ticks(axis: Axis) -> None:
 
 
 def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
-    """File of a result, and its law and values with their letters (fitted, or held), version of the program, date."""
+    """File of a result, and its law, values with letters (fitted, held, first) and protocol, the program, the date."""
     fit = getattr(result, "fit", result)  # of draws
     plan = getattr(fit, "plan", None)
     rig = fit.rig() if hasattr(plan, "records") else getattr(result, "rig", None)
@@ -222,7 +236,11 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         fitted = {name.partition("@")[0] for name in estimates}
         labels = [text for ax in axes for text in (ax.get_xlabel(), ax.get_ylabel())]
         shown = [name for name in rig.parameters() if _on_an_axis(rig, name, labels)]
-        held = ", ".join(_values_of(rig, {*fitted, *shown}))
+        protocol = getattr(result, "protocol", None)
+        changed = changed_by(rig, protocol) if isinstance(protocol, Protocol) else []
+        held = ", ".join(_values_of(rig, [one for one in rig.parameters() if one not in {*fitted, *shown, *changed}]))
+        first = ", ".join(_values_of(rig, changed))
+        done = protocol_words(rig, protocol) if isinstance(protocol, Protocol) else ""
         told = ", ".join(
             _unbroken(f"{estimate_words(rig, name)} {typeset(one.shown())}") for name, one in estimates.items()
         )
@@ -230,15 +248,17 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
         file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # that of a map
         parts = [*words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
+        parts += [f"at first: {first}" if first else "", f"protocol: {typeset(done)}" if done else ""]
     parts.append(f"steadyslip\xa0{version()}, {datetime.now(UTC):%Y-%m-%d}")
     told = ". ".join(one for one in parts if one)
     return (file.replace(" ", "\xa0"), f". {told}") if file else ("", told)
 
 
-def _values_of(rig: Rig, without: Collection[str]) -> Iterator[str]:
-    """Values of a rig with words and letters, in no-break spaces."""
-    for name, one in rig.parameters().items():
-        if one.value and np.ndim(one.value) == 0 and name not in without:
+def _values_of(rig: Rig, names: Iterable[str]) -> Iterator[str]:
+    """Values of some parameters of a rig with words and letters, in no-break spaces; none of those that are zero."""
+    for name in names:
+        one = rig.parameters()[name]
+        if one.value and np.ndim(one.value) == 0:
             word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
             yield _unbroken(f"{said(rig, name)} {typeset(word)}")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.pictures import save
+from steadyslip.core.pictures import drawn_for_file, save
 
 _NO_FILES = ("/dev", "/proc", "/sys")
 FIGURES = (".png", ".svg", ".pdf")
@@ -84,7 +84,7 @@ def write_by_ending(
         if ending in writers:
             writers[ending](path)
             return
-        axes = figure()
+        axes = drawn_for_file(figure)
         with whole_file(path) as temporary:
             save(axes, temporary, result)
     except OSError as error:

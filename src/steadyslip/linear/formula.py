@@ -147,16 +147,18 @@ def _answers(model: Model) -> dict[str, sp.Expr]:
     return {name: model.written(value) for name, value in response(model).as_dict().items() if name != "k"}
 
 
-def formula_in_parts(rig: Slider) -> list[sp.Eq]:
+def formula_in_parts(rig: Slider | Machine, along: str | None = None) -> list[sp.Eq]:
     """Formula of `formula` as one equation if short, else in the quantities of `small_signal`, then one equation each.
+
+    Formulas of other parameters than a slider's stiffness are one equation.
 
     Raises
     ------
     NotAvailable
         As `formula`.
     """
-    whole = formula(rig)
-    if sp.count_ops(whole) <= LEGIBLE:
+    whole = formula(rig, along)
+    if sp.count_ops(whole) <= LEGIBLE or not is_own_stiffness(rig, _name(rig, along)):
         return [whole]
     known = _answers(build_model(rig))
     letters = {name: sp.Symbol(_LETTERS.get(name, name), real=True) for name in known}

@@ -14,13 +14,10 @@ from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_percent, format_quantity, format_range
 from steadyslip.core.pages import Displayed
-from steadyslip.core.records import key_of
-from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, Population, predict
 from steadyslip.figures.hunting import hunting
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.maps import MAX_FACETS
-from steadyslip.files.specifications.layout import own_fields
 from steadyslip.machine.letters import said, worded
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -28,6 +25,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
 from steadyslip.motion.events import ContactSlip
+from steadyslip.motion.protocol_words import piece_words
 from steadyslip.motion.sentence import drop_of
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.hunting.hunt import hunt
@@ -268,21 +266,7 @@ def _load_name(rig: Slider | Machine) -> str:
 
 def protocol_table(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
     """HTML table of the pieces of a protocol, with numbers in display units."""
-    area = rig.protocol_area
-    turns = rig.parameters()["drive.velocity"].role.unit == "rad/s"
-    rows = []
-    for piece in protocol.pieces:
-        items = []
-        for item, role in own_fields(type(piece)):
-            value = getattr(piece, item.name)
-            if value is None or value == item.default:
-                continue
-            if isinstance(role, Parameter) and isinstance(value, float | int):
-                unit = {"m/s": "rad/s", "m": "rad"}.get(role.unit, role.unit) if turns else role.unit
-                items.append(f"{key_of(item)} {format_quantity(value, unit, area=area)}")
-            else:
-                items.append(f"{key_of(item)} {value if isinstance(value, str) else f'{np.size(value)} numbers'}")
-        rows.append((piece.name.replace("-", " "), ", ".join(items)))
+    rows = [(name, ", ".join(items)) for name, items in (piece_words(rig, one) for one in protocol.pieces)]
     yield table(rows) if rows else paragraph("Nothing: it starts in steady sliding.")
 
 

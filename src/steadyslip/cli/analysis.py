@@ -166,7 +166,8 @@ def compare(
     check_output(output or (), (".html",))
     found = compare_files(rig, other, changes or ())
     block: dict[str, Any] = {"project": project, "author": author, "revision": revision, "approval": approval}
-    output_result(found, output or (), as_json, partial(write_page, kind="Comparison", source=[rig, other], **block))
+    block |= {"kind": "Comparison", "of": " and ".join(found.names), "source": [rig, other]}
+    output_result(found, output or (), as_json, partial(write_page, **block))
 
 
 def modes(

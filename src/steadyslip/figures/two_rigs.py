@@ -35,7 +35,7 @@ _CURVES: Any = (
 def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
     """Plot how near the edge of stability two compared rigs are, over what differs between them.
 
-    The abscissa is the difference with the largest part that is a number of both rigs, or the speed without one. A mark
+    The abscissa is that of `abscissa`. A mark
     on each curve is the rig itself. The ordinate is k/k_cr where that tells the verdict everywhere, else the growth
     rate.
 
@@ -55,7 +55,7 @@ def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
     >>> axes.figure.savefig("two-rigs.svg")
     """
     rigs: list[Any] = [one.rig for one in found.verdicts]
-    name = _abscissa(found, rigs)
+    name = abscissa(found)
     own = [float(rig.parameters()[name].value) for rig in rigs]
     x = np.union1d(_values(rigs[0].parameters()[name].role, own), own)
     heights = _heights(found, rigs, name, x)
@@ -74,11 +74,25 @@ def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _abscissa(found: RigComparison, rigs: list[Any]) -> str:
-    """Name of the difference with the largest part that both rigs have as a number; else that of the speed."""
-    known = [{name for name, one in rig.parameters().items() if one.value is not None} for rig in rigs]
-    of = (one.parameter for one in found.differences)
-    return next((name for name in of if all(name in one for one in known)), _SPEED)
+def abscissa(found: RigComparison) -> str:
+    """Name of the number of both rigs that differs with the largest part; that of the speed if none differs.
+
+    Without parts it is that whose value of the other rig changes the growth rates of both most, relative to themselves.
+    """
+    rigs: list[Any] = [one.rig for one in found.verdicts]
+    first, second = ({name: one.value for name, one in rig.parameters().items()} for rig in rigs)
+
+    def change(name: str) -> float:
+        both = zip(rigs, (second[name], first[name]), strict=True)
+        with np.errstate(all="ignore"):
+            shares = [abs(growth_rate(rig, {name: value}) / growth_rate(rig) - 1) for rig, value in both]
+        return float(np.sum(np.where(np.isfinite(shares), shares, 0.0)))
+
+    each = (one.parameter for one in found.differences)
+    names = [name for name in each if first.get(name) is not None and second.get(name) is not None]
+    if names and not found.measure:
+        return max(names, key=change)
+    return names[0] if names else _SPEED
 
 
 def _values(role: Any, own: list[float]) -> Array:

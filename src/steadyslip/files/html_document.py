@@ -70,13 +70,13 @@ class HtmlDocument:
         return f'<iframe title="{html.escape(self.title)}" {FRAME} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
-def write_page(result: Any, path: Path, kind: str, **options: Any) -> None:
-    """Write the document of a result, titled with its kind (``Run``) and the file's name unless these are the same.
+def write_page(result: Any, path: Path, kind: str, of: str = "", **options: Any) -> None:
+    """Write the document of a result, titled with its kind (``Run``) and what it is of: if not told, the file's name.
 
     Raises
     ------
     NotAvailable
         If it cannot be written.
     """
-    title = kind if path.stem.lower() == kind.lower() else f"{kind}: {path.stem}"
+    title = kind if not of and path.stem.lower() == kind.lower() else f"{kind}: {of or path.stem}"
     HtmlDocument(whole(result, title=title, **options), title).save(path)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from steadyslip.figures.inline import figure_html
+from steadyslip.figures.two_rigs import abscissa
 from steadyslip.machine.letters import said, worded
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
@@ -27,11 +29,10 @@ def _comparison(result: RigComparison) -> Parts:
     a, b = result.names
     (label, *names), *sides = result.side_by_side()
     told = [tuple(_with_words(rigs, cells)) for cells in sides]
-    first, second = (_assumed(one) for one in result.verdicts)
     body = [
         *(part for name, one, within in of_each
           for part in recommendation(one, _order(within), within, f"The recommendation for {name}")),
-        *first, *(part for part in second if part not in first),
+        *_assumed(result),
         heading("Side by side"), table(told, (label or "of", *names), caption="The two rigs."),
         heading("What differs?"), *_differences(result), _chart(result),
         *(part for name, one, _ in of_each
@@ -44,8 +45,12 @@ def _comparison(result: RigComparison) -> Parts:
     return Parts(f"{a}: {verdicts[0]}; {b}: {verdicts[1]}", _answer(result), question, body)
 
 
-def _assumed(analysis: Any) -> list[str]:
-    return list(assumptions(analysis.rig, analysis.warnings, VALIDITY))
+def _assumed(result: RigComparison) -> Iterator[str]:
+    """HTML of what the verdicts take for granted; what holds for one of them alone begins with its name."""
+    first, second = ([*assumptions(one.rig, one.warnings, VALIDITY)] for one in result.verdicts)
+    yield from (part for part in first if part in second)
+    for name, parts, others in zip(result.names, (first, second), (second, first), strict=True):
+        yield from (part.replace(">", f">{html.escape(name)}: ", 1) for part in parts if part not in others)
 
 
 def _order(within: Tolerated | None) -> Order:
@@ -95,9 +100,10 @@ def _differences(result: RigComparison) -> Iterator[str]:
 
 
 def _chart(result: RigComparison) -> str:
-    """HTML figure of both rigs, over the number that differs most."""
+    """HTML figure of both rigs, over a number that differs."""
     a, b = result.names
-    words = f"How near {a} and {b} are to the edge of stability, over what differs most; the marks are the rigs."
+    over = said(result.verdicts[0].rig, abscissa(result))
+    words = f"How near {a} and {b} are to the edge of stability, over {over}; the marks are the rigs."
     return figure(figure_html(result.plot, words, 6.0), words)
 
 

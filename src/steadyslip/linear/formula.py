@@ -31,7 +31,7 @@ LARGEST, LONG = 4, 400
 _LETTERS = {"mu": "mu_ss", "f1": "f_1"} | {f"B{i}": f"B_{i}" for i in range(4)}
 MU_SS = sp.Symbol("mu_ss", real=True)
 MEANINGS = {
-    "k_cr": ("Pa/m", "critical stiffness along the sliding direction"),
+    "k_cr": ("Pa/m", "critical stiffness of the spring along the sliding direction, beside the gain of a controller"),
     "mu_ss": ("1", "friction coefficient in steady sliding"),
     "f": ("Pa s/m", "rise of friction stress with velocity at once, dampings included"),
     "S": ("Pa s/m", "rise of friction stress with velocity in steady sliding, dampings included"),

@@ -2,11 +2,12 @@
 import { ABSENT, CLASSES } from "./linear.js";
 
 /**
- * SVG paths of the regions, of the outlines between them (`lost` where there is no steady sliding on one side), and places for words.
+ * SVG paths of the regions, of the outlines between them (`lost` where there is no steady sliding on one side), and places for words
+ * that are clear of the point `own`.
  * @param {(x: number, y: number) => number} status of positions from 0 to 1
- * @param {number} rows
+ * @param {number} rows @param {number} width @param {number} height @param {number[]} own
  */
-export function regions(status, rows, width, height) {
+export function regions(status, rows, width, height, own) {
   const columns = Math.round(rows * 1.3), grid = [];
   const paths = Object.fromEntries(CLASSES.map((name) => [name, ""]));
   const cut = (at, a, b, first) => { // boundary point between two positions of different status, by bisection
@@ -19,6 +20,7 @@ export function regions(status, rows, width, height) {
   };
   for (let j = 0; j <= rows; j++) grid.push(Array.from({ length: columns + 1 }, (_, i) => status(i / columns, j / rows)));
   const top = (y) => ((1 - y) * height).toFixed(1), left = (x) => (x * width).toFixed(1);
+  const border = /** @type {number[][]} */ ([]); // middles of the pieces of both outlines
   let outline = "", lost = "";
   const acrossRow = (j, i) => cut((x) => status(x, j / rows), i / columns, (i + 1) / columns, grid[j][i]);
   const upColumn = (j, i) => cut((y) => status(i / columns, y), j / rows, (j + 1) / rows, grid[j][i]);
@@ -35,6 +37,7 @@ export function regions(status, rows, width, height) {
       const ends = points.length === 3 ? points.flatMap((point) => [point, [mean(0), mean(1)]]) : points;
       for (let k = 0; k + 1 < ends.length; k += 2) {
         const piece = `M${left(ends[k][0])} ${top(ends[k][1])}L${left(ends[k + 1][0])} ${top(ends[k + 1][1])}`;
+        border.push([0.5 * (ends[k][0] + ends[k + 1][0]) * width, (1 - 0.5 * (ends[k][1] + ends[k + 1][1])) * height]);
         if ([a, b, c, d].includes(ABSENT)) lost += piece;
         else outline += piece;
       }
@@ -62,7 +65,7 @@ export function regions(status, rows, width, height) {
     }
     bar(from, 1, code);
   }
-  return { paths, outline, lost, places: widest(grid, width / columns, height / rows) };
+  return { paths, outline, lost, border, places: widest(grid, width / columns, height / rows, own) };
 }
 
 /** Grid of numbers carried on by one point into NaN, in straight lines. @param {number[][]} grid */
@@ -116,37 +119,55 @@ export function line(grid, at, width, height, { jump = Infinity, exact = null, s
         const t = known[side] ??= zero((share) => beyond(x + share * (u - x), y + share * (v - y)), one, other, exact && Math.abs(one - other) > steep ? steps : 0);
         return [[x + t * (u - x), y + t * (v - y)]];
       });
-      if (ends.length !== 2) continue;
-      const [first, last] = ends, middle = [0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1])];
-      if (bends) {
-        const [u, v] = [middle[0] - i, middle[1] - j], gx = (1 - v) * (b - a) + v * (c - d), gy = (1 - u) * (d - a) + u * (c - b), off = beyond(middle[0], middle[1]) / (gx * gx + gy * gy);
-        if (Math.hypot(off * gx, off * gy) < 0.5) [middle[0], middle[1]] = [middle[0] - off * gx, middle[1] - off * gy];
-        ends.splice(1, 0, middle);
+      const saddle = () => (exact ? beyond(i + 0.5, j + 0.5) : a + b + c + d) * a > 0; // two lines cross the cell: they part where its middle is
+      const pieces = ends.length === 2 ? [ends] : ends.length < 4 ? [] : saddle() ? [ends.slice(0, 2), ends.slice(2)] : [[ends[0], ends[3]], ends.slice(1, 3)];
+      for (const piece of pieces) {
+        const [first, last] = piece, middle = [0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1])];
+        if (bends) {
+          const [u, v] = [middle[0] - i, middle[1] - j], gx = (1 - v) * (b - a) + v * (c - d), gy = (1 - u) * (d - a) + u * (c - b), far = beyond(middle[0], middle[1]), off = far / (gx * gx + gy * gy), x = middle[0] - off * gx, y = middle[1] - off * gy;
+          if (Math.hypot(off * gx, off * gy) < 0.5 && Math.abs(beyond(x, y)) < 0.5 * Math.abs(far)) [middle[0], middle[1]] = [x, y];
+        }
+        path += `M${[first, ...(bends ? [middle] : []), last].map((one) => shown(/** @type {[number, number]} */ (one)).map((value) => value.toFixed(1)).join(" ")).join("L")}`;
+        const [x, y] = shown(/** @type {[number, number]} */ (middle));
+        middles.push([x, y]);
       }
-      path += `M${ends.map((one) => shown(/** @type {[number, number]} */ (one)).map((value) => value.toFixed(1)).join(" ")).join("L")}`;
-      const [x, y] = shown(/** @type {[number, number]} */ (middle));
-      middles.push([x, y]);
     }
   }
   return { path, middles };
 }
 
-const HALF_LINE = 11, HALF_LETTER = 4.2; // half the height of a line and half the width of a letter of words in areas, SVG units
+export const HALF_LINE = 11, HALF_LETTER = 4.2; // half the height of a line and half the width of a letter of words in areas, SVG units
+export const POINT = 12; // radius of the rig's point with its halo, SVG units
+const LETTERS = { none: 17 }; // of words, 9 of others
 
-/** Places for the words of the areas: where they are furthest from all outlines, if there is room. @param {number[][]} grid of statuses */
-function widest(grid, dx, dy) {
-  const rows = grid.length, columns = grid[0].length;
-  return [...new Set(grid.flat())].flatMap((code) => {
-    const name = CLASSES[code], across = dx / (HALF_LETTER * (name === "none" ? 17 : 9)), up = dy / HALF_LINE, away = grid.map((row) => row.map((one) => (one === code ? Infinity : 0)));
-    const near = (j, i) => (j < 0 || i < 0 || j >= rows || i >= columns ? 0 : away[j][i]);
-    for (let j = 0; j < rows; j++) for (let i = 0; i < columns; i++) away[j][i] = Math.min(away[j][i], near(j, i - 1) + across, near(j - 1, i) + up);
-    let best = 1, at = null;
-    for (let j = rows - 1; j >= 0; j--) {
-      for (let i = columns - 1; i >= 0; i--) {
-        away[j][i] = Math.min(away[j][i], near(j, i + 1) + across, near(j + 1, i) + up);
-        if (away[j][i] > best) [best, at] = [away[j][i], { name, x: i * dx, y: (rows - 1 - j) * dy }];
+/** Places for the words of the areas, one in each area that has room: where they are furthest from all outlines and the point. @param {number[][]} grid of statuses @param {number} dx @param {number} dy @param {number[]} own */
+function widest(grid, dx, dy, [left, top]) {
+  const rows = grid.length, columns = grid[0].length, places = /** @type {{name: string, x: number, y: number, wide: number}[]} */ ([]);
+  for (const code of new Set(grid.flat())) {
+    const name = CLASSES[code], wide = HALF_LETTER * (LETTERS[name] ?? 9), across = dx / wide, up = dy / HALF_LINE;
+    const covered = (j, i) => Math.abs(i * dx - left) < POINT + dx && Math.abs((rows - 1 - j) * dy - top) < POINT + dy;
+    const named = new Uint8Array(rows * columns), free = grid.map((row, j) => row.map((one, i) => one === code && !covered(j, i)));
+    for (let more = true; more; ) {
+      const away = free.map((row) => row.map((one) => (one ? Infinity : 0))), near = (j, i) => away[j]?.[i] ?? 0;
+      for (let j = 0; j < rows; j++) for (let i = 0; i < columns; i++) away[j][i] = Math.min(away[j][i], near(j, i - 1) + across, near(j - 1, i) + up);
+      let best = 1, at = /** @type {number[] | null} */ (null);
+      for (let j = rows - 1; j >= 0; j--) {
+        for (let i = columns - 1; i >= 0; i--) {
+          away[j][i] = Math.min(away[j][i], near(j, i + 1) + across, near(j + 1, i) + up);
+          if (away[j][i] > best) [best, at] = [away[j][i], [j, i]];
+        }
+      }
+      more = at !== null;
+      if (!at) continue;
+      places.push({ name, x: at[1] * dx, y: (rows - 1 - at[0]) * dy, wide });
+      for (const open = [at]; open.length; ) { // this area has its word
+        const [j, i] = /** @type {number[]} */ (open.pop());
+        if (grid[j]?.[i] !== code || named[j * columns + i]) continue;
+        named[j * columns + i] = 1;
+        free[j][i] = false;
+        open.push([j, i - 1], [j, i + 1], [j - 1, i], [j + 1, i]);
       }
     }
-    return at ? [at] : [];
-  });
+  }
+  return places;
 }

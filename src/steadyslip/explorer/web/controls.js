@@ -46,7 +46,8 @@ export class Controls {
     const slider = make("input", { type: "range", min: "0", max: String(STEPS), step: "any", "aria-label": label, "data-name": one.name });
     const text = make("input", { type: "text", "aria-label": `${label}, value with unit`, spellcheck: false, autocomplete: "off", "aria-describedby": id, "data-name": one.name });
     const fault = make("span", { className: "fault", role: "alert" }), taken = make("span", { className: "taken hint", id });
-    const row = { box: /** @type {any} */ (null), slider, text, fault, taken, name: /** @type {any} */ (null), refused: NaN };
+    const ends = ["", ""].map((text) => make("small", { textContent: text })); // edges beyond the ends of the track
+    const row = { box: /** @type {any} */ (null), slider, text, fault, taken, ends, name: /** @type {any} */ (null), refused: NaN };
     slider.addEventListener("input", () => page.slide(i, Number(slider.value) / STEPS, true));
     slider.addEventListener("change", () => page.rest());
     slider.addEventListener("keydown", (event) => {
@@ -67,7 +68,7 @@ export class Controls {
     text.addEventListener("blur", () => tell(taken, ""));
     const about = named(one.doc, one.unit); // left out where it says no more than the title
     const name = make("span", { className: "name" }, make("b", {}, ...lettered(one)), " ", make("small", {}, ...(about.startsWith(one.title.split(" ")[0]) || one.title.endsWith(about) ? [] : numbered(about))));
-    return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
+    return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, make("span", { className: "ends tells" }, ...ends), taken, fault), name });
   }
 
   /** Unit assumed for a typed number without unit. @param {number} i */
@@ -108,7 +109,7 @@ export class Controls {
   /** Update the shown values and tracks. */
   show() {
     const { rig, tracks } = this.page;
-    this.rows.forEach(({ box, slider, text, name, refused }, i) => {
+    this.rows.forEach(({ box, slider, text, name, ends, refused }, i) => {
       if (!this.page.due(i)) return;
       const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = unitFor(one, value);
       const place = String(STEPS * this.page.scale(i).of(value)), typed = (many) => `${Number((value / factor).toPrecision(many))} ${unit}`.trim(), words = typed(typed(6).length > ROOM ? 4 : 6);
@@ -118,6 +119,9 @@ export class Controls {
         if (!Number.isNaN(refused)) this.forget(i);
         if (text.value !== words) text.value = words;
       }
+      const [below, above] = this.page.beyond(i);
+      tell(ends[0], below === undefined ? "" : `◂ edge ${told(one, below)}`);
+      tell(ends[1], above === undefined ? "" : `edge ${told(one, above)} ▸`);
       box.classList.toggle("pinned", this.page.chart.axes.includes(i));
       name.classList.toggle("changed", !Object.is(value, one.value));
       const stops = visible(tracks[i], this.page.scale(i).of(value)).flatMap((part, n) => [...(n ? [`var(--ink) ${inPercent(part.from)}`, `var(--ink) calc(${inPercent(part.from)} + ${EDGE})`] : []), ...filled(part)]);

@@ -1,5 +1,5 @@
 // Stability chart over two parameters with the point of the rig.
-import { carried, line, regions } from "./chart.js";
+import { HALF_LINE, POINT, carried, line, regions } from "./chart.js";
 import { inMenu } from "./controls.js";
 import { make, put, putAt, svg } from "./dom.js";
 import { CLASSES, UPPER } from "./linear.js";
@@ -13,7 +13,14 @@ const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours:
 const FEW = 5; // steps of the search for a contour of a machine on a side of a cell: each is some .2 ms, and the growth rate is smooth
 const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
 const NUMBERS = 4, AGAIN = 130; // most numbers of a contour, which may be in pieces, and their least distance, SVG units
+const FIGURE = 7.4, LINE = 17; // width of a figure of a number and height of its line with its halo, SVG units
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+/** True if two boxes, [x, y, half the width, half the height], overlap. @param {number[]} a @param {number[]} b */
+const clash = (a, b) => Math.abs(a[0] - b[0]) < a[2] + b[2] && Math.abs(a[1] - b[1]) < a[3] + b[3];
+
+/** Text around a place of the chart. @param {string} kind @param {number} x @param {number} y @param {string} words */
+const centred = (kind, x, y, words) => svg("text", { class: kind, x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, words);
 
 export class Chart {
   /** @type {Record<string, any>} */ regions;
@@ -25,6 +32,8 @@ export class Chart {
     this.axes = axes;
     this.rows = 0; // rows of the painted regions (0: none)
     this.painted = "";
+    this.paintedAt = ""; // place of the point then
+    this.written = /** @type {{text: any, room: number[]}[]} */ ([]); // words and numbers in the chart, with the room they take
     this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // unique: a document may have several pages
     const { parameters } = page.rig.data;
     this.choices = [0, 1].map((which) => {
@@ -80,9 +89,10 @@ export class Chart {
     this.choices.forEach((select, which) => (select.selectedIndex = this.axes[which]));
     const rows = Math.round((facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? THINNED : 1));
     const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
-    if (others !== this.painted || rows > this.rows) { // regions are painted anew only if other values change or more rows are wanted
-      [this.painted, this.rows] = [others, rows];
-      const { paths, outline, lost, places } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
+    const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one))), own = [at[0] * box.width, (1 - at[1]) * box.height], hides = this.written.some(({ room }) => clash(room, [...own, POINT, POINT]));
+    if (others !== this.painted || rows > this.rows || (hides && !this.page.sliding && own.join() !== this.paintedAt)) { // regions are painted anew only if other values change, more rows are wanted, or the point rests on words
+      [this.painted, this.rows, this.paintedAt] = [others, rows, own.join()];
+      const { paths, outline, lost, border, places } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height, own);
       this.frame(i, j, x, y);
       for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);
       for (const [name, path] of Object.entries(this.patterned)) put(path, "d", paths[name]);
@@ -91,17 +101,18 @@ export class Chart {
       put(this.outline, "d", outline);
       put(this.lost, "d", lost);
       put(this.slides, "d", paths.stable + paths.unstable + paths.undamped);
-      this.words.replaceChildren(...places.map(({ name, x, y }) => svg("text", { class: "word", x: x.toFixed(0), y: y.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, kindWords(name, this.page.rig.data))));
-      this.contours(i, x, j, y, places);
+      this.written = places.map(({ name, x, y, wide }) => ({ text: centred("word", x, y, kindWords(name, this.page.rig.data)), room: [x, y, wide, HALF_LINE] }));
+      this.words.replaceChildren(...this.written.map(({ text }) => text));
+      this.contours(i, x, j, y, own, border);
     }
-    const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
-    putAt(this.point, { cx: box.left + at[0] * box.width, cy: box.top + (1 - at[1]) * box.height });
+    for (const { text, room } of this.written) put(text, "visibility", clash(room, [...own, POINT, POINT]) ? "hidden" : "visible");
+    putAt(this.point, { cx: box.left + own[0], cy: box.top + own[1] });
     const words = [i, j].map((n) => `${parameters[n].title} ${told(parameters[n], rig.values[n])}`);
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
   }
 
-  /** Draw contours, which are left out while a slider moves; labels stand apart from each other and from words, which are some three times as wide as high. @param {{x: number, y: number}[]} words */
-  contours(i, x, j, y, words) {
+  /** Draw contours, which are left out while a slider moves; labels stand clear of the point, of each other and of words. @param {number[]} own place of the point @param {number[][]} border points of the edges */
+  contours(i, x, j, y, own, border) {
     const { size: { width, height }, rig, sliding } = this.page, { phrases, facts } = rig.data, cells = phrases ? CELLS : FINE, columns = Math.round(1.3 * cells);
     this.lines.replaceChildren();
     clearTimeout(this.finer);
@@ -110,7 +121,7 @@ export class Chart {
     const grid = carried(Array.from({ length: cells + 1 }, (_, b) => Array.from({ length: columns + 1 }, (_, a) => exact(a / columns, b / cells))));
     const top = Math.ceil(Math.log10(Math.max(...grid.flat().map(Math.abs).filter(Number.isFinite)))) - 1;
     const levels = phrases ? [-1, -0.1, 0.1, 1].map((share) => share * 10 ** top) : LEVELS;
-    const at = (level) => (phrases ? line(grid, level, width, height) : line(grid, level, width, height, { jump: 1, exact })), own = [x.of(rig.values[i]) * width, (1 - y.of(rig.values[j])) * height];
+    const at = (level) => (phrases ? line(grid, level, width, height) : line(grid, level, width, height, { jump: 1, exact }));
     const drawn = levels.map((level) => {
       if (phrases) return at(level);
       const [lower, upper] = [0, UPPER].map((more) => at(level / (1 + level) + more));
@@ -118,20 +129,28 @@ export class Chart {
     });
     const known = /** @type {number[]} */ ([]);
     drawn.forEach(({ path, middles }, n) => {
-      const beside = [own, ...words.map((one) => [one.x, one.y, 0.3]), ...drawn.flatMap((one, m) => (m === n ? [] : one.middles))], numbers = /** @type {number[][]} */ ([]);
-      const room = ([u, v]) => (numbers.some(([a, b]) => Math.hypot(a - u, b - v) < AGAIN) ? 0 : Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b, wide = 1]) => Math.hypot(wide * (a - u), b - v))));
-      for (let best; numbers.length < NUMBERS; numbers.push(best)) {
-        best = middles.reduce((best, one) => (room(one) > room(best) ? one : best), [0, 0]);
-        if (room(best) <= TIGHT) break;
+      const others = drawn.flatMap((one, m) => (m === n ? [] : one.middles)), numbers = /** @type {number[][]} */ ([]), text = digits(levels[n], 3), size = [0.5 * FIGURE * text.length + 2, 0.5 * LINE];
+      const taken = (one) => this.written.some(({ room }) => clash(room, one)) || clash(one, [...own, POINT, POINT]);
+      const room = ([u, v], /** @type {number[][]} */ beside) => (numbers.some(([a, b]) => Math.hypot(a - u, b - v) < AGAIN) || taken([u, v, ...size]) ? 0 : Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b]) => Math.hypot(a - u, b - v))));
+      for (const beside of [[...border, ...others], others]) { // clear of edges too, if there is such a place
+        for (let best; numbers.length < NUMBERS; numbers.push(best)) {
+          const rooms = middles.map((one) => room(one, beside)), most = Math.max(0, ...rooms);
+          best = middles[rooms.indexOf(most)];
+          if (most <= TIGHT) break;
+        }
+        if (numbers.length) break;
       }
       if (!numbers.length) return; // a contour without a number tells nothing
       known.push(levels[n]);
-      this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...numbers.map(([u, v]) => svg("text", { x: u.toFixed(0), y: v.toFixed(0), "text-anchor": "middle", "dominant-baseline": "middle" }, digits(levels[n], 3))));
+      const labels = numbers.map(([u, v]) => ({ text: centred("number", u, v, text), room: [u, v, ...size] }));
+      this.written.push(...labels);
+      this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...labels.map((one) => one.text));
     });
-    if (phrases) this.refine(Array.from(this.lines.querySelectorAll("path")), (n) => line(grid, known[n], width, height, { exact, steep: 0, steps: FEW, bends: true }).path);
+    const fine = (level, jump) => line(grid, level, width, height, { jump, exact, steep: 0, steps: FEW, bends: true }).path;
+    this.refine(Array.from(this.lines.querySelectorAll("path")), (n) => (phrases ? fine(known[n], Infinity) : [0, UPPER].map((more) => fine(known[n] / (1 + known[n]) + more, 1)).join("")));
   }
 
-  /** Draw contours of a machine anew where they run exactly, one after another, so that the page answers in between. @param {any[]} paths @param {(n: number) => string} exactly */
+  /** Draw contours anew where they run exactly, one after another, so that the page answers in between. @param {any[]} paths @param {(n: number) => string} exactly */
   refine([path, ...others], exactly, n = 0) {
     if (path) this.finer = setTimeout(() => {
       put(path, "d", exactly(n));

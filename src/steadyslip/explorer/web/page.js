@@ -6,7 +6,7 @@ import { button, make, put } from "./dom.js";
 import { edgesOf } from "./edges.js";
 import { Facts } from "./facts.js";
 import { leaving } from "./leaving.js";
-import { STABLE } from "./linear.js";
+import { STABLE, UNKNOWN } from "./linear.js";
 import { Chart } from "./map.js";
 import { presets } from "./presets.js";
 import { unitFor } from "./quantities.js";
@@ -223,11 +223,14 @@ export class Page {
   /** Widen a slider range without any change of status to the nearest change outside, within `SOUGHT`. */
   seek(i) {
     const one = this.rig.data.parameters[i], [low, high] = this.ranges[i], all = this.found[i].edges.map(({ at }) => at);
+    if (low < 0) {
+      const [least, most] = rangeOf(one, this.rig.values[i], all);
+      if (one.low === null || one.high === null) this.ranges[i] = [Math.min(low, least), Math.max(high, most)];
+      return;
+    }
     if ((one.low !== null && one.high !== null) || all.some((at) => at >= low && at <= high)) return; // the domain is bounded, or a change is in the range
     const above = nearestOf(all.filter((at) => at > high || (at < low && at > 0)), low > 0 ? Math.sqrt(low * high) : high), far = low > 0 ? low / SOUGHT : 0;
-    const below = all.filter((at) => at < low && low < 0).at(-1);
     if (above !== undefined && above > far && above < high * SOUGHT) this.reach(i, above);
-    else if (below !== undefined && below > low * SOUGHT) this.reach(i, below);
   }
 
   /** Widen the range of the stiffness slider to the critical stiffness, which depends on other parameters. */
@@ -354,6 +357,12 @@ export class Page {
     const scale = this.scale(i), [low, high] = [scale.at(0), scale.at(1)], { edges, status } = this.found[i], inner = edges.filter(({ at }) => at > low && at < high);
     const first = inner[0]?.below ?? edges.filter(({ at }) => at <= low).at(-1)?.above ?? status, at = (n) => (n < inner.length ? scale.of(inner[n].at) : 1);
     return Array.from({ length: inner.length + 1 }, (_, n) => ({ from: n ? at(n - 1) : 0, to: at(n), at: inner[n]?.at ?? high, status: n ? inner[n - 1].above : first }));
+  }
+
+  /** Nearest edges beyond the ends of a track, below and above. @param {number} i */
+  beyond(i) {
+    const [low, high] = this.ranges[i], at = this.found[i].edges.filter(({ below, above }) => below !== UNKNOWN && above !== UNKNOWN).map((edge) => edge.at);
+    return [at.filter((x) => x < low).at(-1), at.find((x) => x > high)];
   }
 
   /** Nearest edge of every parameter, nearest first. */

@@ -162,6 +162,7 @@ export function inside(one, value) {
   return above && (one.high === null || (one.highAllowed ? value <= one.high : value < one.high));
 }
 
+const SPREAD = 8; // sizes of a value within which edges are drawn on its track, if it may be negative: on a linear scale one further off leaves no room for the rest
 const ZERO = 0.04; // share of a logarithmic scale that stands for zero
 
 /** Scale with positions 0 to 1 for the values of a range: logarithmic or linear, as suits the parameter. */
@@ -187,7 +188,10 @@ export function rangeOf(one, value, edges) {
     return [one.lowAllowed ? one.low : one.low + inset, one.highAllowed ? one.high : one.high - inset];
   }
   const size = Math.abs(value) || one.natural, above = edges.filter((at) => at > 0);
-  if (one.low === null || one.low < 0) return value > 0 ? [-size, 4 * size] : [-4 * size, value < 0 ? size : 4 * size];
+  if (one.low === null || one.low < 0) {
+    const [low, high] = value > 0 ? [-size, 4 * size] : [-4 * size, value < 0 ? size : 4 * size], near = edges.filter((at) => Math.abs(at - value) <= SPREAD * size), room = 0.5 * size;
+    return [Math.min(low, ...near.map((at) => at - room)), Math.max(high, ...near.map((at) => at + room))];
+  }
   if (value === 0) return above.length ? [above[0] * 1e-2, above[0] * 30] : [size * 1e-3, size * 1e2];
   const nearest = nearestOf(above, size) ?? size;
   return [Math.min(size / 30, nearest / 3), Math.max(size * 30, nearest * 3)];

@@ -59,7 +59,7 @@ def test_a_sketch_names_everything_and_no_words_lie_on_others(name):
 
 def test_a_sketch_says_what_the_drive_does():
     late = "\n".join(text for text, _ in boxes(figures.machine_sketch(MACHINES["late"])))
-    for piece in ("p-pi", "100 ms late", "place", "speed"):
+    for piece in ("P-PI", "100 ms late", "place", "speed"):
         assert piece in late
     pulled = "\n".join(text for text, _ in boxes(figures.machine_sketch(MACHINES["two-guides"])))
     assert "20 µm/s" in pulled

@@ -3,6 +3,7 @@
 import html
 import inspect
 import re
+from dataclasses import fields
 from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
@@ -15,9 +16,19 @@ from data_sheets import SHEETS
 from read_pages import words
 from rigs_of_theory import CONTACTS, LAWS, rig
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.records import role_of
+from steadyslip.core.roles import Parameter
 from steadyslip.figures.inline import _shorter
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.laws.friction import FrictionLaw
+from steadyslip.laws.friction.normal_memory import NormalMemory
 from steadyslip.linear.formula import MEANINGS, formula_in_parts
+from steadyslip.machine.bodies import Body
+from steadyslip.machine.drive import Drive
 from steadyslip.machine.letters import said
+from steadyslip.machine.links import Link
+from steadyslip.machine.servo import MachineDrive, kind_of_control
+from steadyslip.machine.surfaces import Surface
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
 from steadyslip.reports.elements import _LINE, _PIECE, _lines, equation, math
@@ -246,6 +257,37 @@ def test_a_sum_has_its_signs():
 def signs(markup):
     """Signs of a formula, without elements and space."""
     return re.sub("\\s|\u2062", "", html.unescape(re.sub("<.*?>", "", str(markup))))
+
+
+@pytest.mark.parametrize("path", RIGS, ids=lambda path: path.stem)
+def test_inputs_have_each_choice_and_a_letter_of_their_own(path):
+    own, text = ss.read_rig(path), path.read_text()
+    page = input_table(own, notes=notes_of(text))
+    letters_there = re.findall("<td><math.*?</math></td>", page)
+    assert len(set(letters_there)) == len(letters_there)
+    told = words(page)
+    assert ("direction lowering" in told) == ('direction = "lowering"' in text)
+    assert ("regularised yes" in told) == ("regularised = true" in text)
+    assert "source or remark" in told
+    assert "`" not in told
+
+
+def test_meanings_of_inputs_have_no_hints_for_writers():
+    """All parameters of all laws, bodies, links and drives."""
+    families = (FrictionLaw, ContactLaw, NormalMemory, Drive, MachineDrive, Body, Link)
+    kinds = [ss.Slider, Surface, *(one for family in families for one in family.registry.values())]
+    roles = [one for kind in kinds for one in map(role_of, fields(kind)) if isinstance(one, Parameter)]
+    docs = {one.doc: one.meaning for one in roles}
+    assert docs["velocity v0 in steady sliding; 0 to hold a place"] == "velocity v0 in steady sliding"
+    assert docs["reference in ln(σ/σ_ref); shifts the memory variable only"].endswith("variable only")
+    for doc, meaning in docs.items():
+        assert meaning
+        assert doc.removeprefix("at velocity 0: ").startswith(meaning.partition(" (the pitch")[0])
+        assert not re.search("instead|such as|unless given|; 0 |without one|'[^s]", meaning)
+
+
+def test_a_controller_is_named_as_people_write_it():
+    assert [kind_of_control(one) for one in ("pd", "rotary-pid", "rotary-p-pi")] == ["PD", "PID", "P-PI"]
 
 
 def test_values_of_inline_tables_are_of_the_file():

@@ -412,6 +412,20 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
     return found
 
 
+def choices(record: FrozenRecord, prefix: str = "") -> dict[str, tuple[Option, Any, bool]]:
+    """Choices of a record and the records in it by dotted name: what may be chosen, what is, and whether by default."""
+    found: dict[str, tuple[Option, Any, bool]] = {}
+    usual = {item.name: item.default for item in fields(record)}  # type: ignore[arg-type]
+    for field_name, own_name, role in field_layout(record):
+        value, name = getattr(record, field_name), prefix + own_name
+        if isinstance(role, Option):
+            found[name] = role, value, value == usual[field_name]
+        elif isinstance(role, Part):
+            for before, member in below(role, value, name, prefix):
+                found |= choices(member, before)
+    return found
+
+
 def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Condition]]:
     """Yield the conditions of a record and the records in it, each with the dotted name of its field."""
     layout = field_layout(record)

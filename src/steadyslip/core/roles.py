@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from contextlib import suppress
 from dataclasses import dataclass
 from textwrap import wrap
@@ -122,6 +123,13 @@ class InUnit(float):
         return InUnit, (float(self), self.unit)
 
 
+_HINTS = re.compile(
+    "^at velocity 0: |; (?:0 (?:to|is) |needs |without |[^;]* unless given).*$|, (?:instead|to report ).*$"
+    "|, such as '[^']*'"
+)
+"""Parts of a description that are for who writes a file."""
+
+
 @dataclass(frozen=True)
 class Parameter(Entry):
     """Role of a numeric field: unit, allowed values and meaning.
@@ -173,6 +181,11 @@ class Parameter(Entry):
     elsewhere: tuple[str, ...] = ()
     instance: str = ""
     optional: bool = False
+
+    @property
+    def meaning(self) -> str:
+        """`doc` without the hints for who writes a file: what to give instead, or what stands for nothing given."""
+        return _HINTS.sub("", self.doc)
 
     def __post_init__(self) -> None:
         if self.kind and self.kind not in PARAMETER_KINDS:

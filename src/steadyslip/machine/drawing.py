@@ -15,6 +15,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.machine.links import Link
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT
+from steadyslip.machine.servo import kind_of_control
 from steadyslip.machine.surfaces import Surface
 
 Point = tuple[float, float]
@@ -373,7 +374,9 @@ class Drawing:
         late = f"\n{format_quantity(float(drive.lateness()), 's')} late" if drive.lateness() else ""
         top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.levels
         self.pencil.frame(place.x - 1.0, top, 2.0, 0.75)
-        self.pencil.words(place.x, top + 0.375, self._label(drive.name, speed + late, ", "), color=DRIVEN)
+        self.pencil.words(
+            place.x, top + 0.375, self._label(kind_of_control(drive.name), speed + late, ", "), color=DRIVEN
+        )
         roof = place.y + (_HIGH / 1.7 if self.machine.bodies[body].turns else _HIGH / 2)
         self.pencil.arrow((place.x - 0.2, top), (place.x - 0.2, roof + 0.02))
         for i, seen in enumerate(dict.fromkeys(drive.watched())):

@@ -97,7 +97,8 @@ def said(rig: Rig, name: str) -> str:
     if "+" in name:
         return " and ".join(said(rig, one) for one in name.split("+"))
     if name not in rig.parameters():
-        return name.replace(".", " ").replace("_", " ")
+        part, _, rest = name.partition(".")
+        return (rest if part in MEMBERS else name).replace(".", " ").replace("_", " ")
     text = _said(rig, name)
     if text and [_said(rig, other) for other in rig.parameters()].count(text) == 1:
         return text

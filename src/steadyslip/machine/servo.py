@@ -160,6 +160,11 @@ def control_for(control: str, turns: bool) -> str:
     return f"rotary-{control.removeprefix('rotary-')}" if turns else control.removeprefix("rotary-")
 
 
+def kind_of_control(control: str) -> str:
+    """Kind of a controller as people write it: "PID" of ``rotary-pid``."""
+    return control_for(control, turns=False).upper()
+
+
 def wrong_control(control: str, body: str, turns: bool) -> Problem:
     """Problem to report if a drive for rotation acts on a body that slides, or the reverse; names the right one."""
     does = "turns" if turns else "slides"

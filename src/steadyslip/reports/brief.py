@@ -79,7 +79,8 @@ _HIDDEN = frozenset(
     where columns""".split()  # noqa: SIM905
 )
 _SKETCH_CAPTION = (
-    "Motion is to the right. Solid blue: what the drive does; dashed: what it measures; red: constant forces."
+    "Motion is to the right. Thick bars and the rounded frame: the drive; dashed line: what it measures; arrows with a "
+    "force: constant forces."
 )
 _MAX_ROWS = 12  # rows of a table of results, so that a notebook cell stays short (by trial)
 _MAX_VALUES = 4  # numbers of an array that are written out; longer ones are shown as shape and range (by trial)

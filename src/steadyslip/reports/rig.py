@@ -13,7 +13,7 @@ from steadyslip.core.areas import stress_name
 from steadyslip.core.checks import in_words
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
-from steadyslip.core.records import Address
+from steadyslip.core.records import Address, choices
 from steadyslip.core.roles import PARAMETER_KINDS
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
@@ -21,7 +21,7 @@ from steadyslip.figures.inline import column_html, figure_html
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
-from steadyslip.machine.letters import letter_of, said, worded, words_of
+from steadyslip.machine.letters import MEMBERS, letter_of, said, worded, words_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
@@ -42,11 +42,12 @@ from steadyslip.reports.elements import (
 from steadyslip.reports.recommendation import ORDER, Order, changeable, recommendation
 from steadyslip.reports.sections import (
     assumptions,
-    input_letter,
+    input_letters,
     letters,
     motion,
     notes_of,
     references,
+    subscript_of,
     tolerances_of,
 )
 from steadyslip.verdict import Analysis, Tolerated
@@ -91,29 +92,43 @@ def input_table(
     With its tolerance if any is given, and where it comes from: the comment behind it in the rig file, if there is one.
     """
     model = None if rig.holds or by_matrices(rig) else build_model(rig)
-    rows = []
-    for name, one in rig.parameters().items():
-        if one.value is None:
-            continue
-        known = inline_math(sp.Symbol(input_letter(model, rig, name)))
+    rows, inputs = [], rig.parameters()
+    letters_of_inputs = input_letters(model, rig)
+    for name, letter in letters_of_inputs.items():
+        one = inputs[name]
+        known = inline_math(sp.Symbol(letter))
         rows.append(
             (
                 words_of(rig, name),
                 known,
-                format_quantity(one.value, one.role.unit, 6, rig.printed_area(name)),
+                format_quantity(float(one.value or 0.0), one.role.unit, 6, rig.printed_area(name)),
                 stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)),
                 *((tolerances.get(name, "none given"),) if tolerances else ()),
-                *((notes[name] or "rig file" if name in notes else "default",) if notes else ()),
+                *((_remark(notes, name),) if notes else ()),
             )
         )
-    more = (*(("tolerance",) if tolerances else ()), *(("source",) if notes else ()))
+    for name, (choice, value, usual) in choices(rig).items():
+        if not usual or name in notes:
+            chosen = "yes" if value is True else "no" if value is False else str(value)
+            both = *(("",) if tolerances else ()), *((_remark(notes, name),) if notes else ())
+            rows.append((said(rig, name), "", chosen, choice.doc, *both))
+    more = (*(("tolerance",) if tolerances else ()), *(("source or remark",) if notes else ()))
     words = "Inputs." if tolerances else "Inputs. Tolerances: none given."
+    own = [name for name in letters_of_inputs if name.partition(".")[0] in MEMBERS]
+    if shared := [one for one in own if letters_of_inputs[one].endswith(f"_{subscript_of(one)}")]:
+        example = f"{said(rig, shared[0])} for {letters_of_inputs[shared[0]]}"
+        words += f" Behind the name of a member its letter stands without the subscript: {example}."
     return table(rows, ("input", "letter", "value", "meaning", *more), caption=words)
+
+
+def _remark(notes: Mapping[str, str], name: str) -> str:
+    """Comment behind a value in its file, without marks of code; or that it is of the file, or a default."""
+    return (notes[name].replace("`", "") or "rig file") if name in notes else "default"
 
 
 def _meaning(one: Address, letter: str) -> str:
     """What a parameter is, with its `letter`; of the effects of friction also what they do."""
-    kind, doc = one.role.kind, one.role.doc
+    kind, doc = one.role.kind, one.role.meaning
     if "_" in letter:  # "Kp" of a description is the letter K_p
         doc = re.sub(rf"\b{letter.replace('_', '')}\b", letter, doc)
     return f"{doc}: {PARAMETER_KINDS[kind]}" if kind.endswith("effect") and doc.startswith(kind) else doc

@@ -171,7 +171,7 @@ def _told(run: History, analysis: Analysis) -> str:
 def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
     """HTML table of the letters in printed equations that are not those of the inputs."""
     model = build_model(rig)
-    inputs = {input_letter(model, rig, name) for name, one in rig.parameters().items() if one.value is not None}
+    inputs = set(input_letters(model, rig).values())
     known = legend(model) | MEANINGS
     rows = []
     for letter in letters_in(printed):
@@ -185,11 +185,28 @@ def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
     )
 
 
-def input_letter(model: Model | None, rig: Slider | Machine, name: str) -> str:
-    """Letter of an input: as the equations write it, or would if it were in them, or there were any."""
-    if model is None or name not in model.parameters:
-        return letter_of(rig, name) or name.rpartition(".")[2]
-    return str(model.written(model.parameters[name]))
+def input_letters(model: Model | None, rig: Slider | Machine) -> dict[str, str]:
+    """Letters of the inputs by dotted name: as the equations write them, or would if they were in them.
+
+    Those that several would share have the name of their member as a subscript.
+    """
+    given = [name for name, one in rig.parameters().items() if one.value is not None]
+    bare = {name: letter_of(rig, name) or name.rpartition(".")[2] for name in given}
+    in_model = {} if model is None else {name: str(model.written(one)) for name, one in model.parameters.items()}
+    many = Counter([*bare.values(), *(in_model[name] for name in given if name in in_model)])
+
+    def letter(name: str) -> str:
+        if name in in_model:
+            return in_model[name]
+        alone = many[bare[name]] == 1 or "." not in name.partition(".")[2]
+        return bare[name] if alone else f"{bare[name]}_{subscript_of(name)}"
+
+    return {name: letter(name) for name in given}
+
+
+def subscript_of(name: str) -> str:
+    """Subscript that the name of a member is in letters, of the dotted name of its parameter."""
+    return name.split(".")[1].replace("-", "_")
 
 
 def references(*rigs: Slider | Machine, names: Sequence[str] = ()) -> Iterator[str]:

@@ -65,7 +65,7 @@ def test_a_sketch_says_what_the_drive_does():
     assert "20 µm/s" in pulled
     assert "0.4 N/µm" in pulled
     rotary = "\n".join(text for text, _ in boxes(figures.machine_sketch(MACHINES["telescope"])))
-    for piece in ("900 kg m²", "MN m/rad", "gear 0.002", "20 kN at 600 mm", "rad/s"):
+    for piece in ("900 kg m²", "MN m/rad", "gear 0.002", "20 kN at 0.6 m", "rad/s"):
         assert piece in rotary
 
 

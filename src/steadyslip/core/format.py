@@ -209,6 +209,16 @@ def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, a
     return format_quantity(value * factor, si_unit, digits)
 
 
+def format_own(value: float, si_unit: str, area: float | None = None) -> str:
+    """Format a parameter's own value in the unit in which it was written; with six digits if four are not all of it.
+
+    >>> format_own(2e5, "1/m"), format_own(316.228, "s/m")
+    ('2e+05 1/m', '316.228 s/m')
+    """
+    digits = 4 if math.isclose(float(f"{value:.4g}"), value, rel_tol=1e-12) else 6
+    return format_as_written(value, value, si_unit, digits, area)
+
+
 def digits_apart(value: float, other: float) -> int:
     """Digits with which two values read differently: four, or for close ones as many as it takes, up to twelve.
 

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_own, format_quantity
 from steadyslip.machine.links import Link
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT
@@ -226,7 +226,7 @@ class Drawing:
 
     def _load(self, name: str, one: Surface) -> str:
         """Text of a contact's load and radius."""
-        return self._pressed(name, one) + (f" at {format_quantity(one.radius, 'm')}" if one.radius is not None else "")
+        return self._pressed(name, one) + (f" at {format_own(one.radius, 'm')}" if one.radius is not None else "")
 
     def _pressed(self, name: str, one: Surface) -> str:
         if one.loaded_by is not None:
@@ -234,7 +234,7 @@ class Drawing:
         for full, known in self.machine.parameters().items():
             labelled = known.role.kind in ("normal stress", "stiffness") and known.value is not None
             if labelled and full.startswith(f"contacts.{name}.contact."):
-                return format_quantity(float(known.value or 0.0), known.role.unit, area=self.machine.printed_area(full))
+                return format_own(float(known.value or 0.0), known.role.unit, self.machine.printed_area(full))
         return one.contact.name
 
     # -- links
@@ -347,11 +347,11 @@ class Drawing:
         known = self.machine.parameters()
         key = "stiffness" if link.rigidity() is not None else "damping"
         one = known[f"links.{name}.{key}"]
-        words = [name, format_quantity(float(one.value or 0.0), one.role.unit)]
+        words = [name, format_own(float(one.value or 0.0), one.role.unit)]
         if link.turning[0] and link.ratio() != 1:
             ratio = next(known[f"links.{name}.{key}"] for key in ("lead", "gear") if f"links.{name}.{key}" in known)
             words[0] += ", " + (
-                format_quantity(float(ratio.value or 0), ratio.role.unit)
+                format_own(float(ratio.value or 0), ratio.role.unit)
                 if ratio.role.unit == "m/rad"
                 else f"gear {float(ratio.value or 0):.3g}"
             )

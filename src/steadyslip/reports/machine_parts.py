@@ -13,9 +13,10 @@ from steadyslip.reports import rig as rig_report
 from steadyslip.reports.brief import sketch_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
-from steadyslip.reports.recommendation import ORDER, Order, recommendation
+from steadyslip.reports.recommendation import ORDER, Order, changeable, recommendation
 from steadyslip.reports.sections import assumptions, motion, notes_of, references, tolerances_of
 from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict.machine import nearest_edge
 from steadyslip.verdict.whole_text import facts
 from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row, headline, told
 
@@ -38,8 +39,18 @@ def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order:
         *motion(analysis), heading("The formulas"), *rig_report.motion_equations(machine), *references(machine),
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
-    lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
+    lead = f"{analysis.reason[:1].upper()}{analysis.reason[1:]}.{_settable_edge(analysis)}"
     return Parts(headline(analysis, capitals=False), lead, question, body, machine)
+
+
+def _settable_edge(analysis: Analysis) -> str:
+    """Sentence on the nearest edge of what can be set, where the nearest of all, which the reason names, is another."""
+    edged = [one for one in analysis.margins if one.edge is not None]
+    able = {one.parameter for one in changeable(analysis)}
+    settable = next((one for one in edged if one.parameter in able), None)
+    if settable is None or settable is edged[0]:
+        return ""
+    return f" Of what can be set, {nearest_edge(analysis, settable)}."
 
 
 def _verdict_figure(analysis: Analysis) -> str:

@@ -22,12 +22,13 @@ from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.change_costs import PART, SETTING, TASK, unit_cost
 from steadyslip.verdict.cures import default_adjust
 from steadyslip.verdict.tolerances import LEAST, format_chance
-from steadyslip.verdict.words import told
+from steadyslip.verdict.words import change_to, told
 
 BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
 FAR = 10.0  # factor between a value and its change from which the change is named only: nobody orders such a part
 SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
 _ROWS = 4  # changes that are recommended
+_STEPS = (1.1, 1.25, 1.5, 2.0)  # factors of a value that are tried to move a stable rig away from its edges (by trial)
 _LEFT_OUT = f"Left out, as they would have to change by more than a factor of {FAR:g}"
 
 
@@ -75,10 +76,10 @@ def recommendation(
             yield paragraph(f"Of the values themselves: {_what_to_hold(analysis, adjustable)}")
         return
     if analysis.stable:
-        yield paragraph("Keep it as it is.")
+        known = {} if tolerated is None else {one.parameter for one in tolerated.alone}
+        near = [one for one in _close_edges(analysis.margins) if one[0].parameter not in known]
+        yield from _kept_apart(analysis, near, adjustable) if near else [paragraph("Keep it as it is.")]
         yield paragraph(_what_to_hold(analysis, adjustable))
-        if tolerated is None and (near := _small_margin(analysis)):
-            yield paragraph(near)
         return
     able = [one for one in changeable(analysis, adjustable) if not adjustable or one.parameter in adjustable]
     found = {one: row for one in able if (row := _change(analysis, one, adjustable.get(one.parameter)))}
@@ -254,16 +255,91 @@ def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:
     return f"{text} Of what can be set, the nearest is that of {_side(analysis, chosen)}."
 
 
-def _small_margin(analysis: Analysis) -> str:
-    """Sentence on a nearest edge that is nearer than what is recommended of other values; empty for one that is not."""
-    nearest = next((one for one in analysis.margins if one.edge is not None and one.value), None)
-    if nearest is None or nearest.unit == "rad" or abs(nearest.relative) >= BEYOND_EDGE:
-        return ""
-    name, away, wanted = said(analysis.rig, nearest.parameter), abs(nearest.relative), format_percent(BEYOND_EDGE)
-    return (
-        f"The edge of {name} is {format_percent(away)} away, where {wanted} are recommended: know the value more "
-        "closely than that, or move away from its edge."
+def _distance(margin: Margin, edge: Boundary) -> float:
+    """Distance of an edge from the value, as a share of the value; infinite where a share says nothing."""
+    return math.inf if margin.unit == "rad" or not margin.value else abs(edge.value / margin.value - 1)
+
+
+def _close_edges(margins: Sequence[Margin]) -> list[tuple[Margin, Boundary]]:
+    """Edges of a stable rig that are nearer than is recommended, nearest first."""
+    every = [(one, edge) for one in margins for edge in one.about if _distance(one, edge) < BEYOND_EDGE]
+    return sorted(every, key=lambda found: _distance(*found))
+
+
+def _kept_apart(
+    analysis: Analysis, near: Sequence[tuple[Margin, Boundary]], adjustable: Collection[str]
+) -> Iterator[str]:
+    """HTML of the edges of a stable rig that are too near, and of changes that move it away from them."""
+    rig, wanted = analysis.rig, format_percent(BEYOND_EDGE)
+    listed = ", ".join(
+        f"{said(rig, one.parameter)} at {_value(analysis, one, edge.value)} ({change_to(one, edge)})"
+        for one, edge in near
     )
+    whose = "their values are the edges" if len(near) > 1 else "its value is the edge"
+    yield paragraph(
+        f"It is stable, with less distance from the edge than the {wanted} that are recommended. Within {wanted} of "
+        f"{whose} of {listed}. Know what has an edge so near more closely than that, or make a change."
+    )
+    found = sorted(
+        filter(None, (_moved_away(analysis, one) for one in _movable(analysis, adjustable))), key=_best_first
+    )
+    if not found:
+        yield paragraph(f"No single change that was tried puts all edges {wanted} away.")
+        return
+    name, first, to, after, _ = found[0].cells
+    yield paragraph(
+        f"Change {name} from {first} to {to}: it stays stable, and the nearest edge is then that of {after}."
+    )
+    head = ("change", "now", "recommended", "nearest edge then", f"all edges {wanted} away")
+    yield table((one.cells for one in found), head, caption="Changes that move it away from its edges, each alone.")
+
+
+def _movable(analysis: Analysis, adjustable: Collection[str]) -> list[Margin]:
+    """What can be changed of a stable rig to move it away from its edges: the nearest ones, the speed last."""
+    able = [one for one in changeable(analysis, adjustable) if one.value and one.unit != "rad" and not one.remote]
+    return sorted(able[:_ROWS], key=lambda one: unit_cost(one.parameter))
+
+
+class _MovedAway(NamedTuple):
+    """Row of a table: name, value, recommended value, nearest edge then, whether all are far; that edge's distance."""
+
+    cells: tuple[str, str, str, str, str]
+    distance: float
+
+
+def _best_first(found: _MovedAway) -> float:
+    """Sort key: those at which all edges are far, in their order; of the others the farthest first."""
+    return -min(found.distance, BEYOND_EDGE)
+
+
+def _moved_away(analysis: Analysis, margin: Margin) -> _MovedAway | None:
+    """Change of a parameter away from its edge by the steps of `_STEPS`, to the first at which all edges are far.
+
+    Else the one at which the nearest edge is farthest; None if none is farther than now.
+    """
+    rig: Any = analysis.rig
+    rises = margin.edge is None or margin.edge.value < margin.value
+    sign = 1 if rises == (margin.value > 0) else -1
+    best: _MovedAway | None = None
+    now = min((_distance(one, edge) for one in analysis.margins for edge in one.about), default=math.inf)
+    for step in _STEPS:
+        to = margin.value * step**sign
+        with suppress(ParameterError, NotAvailable):
+            changed = analyze(rig.with_values({margin.parameter: to}), branch=analysis.branch)
+            edges = [(one, edge) for one in changed.margins for edge in one.about]
+            if not changed.stable or not edges:
+                continue
+            one, edge = min(edges, key=lambda found: _distance(*found))
+            away = _distance(one, edge)
+            if away <= (now if best is None else best.distance):
+                continue
+            after = f"{said(rig, one.parameter)}, {format_percent(away)} away"
+            first, then = (_value(analysis, margin, value) for value in (margin.value, to))
+            far = "yes" if away >= BEYOND_EDGE else "no"
+            best = _MovedAway((said(rig, margin.parameter), first, then, after, far), away)
+            if away >= BEYOND_EDGE:
+                break
+    return best
 
 
 def _side(analysis: Analysis, margin: Margin) -> str:
@@ -317,10 +393,9 @@ def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _C
 
 def _because(analysis: Analysis, change: Mapping[str, float]) -> str:
     """Sentence on why a change helps: what feeds the motion of a machine, or the reason for the verdict with it."""
-    if analysis.origin is not None:
-        return f" Why it is unstable: {analysis.origin.words}."
+    because = "" if analysis.origin is None else f" Why it is unstable: {analysis.origin.words}."
     rig: Any = analysis.rig
-    return "" if rig.contacts else f" Then {analyze(rig.with_values(change), branch=analysis.branch).reason}."
+    return f" Then {analyze(rig.with_values(change), branch=analysis.branch).reason}.{because}"
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:

@@ -12,7 +12,7 @@ from steadyslip import figures
 from steadyslip.core.areas import stress_name
 from steadyslip.core.checks import in_words
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_own, format_quantity
 from steadyslip.core.records import Address, choices
 from steadyslip.core.roles import PARAMETER_KINDS
 from steadyslip.experiments import Prediction
@@ -101,7 +101,7 @@ def input_table(
             (
                 words_of(rig, name),
                 known,
-                format_quantity(float(one.value or 0.0), one.role.unit, 6, rig.printed_area(name)),
+                format_own(float(one.value or 0.0), one.role.unit, rig.printed_area(name)),
                 stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)),
                 *((tolerances.get(name, "none given"),) if tolerances else ()),
                 *((_remark(notes, name),) if notes else ()),

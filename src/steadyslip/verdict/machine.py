@@ -75,7 +75,7 @@ def reason(found: Findings) -> str:
         late = "" if by_matrices(found.rig) else why_delay_is_ill_posed(operating_point(found.rig))
         return late or PHRASES["are ill-posed"]
     first = next((one for one in found.margins if one.edge is not None), None)
-    hint = "" if first is None else f"; {_nearest(found, first)}"
+    hint = "" if first is None else f"; {nearest_edge(found, first)}"
     if found.on_edge:
         return PHRASES["undamped"] + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
@@ -85,7 +85,7 @@ def reason(found: Findings) -> str:
     return PHRASES["dies out"] + hint
 
 
-def _nearest(found: Findings, margin: Margin) -> str:
+def nearest_edge(found: Findings, margin: Margin) -> str:
     """Clause on the nearest edge of a parameter: side, value and what happens beyond it."""
     edge = margin.edge
     if edge is None:

@@ -265,17 +265,22 @@ def margin_table(analysis: Findings) -> list[str]:
     return lines
 
 
-def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:
-    """Row of the table of nearest edges: name, value, edge, change and what happens beyond."""
+def change_to(margin: Margin, edge: Boundary) -> str:
+    """Change of a parameter to an edge: in degrees, percent or as a factor."""
     gap = edge.value - margin.value
     if margin.unit == "rad":
-        change = f"{math.degrees(gap):+.4g} deg"
-    elif not margin.value:
-        change = "from zero"
-    elif 0 < (ratio := edge.value / margin.value) < 0.1 or abs(ratio) > 10:
-        change = f"x {ratio:.4g}"
-    else:
-        change = f"{100 * gap / abs(margin.value):+.4g} %"
+        return f"{math.degrees(gap):+.4g} deg"
+    if not margin.value:
+        return "from zero"
+    ratio = edge.value / margin.value
+    if ratio < -10:
+        return "to the other sign"
+    return f"x {ratio:.4g}" if 0 < ratio < 0.1 or ratio > 10 else f"{100 * gap / abs(margin.value):+.4g} %"
+
+
+def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str, str, str, str, str]:
+    """Row of the table of nearest edges: name, value, edge, change and what happens beyond."""
+    gap, change = edge.value - margin.value, change_to(margin, edge)
     towards = "above" if gap > 0 or (gap == 0 and edge.stable == "below") else "below"
     if analysis.on_edge and abs(gap) <= NEXT_TO_IT * abs(margin.value):
         change, words = "0", EDGE_WORDS["here" if edge.stable == "neither" else "beside"].format(side=edge.stable)

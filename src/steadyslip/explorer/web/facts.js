@@ -28,13 +28,14 @@ function legend() {
   return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key("at other values of what the bar shows, the larger the higher", ...dots));
 }
 
-/** Text of the distance to an edge: per cent, a factor, degrees, or "from zero". */
+/** Text of the distance to an edge: per cent, a factor, degrees, or words. */
 function change(one, value, at) {
   const sign = at < value ? "" : "+", ratio = at / value, few = (share) => `${sign}${digits(share, 3)}`;
   if (one.unit === "rad") return `${few(((at - value) * one.factor * 180) / Math.PI)}\u00a0deg`;
   if (!value) return "from zero";
   if (Math.abs(ratio - 1) <= NEXT_TO_IT) return "0";
-  return (ratio > 0 && ratio < 0.1) || Math.abs(ratio) > 10 ? `×\u00a0${digits(ratio, 3)}` : `${few(100 * (at - value) / Math.abs(value))}\u00a0%`;
+  if (ratio < -10) return "to the other sign";
+  return (ratio > 0 && ratio < 0.1) || ratio > 10 ? `×\u00a0${digits(ratio, 3)}` : `${few(100 * (at - value) / Math.abs(value))}\u00a0%`;
 }
 
 export class Facts {

@@ -11,7 +11,7 @@ const ROWS = 60, ROWS_SEARCHED = 24; // rows of the chart; fewer if σss must be
 const THINNED = 2.5; // factor of fewer rows while a slider moves
 const CELLS = 30, FINE = 45, LEVELS = [0.1, 0.2, 0.5, 2, 5, 10]; // of contours: rows of machines and of sliders, and levels of k/k_cr
 const FEW = 5; // steps of the search for a contour of a machine on a side of a cell: each is some .2 ms, and the growth rate is smooth
-const APART_BY = 40, TIGHT = 9; // APART_BY: distance of a label to all else that is enough; TIGHT: one below which it is left out, SVG units
+const APART_BY = 40, ROOMY = 16, TIGHT = 6; // APART_BY: distance of a label to all lines that is enough; ROOMY, TIGHT: ones below which further ones and the first are left out, about that of letters from their middle, SVG units
 const NUMBERS = 4, AGAIN = 130; // most numbers of a contour, which may be in pieces, and their least distance, SVG units
 const FIGURE = 7.4, LINE = 17; // width of a figure of a number and height of its line with its halo, SVG units
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -127,25 +127,25 @@ export class Chart {
       const [lower, upper] = [0, UPPER].map((more) => at(level / (1 + level) + more));
       return { path: lower.path + upper.path, middles: [...lower.middles, ...upper.middles] };
     });
-    const known = /** @type {number[]} */ ([]);
-    drawn.forEach(({ path, middles }, n) => {
-      const others = drawn.flatMap((one, m) => (m === n ? [] : one.middles)), numbers = /** @type {number[][]} */ ([]), text = digits(levels[n], 3), size = [0.5 * FIGURE * text.length + 2, 0.5 * LINE];
-      const taken = (one) => this.written.some(({ room }) => clash(room, one)) || clash(one, [...own, POINT, POINT]);
-      const room = ([u, v], /** @type {number[][]} */ beside) => (numbers.some(([a, b]) => Math.hypot(a - u, b - v) < AGAIN) || taken([u, v, ...size]) ? 0 : Math.min(APART_BY, u, v, width - u, height - v, ...beside.map(([a, b]) => Math.hypot(a - u, b - v))));
-      for (const beside of [[...border, ...others], others]) { // clear of edges too, if there is such a place
-        for (let best; numbers.length < NUMBERS; numbers.push(best)) {
-          const rooms = middles.map((one) => room(one, beside)), most = Math.max(0, ...rooms);
-          best = middles[rooms.indexOf(most)];
-          if (most <= TIGHT) break;
-        }
-        if (numbers.length) break;
-      }
-      if (!numbers.length) return; // a contour without a number tells nothing
-      known.push(levels[n]);
-      const labels = numbers.map(([u, v]) => ({ text: centred("number", u, v, text), room: [u, v, ...size] }));
-      this.written.push(...labels);
-      this.lines.append(svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...labels.map((one) => one.text));
+    const near = (points, [u, v]) => points.reduce((least, [a, b]) => Math.min(least, Math.hypot(a - u, b - v)), Math.min(APART_BY, u, v, width - u, height - v));
+    const lines = drawn.map(({ path, middles }, n) => {
+      const others = drawn.flatMap((one, m) => (m === n ? [] : one.middles)), text = digits(levels[n], 3), size = [0.5 * FIGURE * text.length + 2, 0.5 * LINE];
+      const gaps = middles.map((one) => near(others, one)), clear = gaps.map((gap, k) => (gap > TIGHT ? Math.min(gap, near(border, middles[k])) : 0));
+      return { level: levels[n], path, middles, text, size, numbers: /** @type {number[][]} */ ([]), texts: /** @type {any[]} */ ([]), rooms: clear.some((gap) => gap > TIGHT) ? clear : gaps }; // clear of edges too, if there is such a place
     });
+    const add = ({ middles, rooms, numbers, texts, size, text }) => { // one more number, where it is clearest
+      const free = ([u, v]) => ![...this.written.map((one) => one.room), [...own, POINT, POINT]].some((one) => clash(one, [u, v, ...size])) && numbers.every(([a, b]) => Math.hypot(a - u, b - v) >= AGAIN);
+      const best = rooms.reduce((best, room, k) => (room > (rooms[best] ?? (numbers.length ? ROOMY : TIGHT)) && free(middles[k]) ? k : best), -1);
+      if (best < 0) return;
+      const [u, v] = middles[best];
+      numbers.push(middles[best]);
+      texts.push(centred("number", u, v, text));
+      this.written.push({ text: texts.at(-1), room: [u, v, ...size] });
+    };
+    const roomy = (one) => one.rooms.filter((gap) => gap > TIGHT).length, crowded = lines.slice().sort((a, b) => roomy(a) - roomy(b));
+    for (let n = 0; n < NUMBERS; n++) crowded.forEach(add); // those with few places first
+    const shown = lines.filter(({ numbers }) => numbers.length), known = shown.map(({ level }) => level); // a contour without a number tells nothing
+    this.lines.append(...shown.flatMap(({ path, texts }) => [svg("path", { d: path, "clip-path": `url(#${this.stripes}-clip)` }), ...texts]));
     const fine = (level, jump) => line(grid, level, width, height, { jump, exact, steep: 0, steps: FEW, bends: true }).path;
     this.refine(Array.from(this.lines.querySelectorAll("path")), (n) => (phrases ? fine(known[n], Infinity) : [0, UPPER].map((more) => fine(known[n] / (1 + known[n]) + more, 1)).join("")));
   }

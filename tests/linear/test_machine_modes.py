@@ -85,7 +85,7 @@ def test_modes_are_those_of_an_undamped_pair():
     assert fast.energy["links.screw"] == pytest.approx(0.5, rel=1e-7)
     assert fast.energy["bodies.motor"] == pytest.approx(0.5 * 5 / 7, rel=1e-6)
     assert fast.words() == (
-        "the motor oscillates, table by 40 % of that; 50 % of the energy is in the screw"
+        "the motor oscillates, table with 40 % of the largest amplitude; 50 % of the energy is in the screw"
         if fast.energy["links.screw"] >= fast.energy["bodies.motor"]
         else fast.words()
     )

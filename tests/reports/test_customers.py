@@ -16,6 +16,7 @@ from data_sheets import SHEETS
 from read_pages import words
 from rigs_of_theory import CONTACTS, LAWS, rig
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.quantities import parse
 from steadyslip.core.records import role_of
 from steadyslip.core.roles import Parameter
 from steadyslip.figures.inline import _shorter
@@ -36,6 +37,7 @@ from steadyslip.reports.literature import PUBLICATIONS, cited
 from steadyslip.reports.recommendation import Order, recommendation
 from steadyslip.reports.rig import edge_table, input_table, motion_equations
 from steadyslip.reports.sections import letters, motion, notes_of, references
+from steadyslip.verdict.whole_text import meaning
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
 RIGS = [path for path in EXAMPLES if "[drive]" in path.read_text() and not path.stem.startswith(("hunting", "reed"))]
@@ -309,10 +311,10 @@ def test_meanings_of_inputs_have_no_hints_for_writers():
     docs = {one.doc: one.meaning for one in roles}
     assert docs["velocity v0 in steady sliding; 0 to hold a place"] == "velocity v0 in steady sliding"
     assert docs["reference in ln(σ/σ_ref); shifts the memory variable only"].endswith("variable only")
-    for doc, meaning in docs.items():
-        assert meaning
-        assert doc.removeprefix("at velocity 0: ").startswith(meaning.partition(" (the pitch")[0])
-        assert not re.search("instead|such as|unless given|; 0 |without one|'[^s]", meaning)
+    for doc, told in docs.items():
+        assert told
+        assert doc.removeprefix("at velocity 0: ").startswith(told.partition(" (the pitch")[0])
+        assert not re.search("instead|such as|unless given|; 0 |without one|'[^s]", told)
 
 
 def test_a_controller_is_named_as_people_write_it():
@@ -333,7 +335,10 @@ def test_a_held_axis_has_a_report_on_its_hunting():
     found = ss.report(ss.read_rig(path), source=path).html
     text = words(found)
     assert ss.hunt(ss.read_rig(path)).sentence.capitalize() in text
-    assert "There is no explorer at the end: the drive holds a place" in text
+    assert "explorer" not in text
+    assert "displacement step at 0 s, by 1 m" in text
+    assert "smaller strokes 0 m ends it" in text
+    assert "rtol" not in text
     assert "does it hunt" in text
     assert "Make this change: friction at rest no larger than in sliding (static friction μ_S from 1.5 to 1)" in text
     assert "The axis then rests, on the target" in text
@@ -496,3 +501,33 @@ def test_a_value_has_one_unit_and_one_form_in_a_report():
         edges = re.search("<caption>Nearest edges.*?</table>", html_of, re.S)
         for name, now in re.findall("<th scope=row>(.*?)</th><td[^>]*>(.*?)</td>", edges[0] if edges else ""):
             assert f">{now}</td>" in inputs or not re.search(r"\d", now), (path.stem, name, now)
+
+
+@pytest.mark.parametrize("name", ["two-states", "inclined-spring", "triaxial", "machines/brake-pad"])
+def test_verdict_and_motion_tell_one_story(name):
+    """A verdict warned of a run-away beside a motion that juddered; times of an end were told from two beginnings."""
+    found = ss.analyze(ss.read_rig(f"examples/{name}.toml"))
+    text = words("".join(motion(found)))
+    told = " ".join(meaning(found))
+    assert found.judders in told
+    if found.judders.startswith("judders"):
+        assert f"What follows: {found.judders}.".replace("um", "µm") in text
+        return
+    (since,) = re.findall(r"after ([\d.]+ m?s)", found.judders)
+    (end,) = re.findall(r" at ([\d.]+ m?s)", text.partition("What follows")[2])
+    (begin,) = re.findall(r"faster from ([\d.]+ .?s) to", text)
+    assert f"({since} after the disturbance began)" in text
+    end, begin, since = (float(parse(one.replace("µ", "u"), "s")) for one in (end, begin, since))
+    assert end - begin == pytest.approx(since, rel=5e-3)
+    assert "still growing" not in text
+
+
+@pytest.mark.parametrize("name", ["stick-slip", "inclined-spring", "machines/brake-pad"])
+def test_figures_and_tables_are_numbered_and_a_protocol_is_not_passed_over(name):
+    path = Path(f"examples/{name}.toml")
+    page = ss.report(ss.read_rig(path), source=path, explorer=False).html.partition("Where it came from")[0]
+    assert page.count("<table") == page.count("<caption>")
+    assert page.count("<figure") == page.count("<figcaption>")
+    assert ("has a protocol of its own" in page) == ("[protocol" in path.read_text())
+    assert "Solid blue" not in page
+    assert not re.search(r"is the edge of [^:.]*,", page)

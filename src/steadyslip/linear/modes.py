@@ -26,7 +26,7 @@ from steadyslip.model.start import coordinate_speeds
 WORDS = {
     "oscillate": "oscillates|oscillate", "drift": "drifts|drift", "still": "hardly moves|hardly move",
     "opposed": " against each other", "the": "the {name}", "and": " and ", "normal": " (normal)",
-    "both": " (along and normal)", "share": "{name} by {share} of that",
+    "both": " (along and normal)", "share": "{name} with {share} of the largest amplitude",
     "energy": "; {share} of the energy is in the {name}", "most": " most, of {count} coordinates",
 }  # fmt: skip
 """Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,7 +20,7 @@ from steadyslip.files.specifications.read import read_whole, text_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
-from steadyslip.reports.elements import STYLE, heading, html_text, listing, paragraph, table, why
+from steadyslip.reports.elements import STYLE, heading, html_text, listing, paragraph, table
 
 _DOCUMENT_STYLE = """
 body { background: #fff; }
@@ -104,19 +105,17 @@ def document_html(
 ) -> str:
     """HTML text of a document; `sources` are the files that the result was computed from, `block` its title block."""
     source = sources[0] if sources else None
-    live, still = "", ""
+    live = ""
     if explorer and parts.rig is not None:
-        try:
+        with suppress(NotAvailable):  # such as of a drive that holds a place
             live = fragment(parts.rig, title, parts.branch, source_text(source))
-        except NotAvailable as refused:
-            still = paragraph(f"There is no explorer at the end: {why(refused)}.", "small")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
         '<article class="report steadyslip-told" role="' + ("region" if live else "main") + '" aria-label="report">'
         f"{_title_block(block)}"
         f'<p class="kind">{html_text(title)}</p><h1>{html_text(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
-        f"{''.join(parts.body)}{_provenance(_listings(parts, sources), sources)}{still}"
+        f"{''.join(parts.body)}{_provenance(_listings(parts, sources), sources)}"
         f'<div class="on-screen">{shown}</div></article>\n'
     )
     return document(f"{title} – steadyslip", _DOCUMENT_STYLE + STYLE + (style() if live else ""), article + live)

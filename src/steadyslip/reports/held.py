@@ -22,8 +22,8 @@ STIFFER = 2.0  # factor of all gains that is tried
 LONGER = 4.0  # length of the runs with changes over that of the run without, which bounds their computing time
 WHY = "it hunts because the integral winds up while friction at rest, larger than in sliding, holds the axis"
 HOLDS = (
-    "Each contact has one normal force, and bodies are rigid. The motion is simulated for the values below and one "
-    "step of the target; it says nothing of wear, heat or of what the laws leave out."
+    "Each contact has one normal force, and bodies are rigid. The motion is simulated for the values and the change of "
+    "target below; it says nothing of wear, heat or of what the laws leave out."
 )
 
 
@@ -102,7 +102,9 @@ def _cures(result: Hunt) -> Iterator[str]:
         (
             one.what,
             one.then.sentence.capitalize(),
-            f"{format_quantity(one.reach, unit)}, {one.reach / own:.2g} times as far as now" if one.reach else "0",
+            f"{format_quantity(one.reach, unit)}, {one.reach / own:.2g} times as far as now"
+            if one.reach
+            else f"0 {unit}",
             one.verdict(allowed),
         )
         for one in found

@@ -36,7 +36,8 @@ def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order:
         heading("How far is the edge?"), _verdict_figure(analysis), *rig_report.charts_over(analysis, order),
         *rig_report.edge_table(analysis), *rig_report.checks_line(analysis),
         *rig_report.tolerance_section(tolerated),
-        *motion(analysis), heading("The formulas"), *rig_report.motion_equations(machine), *references(machine),
+        *motion(analysis, source=order.source),
+        heading("The formulas"), *rig_report.motion_equations(machine), *references(machine),
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = f"{analysis.reason[:1].upper()}{analysis.reason[1:]}.{_settable_edge(analysis)}"
@@ -58,8 +59,8 @@ def _verdict_figure(analysis: Analysis) -> str:
     if far := undrawn_edges(analysis):
         names = ", ".join(said(analysis.rig, name) for name in far)
         words += (
-            f" Not drawn, but named below, is the edge of {names}: a factor of 100 away or more, or not of a "
-            "positive value."
+            f" Not drawn, but named below, {'are the edges' if len(far) > 1 else 'is the edge'} of {names}: a factor "
+            "of 100 away or more, or not of a positive value."
         )
     broad = figure_html(lambda: figures.machine_verdict(analysis), words, 8.0)
     narrow = column_html(lambda: figures.machine_verdict(analysis), words)  # the same, for a narrow window
@@ -71,7 +72,7 @@ def _verdict_section(analysis: Analysis) -> Iterator[str]:
     if analysis.steady is None:
         return
     yield table(
-        row for row in facts(analysis) if row[0] != "steady sliding"
+        (row for row in facts(analysis) if row[0] != "steady sliding"), caption="The verdict."
     )  # steady sliding has a table of its own below
     contacts = [
         (name, format_quantity(one.slip_rate, "m/s"), format_quantity(one.normal_force, "N"),
@@ -79,9 +80,11 @@ def _verdict_section(analysis: Analysis) -> Iterator[str]:
         for name, one in analysis.steady.contacts.items()
     ]  # fmt: skip
     yield heading("Steady sliding", 3)
-    yield table(contacts, ("contact", "slides at", "normal force", "friction force", "friction"))
+    yield table(
+        contacts, ("contact", "slides at", "normal force", "friction force", "friction"), caption="Steady sliding."
+    )
     yield heading("Eigenvalues", 3)
     roots = [s for s in analysis.eigenvalues if s.imag >= 0]
-    yield table(map(eigenvalue_row, roots[:_MAX_ROOTS]), EIGENVALUE_COLUMNS)
+    yield table(map(eigenvalue_row, roots[:_MAX_ROOTS]), EIGENVALUE_COLUMNS, caption="Eigenvalues.")
     if len(roots) > _MAX_ROOTS:
         yield paragraph(f"and {len(roots) - _MAX_ROOTS} more, which decay faster", "small")

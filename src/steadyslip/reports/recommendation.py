@@ -29,7 +29,6 @@ FAR = 10.0  # factor between a value and its change from which the change is nam
 SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
 _ROWS = 4  # changes that are recommended
 _STEPS = (1.1, 1.25, 1.5, 2.0)  # factors of a value that are tried to move a stable rig away from its edges (by trial)
-_LEFT_OUT = f"Left out, as they would have to change by more than a factor of {FAR:g}"
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def recommendation(
     sequence = "Changes that make it stable: settings first, then parts; the speed, which the task sets, last."
     yield table(rows, head, caption=sequence)
     if close and (far := [row.cells[0] for one, row in found.items() if one not in close]):
-        yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
+        yield _left_out(far)
 
 
 def _made_certain(
@@ -193,6 +192,13 @@ def _cured(
     yield from _windows(found, at, bool(adjustable))
 
 
+def _left_out(far: Sequence[str]) -> str:
+    """HTML on changes by more than a factor of `FAR`, which are named only."""
+    they = "they" if len(far) > 1 else "it"
+    text = f"Left out, as {they} would have to change by more than a factor of {FAR:g}: {', '.join(far)}."
+    return paragraph(text, "small")
+
+
 def _moved(rig: Any, window: Window, to: float | None) -> str:
     return f"{said(rig, window.parameter)} from {window.written(window.value)} to {window.written(to or 0.0)}"
 
@@ -213,7 +219,7 @@ def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
     )
     yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
     if far := [said(rig, one.parameter) for one in every if one not in able]:
-        yield paragraph(f"{_LEFT_OUT}: {', '.join(far)}.", "small")
+        yield _left_out(far)
     if without := [said(rig, one.parameter) for one in found.windows if not one.windows]:
         yield paragraph(f"Not enough alone, whatever the value within range: {', '.join(without)}.", "small")
 

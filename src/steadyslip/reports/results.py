@@ -209,7 +209,9 @@ def _hunt(result: Hunt, source: str = "") -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     words = "How far it is from its target, and the force of the drive, over time."
     body = [
-        *held.recommendation(result), heading("What was found"), text_html(worded(rig, rest)),
+        *held.recommendation(result), heading("What was done to it"), *protocol_table(rig, result.protocol),
+        paragraph("It is at rest before, and its target is where this puts it."),
+        heading("What was found"), text_html(worded(rig, rest)),
         figure(figure_html(lambda: hunting(result), words, 7.0), words),
         *rig_section(rig, source), *references(rig),
     ]  # fmt: skip

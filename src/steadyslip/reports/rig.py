@@ -69,12 +69,13 @@ def verdict_parts(
     speed = format_quantity(rig.drive.velocity, "m/s")
     body = [
         *recommendation(analysis, order, tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
-        heading("The rig"), figure(sketch(rig)), input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
-        heading("The verdict"), table(facts(analysis)),
+        heading("The rig"), figure(sketch(rig), "The rig."),
+        input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
+        heading("The verdict"), table(facts(analysis), caption="The verdict."),
         *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # the motion is below
         *_confidence_section(prediction), *tolerance_section(tolerated),
         heading("How far is the edge?"), *edge_table(analysis), *checks_line(analysis),
-        *_chart_section(analysis, order), *motion(analysis),
+        *_chart_section(analysis, order), *motion(analysis, source=order.source),
         heading("The formulas"), *formula_section(analysis), *references(rig),
     ]  # fmt: skip
     question = f"Will this rig slide steadily at {speed}, what would make it, and how far is it from the edge?"

@@ -28,12 +28,13 @@ from steadyslip.model.build import build_model
 from steadyslip.model.legend import legend, letters_in
 from steadyslip.model.numeric import has_structure
 from steadyslip.motion import History
+from steadyslip.motion.sentence import DIGITS
 from steadyslip.motion.status import BLOWN_UP
 from steadyslip.reports.elements import beside, figure, heading, inline_math, paragraph, table, why, with_subscripts
 from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
-from steadyslip.verdict.judder import STEP, motion_after
+from steadyslip.verdict.judder import STEP, grown, motion_after
 from steadyslip.verdict.words import PACE
 
 CUT_SHORT = "too many steps"
@@ -98,8 +99,11 @@ def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
             yield from _keys(one, f"{before}{name}.") if isinstance(one, dict) else [before + name]
 
 
-def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
-    """HTML of the motion after a small disturbance: time history and phase plane with the cycle."""
+def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> Iterator[str]:
+    """HTML of the motion after a small disturbance: time history and phase plane with the cycle.
+
+    Text of a file, `source`, tells whether it has a protocol, which is not what is shown.
+    """
     yield heading(title)
     rig: Any = analysis.rig
     try:
@@ -118,6 +122,11 @@ def motion(analysis: Analysis, title: str = "The motion") -> Iterator[str]:
         f"A small disturbance shows what the verdict means: {kick}, and at its own speed again from then on. The "
         f"{'machine' if rig.in_forces else 'rig'} itself is not changed. What follows: {_told(run, analysis)}."
     )
+    if "protocol" in tomllib.loads(source):
+        yield paragraph(
+            "The file of the rig has a protocol of its own. Its motion is not shown here, as the verdict is on small "
+            "disturbances, of which this one is the same for all rigs."
+        )
     over = "Motion after this disturbance, over time."
     words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
     if run.status == BLOWN_UP:
@@ -158,9 +167,14 @@ def _told(run: History, analysis: Analysis) -> str:
     """
     if run.sentence and run.status == CUT_SHORT:
         return f"{run.sentence} (simulated for {format_quantity(run.end, 's')})"
-    ended = [run.message.partition("; ")[0].replace("_", " ")] if run.status != "done" else []
-    if run.sentence or ended:
-        return "; then ".join([run.sentence, *ended] if run.sentence else ended)
+    if run.status != "done":
+        ended = run.message.partition("; ")[0].replace("_", " ")
+        pieces: Sequence[Any] = run.protocol.pieces
+        since = format_quantity(run.end - pieces[0].at, "s", DIGITS)
+        before = run.sentence if run.slip_events else grown(run)
+        return "; then ".join(filter(None, [before, f"{ended} ({since} after the disturbance began)"]))
+    if run.sentence:
+        return run.sentence
     steady: Any = getattr(analysis, "steady", None)
     speeds = {f"{name}.slip_rate": one.slip_rate for name, one in steady.contacts.items()} if run.rig.contacts else {}
     off = max(abs(run[name][-1] / own - 1) for name, own in (speeds or {"v": run.rig.drive.velocity}).items())

@@ -110,6 +110,12 @@ def _alike(events: list[AnySlip]) -> bool:
     )  # fmt: skip
 
 
+def grown(run: History) -> str:
+    """What a run without slip events did before it ended: its last swings, if they grew; empty if there are none."""
+    found = growing_swings(run.events, float(run["t"][-1]))
+    return joined(run.rig, {name: f"{GROWS[True]}, last between {speeds(one)}" for name, one in found.items()})
+
+
 def is_irregular(run: History) -> bool:
     """True if slips of each contact that slips go on in the last half of the run and vary without a trend.
 

@@ -26,6 +26,10 @@ from steadyslip.verdict.words import STABLE_MEANS, instead
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
 
+UNLIMITED = (
+    "Neither mass nor damping limits what grows: another disturbance may end in stick-slip or a run-away (blow-up)."
+)
+"""Line behind the simulated motion of an unstable rig whose velocity nothing limits."""
 MEANS = STABLE_MEANS.format(what="an oscillation or a run-away")
 """What the verdict "stable" leaves open of a slider."""
 AT_EDGE = {"at the edge": "oscillation with period {period}", "along the axis": "critical stiffness {critical}"}
@@ -142,6 +146,8 @@ def meaning(analysis: Findings) -> list[str]:
             lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
         return lines if analysis.onset is not None or analysis.kicks else lines[:1]
     if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away() and not _limited(analysis.rig):
+        if analysis.judders:
+            return [instead(analysis), UNLIMITED]
         return [
             "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
             "steadyslip simulate shows which.",

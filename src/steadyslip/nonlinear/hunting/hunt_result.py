@@ -224,7 +224,7 @@ class Hunt(ReadOnly):
             lines.append(f"controller      {low} to {high}")
         if told := self._encoder:
             lines.append(f"encoder         {told}")
-        accuracy = "exact pieces" if self.exact else f"rtol {self.rtol:g}"
+        accuracy = "exact pieces" if self.exact else f"integrated to a relative error of {self.rtol:g}"
         lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")
         if self.stopped:
             way = "a larger sample_time" if self.exact else "a larger sample_time or rtol"

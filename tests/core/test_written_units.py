@@ -16,10 +16,14 @@ from guide_and_seal import GUIDE_AND_SEAL
 from javascript import Script
 from steadyslip.core.dimensions import unit
 from steadyslip.core.format import digits_apart, format_quantity, own_units
+from steadyslip.core.quantities import parse
 from steadyslip.core.written import display_units
 from steadyslip.explorer.assembly import _data
 from steadyslip.explorer.equations import linear_part
+from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
+from steadyslip.files.specifications.write import stored_text
 from steadyslip.reports.brief import _results_table
+from steadyslip.reports.rig import input_table
 from steadyslip.verdict.words import told
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -123,6 +127,64 @@ def test_an_edge_and_its_value_are_told_at_the_load_of_their_contact():
         assert re.search(rf"seal\.friction\.viscous +240 N s/m at 60 N{then}[\d.]+ N s/m at 60 N", text)
     assert rig.load_of("contacts.seal.friction.viscous") == 60.0
     assert rig.load_of("bodies.carriage.mass") is None
+
+
+def _two_contacts(chance):
+    """File of a carriage on two contacts with loads, units and loads of bristles drawn at random, and its texts."""
+    names = {"v_stribeck": ("mm/s", "mm/min", "um/s"), "bristle_stiffness": ("N/um", "N/mm")}
+    text, written = "[bodies.carriage]\nmass = '35 kg'\n", {}
+    for contact in ("guide", "seal"):
+        load, at = (f"{chance.integers(1, 900)} {chance.choice(['N', 'kN'])}" for _ in range(2))
+        own = {name: f"{chance.integers(1, 900)} {chance.choice(units)}" for name, units in names.items()}
+        own["bristle_stiffness"] += f" at {at}"
+        text += f"[contacts.{contact}]\nbody = 'carriage'\ncontact = {{ law = 'constant', preload = '{load}' }}\n"
+        text += "friction = { law = 'lugre', mu_coulomb = 0.1, mu_static = 0.2, "
+        text += ", ".join(f"{name} = '{value}'" for name, value in own.items()) + " }\n"
+        written |= {f"contacts.{contact}.friction.{name}": value for name, value in own.items()}
+        written |= {f"contacts.{contact}.contact.preload": load}
+    speed = f"{chance.integers(1, 900)} {chance.choice(names['v_stribeck'])}"
+    text += f"[links.belt]\nbetween = ['drive', 'carriage']\nstiffness = '1 N/um'\n[drive]\nvelocity = '{speed}'\n"
+    return text, written | {"drive.velocity": speed}
+
+
+@pytest.mark.filterwarnings("ignore::steadyslip.core.errors.UnitWarning")
+def test_every_parameter_is_told_in_the_unit_and_at_the_load_of_its_own_text():
+    """With several units of a kind in a file; bristles of a nut at 6 kN were told at the 4 kN of another contact."""
+    chance = np.random.default_rng(33)
+    for _ in range(60):
+        text, written = _two_contacts(chance)
+        rig = ss.rig_from_text(text)
+        for one in (rig, rig.with_values({"bodies.carriage.mass": 40.0}), ss.rig_from_text(stored_text(rig))):
+            with display_units(one.written_in):
+                assert {name: told(one, name, one.value(name)) for name in written} == written
+        with display_units(rig.written_in):
+            for contact in ("guide", "seal"):  # what has no text is told at the load of its contact
+                load = rig.load_of(f"contacts.{contact}.friction.viscous")
+                shown = told(rig, f"contacts.{contact}.friction.viscous", 2.0)
+                force, _, at = shown.partition(" at ")
+                assert parse(at, "N") == pytest.approx(load)
+                assert parse(force, "N s/m") == pytest.approx(2.0 * load, rel=1e-3)
+
+
+def test_speeds_are_told_in_the_unit_of_the_drive():
+    """Of a file that has others too: that of a press at 0.8 mm/s was told as 48 mm/min."""
+    text = AXIS.replace('"0.5 mm/min"', '"0.01 mm/s"')
+    told = str(ss.analyze(ss.rig_from_text(text)))
+    assert "steady sliding at 0.01 mm/s" in told
+    assert re.search(r"v_stribeck +8 mm/min", told)
+
+
+def test_values_that_are_not_known_and_tolerances_are_told_at_the_load_of_the_file(tmp_path):
+    text = GUIDE_AND_SEAL.replace("0.4 N/um at 60 N", "0.4 ± 20 % N/um at 70 N")
+    path = tmp_path / "rig.toml"
+    path.write_text(text, encoding="utf-8")
+    rig, tolerances = rig_and_tolerances(path)
+    found = ss.tolerate(rig, tolerances)
+    assert "0.32 to 0.48 N/um at 70 N alone" in str(found)
+    with display_units(rig.written_in):
+        assert "0.4 N/µm at 70 N" in input_table(rig).replace("\xa0", " ")
+    found = ss.verdict.stable_within(rig, {"contacts.seal.friction.bristle_stiffness": (1e3, 1e4)})
+    assert "0.07 N/um at 70 N to 0.7 N/um at 70 N" in str(found)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import typer
 def _set_units(context: typer.Context, rig: Path) -> Path:
     """Set the output units to those used in the rig file."""
     from steadyslip.core.errors import ParameterError
+    from steadyslip.core.quantities import units_told
     from steadyslip.files.specifications.deviations import taken_out
     from steadyslip.files.specifications.read import text_of
     from steadyslip.files.specifications.toml import NotToml, tables_of
@@ -19,22 +20,23 @@ def _set_units(context: typer.Context, rig: Path) -> Path:
     with suppress(ParameterError, NotToml):  # problems of the file are reported when the rig is read
         tables = tables_of(text_of(rig))
         taken_out(tables)
-        _print_in(context, tables)
+        _print_in(context, units_told(tables))
     return rig
 
 
 def _add_units(context: typer.Context, changes: list[str] | None) -> list[str] | None:
     """Add the units of changed values to the output units."""
     if changes:
-        _print_in(context, [change.partition("=")[2].strip(" \"'") for change in changes])
+        from steadyslip.core.quantities import units_in
+
+        _print_in(context, units_in([change.partition("=")[2].strip(" \"'") for change in changes]))
     return changes
 
 
-def _print_in(context: typer.Context, values: Any) -> None:
-    from steadyslip.core.quantities import units_in
+def _print_in(context: typer.Context, names: set[str]) -> None:
     from steadyslip.core.written import display_units
 
-    context.with_resource(display_units(sorted(units_in(values))))
+    context.with_resource(display_units(sorted(names)))
 
 
 def _set_width(context: typer.Context, wanted: bool) -> bool:

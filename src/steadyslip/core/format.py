@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from steadyslip.core.areas import outside, told_area
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
-from steadyslip.core.written import display_load, display_names
+from steadyslip.core.written import display_as, display_names
 from steadyslip.units import day, hour, year
 
 _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "N s/mm"))}
@@ -78,12 +78,28 @@ def _is_own(name: str) -> bool:
 
 
 def _at_one_load(names: tuple[str, ...], load: float | None) -> tuple[str, ...]:
-    """Those units that are at the load nearest to `load` (N), or at the largest; all where none is at a load."""
-    if len(names) < 2 or " at " not in names[0]:
+    """Those units at a load (N), made where none is: at the largest for None, none for 0; all where none is at one."""
+    if not names or " at " not in names[0]:
         return names
     sizes = {name: 1 / unit(f"1 at {name.partition(' at ')[2]}")[0] for name in names}
-    nearest = min(sizes.values(), key=lambda one: abs(math.log(one / load)) if load else -one)
-    return tuple(name for name in names if sizes[name] == nearest)
+    wanted = max(sizes.values()) if load is None else load
+    if found := tuple(name for name in names if math.isclose(sizes[name], wanted, rel_tol=SAME_LOAD)):
+        return found
+    forces = dict.fromkeys(name.partition(" at ")[0] for name in names)
+    return tuple(f"{one} at {format_quantity(wanted, 'N')}" for one in forces) if wanted else ()
+
+
+def _named_unit(value: float, si_unit: str) -> str:
+    """Unit in which the file writes the parameter of the context; empty if it has none, or a value is too long in it.
+
+    Where scale is no matter, as with 1/m, no value is. Friction that is written per load is told as that of the file.
+    """
+    name, kind = display_as().unit, unit(si_unit)[1]
+    if not name or unit(name)[1] != kind or (kind in _PER_LOAD and " at " not in name):
+        return ""
+    longest = _LONGEST if _is_own(name) else _LONG
+    fits = value == 0 or _SCALED.match(si_unit) is None or _SHORTEST <= abs(value / unit(name)[0]) < longest
+    return name if fits else ""
 
 
 def _best(value: float, names: tuple[str, ...]) -> str | None:
@@ -95,6 +111,7 @@ _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it 
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 HIDDEN = 1e-3  # share of its error below which a value is told as 0: no digit of it is known
 MOST_DIGITS = 12  # of the ends of a narrow range; beyond, digits are rounding errors
+SAME_LOAD = 1e-9  # relative difference of loads that are the same but for rounding of their units
 _SHORTEST, _LONGEST = 1e-3, 1e5  # numbers between are written without exponent; others in the SI unit without prefix
 _LONG = 1e4  # from which a number takes another prefix than that of the file
 
@@ -130,8 +147,9 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
-    names = _at_one_load(units_for(si_unit, display_names()), display_load())
-    own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
+    names = _at_one_load(units_for(si_unit, display_names()), display_as().load)
+    own = _named_unit(value, si_unit) or (_best(value, names) if math.isfinite(value) else None)
+    own = own or next(iter(names), None)
     scaled = _SCALED.match(si_unit)
     longest = _LONGEST if own is not None and _is_own(own) else _LONG
     if si_unit == "rad" and own is None:
@@ -182,6 +200,8 @@ def written_unit(value: float, si_unit: str) -> str:
     ...     [written_unit(*one) for one in ((3200.0, "N"), (0.8, "N m/rad"), (9.3e5, "N m/rad"), (1.0, "m"))]
     ['kN', 'N m/rad', 'N m/arcsec', '']
     """
+    if named := _named_unit(value, si_unit):
+        return named
     if not _SCALED.match(si_unit) or not math.isfinite(value):
         return ""
     name = _best(value, tuple(sorted(_by_dimension(display_names()).get(unit(si_unit)[1], ()))))

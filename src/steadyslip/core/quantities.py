@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -248,6 +248,28 @@ def units_in(values: Any) -> set[str]:
             found.add(one.strip()[match.end() :].strip())
     found = {name for name in found if name and _is_unit(name)}
     return found | areas if found else found
+
+
+def units_told(tables: Mapping[str, Any]) -> set[str]:
+    """Units in which a rig file's results are told: those of its quantities, but of speeds that of its drive alone.
+
+    >>> sorted(units_told({"drive": {"velocity": "0.8 mm/s"}, "friction": {"v_stribeck": "60 mm/min", "d_c": "2 um"}}))
+    ['mm/s', 'um']
+    """
+    found, drive = units_in(tables), tables.get("drive")
+    speeds = units_in([drive.get("velocity")]) if isinstance(drive, Mapping) else set()
+    kinds = {unit(name)[1] for name in speeds}
+    return {name for name in found if name in speeds or unit(name)[1] not in kinds}
+
+
+def units_named(values: Mapping[str, Any]) -> dict[str, str]:
+    """Units of the quantities among texts, by the keys of those that have one.
+
+    >>> units_named({"bristles": "800 N/um at 6 kN", "viscous": 0.5})
+    {'bristles': 'N/um at 6 kN'}
+    """
+    found = {key: units_in([one]) for key, one in values.items() if isinstance(one, str)}
+    return {key: name for key, own in found.items() for name in own}
 
 
 def _is_unit(name: str) -> bool:

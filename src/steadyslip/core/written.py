@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _names: ContextVar[frozenset[str]] = ContextVar("names of units", default=frozenset())
-_load: ContextVar[float | None] = ContextVar("load of a contact", default=None)
 
 
 def display_names() -> frozenset[str]:
@@ -27,8 +26,8 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
     closest to 10. Units that differ from the default by a leading prefix alone, such as kN or um, have no effect on
     results, since a suitable prefix is chosen in any case; but speeds and all that turns keep theirs, from 0.001 to
     10 000 of it, forces and stresses that are in N or Pa alone those, and parameters what they were written in
-    (`steadyslip.core.format.format_as_written`). Friction per load is told at the largest load that is named, or that
-    which `of_load` picks.
+    (`steadyslip.core.format.format_as_written`). Friction per load is told at the load of `told_as`, or without one at
+    the largest that is named.
 
     >>> from steadyslip.core.format import format_quantity
     >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
@@ -60,25 +59,47 @@ def si_units() -> Iterator[None]:
         _names.reset(before)
 
 
-def display_load() -> float | None:
-    """Load of the contact of which quantities are told, N; None if it is not known."""
-    return _load.get()
+class WrittenAs(NamedTuple):
+    """How a file writes a parameter.
+
+    Attributes
+    ----------
+    unit : str
+        Empty if it is not known.
+    load : float or None
+        Load (N) at which friction per load is told without a unit; 0 where it is told per load, None if not known.
+    """
+
+    unit: str = ""
+    load: float | None = None
+
+
+_NOT_WRITTEN = WrittenAs()
+_written_as: ContextVar[WrittenAs] = ContextVar("how a parameter is written", default=_NOT_WRITTEN)
+
+
+def display_as() -> WrittenAs:
+    """How the file writes the parameter of which quantities are told."""
+    return _written_as.get()
 
 
 @contextmanager
-def of_load(load: float | None) -> Iterator[None]:
-    """Context in which friction per load is told at the one of several loads that is nearest to that of its contact, N.
+def told_as(written: WrittenAs) -> Iterator[None]:
+    """Context in which values of a parameter are told: in the unit in which the file writes it, or at its load.
 
     >>> from steadyslip.core.format import format_quantity
-    >>> with display_units(["N/um at 500 N", "N/um at 60 N"]), of_load(70.0):
+    >>> with display_units(["N/um at 500 N", "N/um at 60 N"]), told_as(WrittenAs(load=70.0)):
     ...     format_quantity(1000.0, "1/m"), format_quantity(1e5, "1/m")
-    ('0.06 N/um at 60 N', '6 N/um at 60 N')
+    ('0.07 N/um at 70 N', '7 N/um at 70 N')
+    >>> with display_units(["mm/s", "mm/min"]), told_as(WrittenAs("mm/s")):
+    ...     format_quantity(8e-4, "m/s")
+    '0.8 mm/s'
     """
-    before = _load.set(load)
+    before = _written_as.set(written)
     try:
         yield
     finally:
-        _load.reset(before)
+        _written_as.reset(before)
 
 
 def in_written_units(make: Callable[_P, _T]) -> Callable[_P, _T]:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.format import format_quantity, typeset
+from steadyslip.core.format import typeset
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, LINES, ORANGE, PURPLE, SKY, VERMILION
+from steadyslip.core.written import told_as
 from steadyslip.figures.style import axis_label, display_unit, given_panels, new_panels, parameter_label
 from steadyslip.linear import ModeChart
 
@@ -52,9 +53,10 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
         axes = given_panels(ax, (2,), "two, for frequencies and damping ratios")
     frequencies, ratios = found.frequencies, found.damping_ratios
     shown = found.least_damped
-    factor, unit = display_unit(
-        found.unit, float(np.max(np.abs(found.values))), found.rig.printed_area(found.parameter)
-    )
+    with told_as(found.rig.written_as(found.parameter)):
+        factor, unit = display_unit(
+            found.unit, float(np.max(np.abs(found.values))), found.rig.printed_area(found.parameter)
+        )
     values = found.values / factor
     high = float(np.nanmax(frequencies[:, shown]))
     scale, hertz = display_unit("Hz", high)
@@ -78,7 +80,7 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
         if own is not None and found.values[0] <= own <= found.values[-1]:
             one.axvline(own / factor, color=BLACK, linestyle=":", linewidth=1, label="_own")
     for edge in found.edges:
-        text = typeset(format_quantity(edge.value, found.unit, area=found.rig.printed_area(found.parameter)))
+        text = typeset(found.told(edge.value))
         axes[1].annotate(
             text, (edge.value / factor, 1), xycoords=("data", "axes fraction"), xytext=(3, -3),
             textcoords="offset points", va="top", fontsize="small",

@@ -26,6 +26,7 @@ from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, STABLE, UNSTABLE
 from steadyslip.core.records import records_in
 from steadyslip.core.version import version
+from steadyslip.core.written import told_as
 from steadyslip.linear.status import (
     ABSENT as ABSENT_CODE,
     STABLE as STABLE_CODE,
@@ -259,7 +260,8 @@ def _values_of(rig: Rig, names: Iterable[str]) -> Iterator[str]:
     for name in names:
         one = rig.parameters()[name]
         if one.value and np.ndim(one.value) == 0:
-            word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
+            with told_as(rig.written_as(name)):
+                word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
             yield _unbroken(f"{said(rig, name)} {typeset(word)}")
 
 

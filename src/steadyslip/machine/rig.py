@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
-from steadyslip.core.quantities import column_with_text, units_in
+from steadyslip.core.quantities import column_with_text, parse, units_in, units_named
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
+from steadyslip.core.written import WrittenAs
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.mechanism import Mechanism
@@ -63,6 +64,9 @@ class Rig(FrozenRecord, Keeper):
     read_from: ClassVar[str] = ""
     """Name of the file that the rig was read from, for a caption; no part of its value."""
 
+    units_named: ClassVar[Mapping[str, str]] = {}
+    """Units in which the file writes parameters, such as ``N/um at 6 kN``, by name; no part of the rig's value."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.written_in:  # of a copy by dataclasses.replace: its parts know the file
@@ -71,6 +75,11 @@ class Rig(FrozenRecord, Keeper):
     def named(self, file: str) -> Self:
         """The rig itself, which is told to be from this file from now on."""
         object.__setattr__(self, "read_from", file)
+        return self
+
+    def told_by(self, units: Mapping[str, str]) -> Self:
+        """The rig itself, of which parameters are told in these units from now on, by name."""
+        object.__setattr__(self, "units_named", dict(units))
         return self
 
     def told_in(self, names: Iterable[str]) -> Self:
@@ -175,6 +184,19 @@ class Rig(FrozenRecord, Keeper):
                 return abs(self.parameters()[pressed].value or 0.0) * area or None
         return None
 
+    def written_as(self, name: str) -> WrittenAs:
+        """Unit in which the file writes a parameter, and the load at which friction is told that it does not write.
+
+        The load is that of the contact, or where it is not known one that the file names for another parameter there,
+        or 0 without any, so that friction is told per load; None of what is of no contact.
+        """
+        prefix = next((own.prefix for own in self.laws_by_contact().values() if name.startswith(own.prefix)), None)
+        if prefix is None:
+            return WrittenAs(self.units_named.get(name, ""))
+        loads = (one.partition(" at ")[2] for other, one in self.units_named.items() if other.startswith(prefix))
+        beside = next((parse(load, "N") for load in loads if load), 0.0)
+        return WrittenAs(self.units_named.get(name, ""), self.load_of(name) or beside)
+
     def parameters(self) -> dict[str, Address]:
         """Parameters of the rig by dotted name: role, with the user's unit, and value (cached)."""
         return dict(_parameters(self))
@@ -276,7 +298,8 @@ class Rig(FrozenRecord, Keeper):
         if problems:
             raise ParameterError(problems)
         texts = {one for one in changes.values() if isinstance(one, str)}
-        return replaced(self, full).told_in((*self.written_in, *units_in(texts))).named(self.read_from)
+        copy = replaced(self, full).told_in((*self.written_in, *units_in(texts))).named(self.read_from)
+        return copy.told_by({**self.units_named, **units_named({self.resolve(n): one for n, one in changes.items()})})
 
 
 @question

@@ -19,7 +19,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord, parameters
-from steadyslip.core.written import si_units
+from steadyslip.core.written import WrittenAs, si_units, told_as
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.machine.machine import Machine
@@ -189,11 +189,12 @@ def _record_html(record: FrozenRecord) -> Iterator[str]:
         if one.value is not None:
             values = np.asarray(one.value)
             area = record.printed_area(path) if isinstance(record, Rig) else None
-            words = (
-                format_quantity(float(values), one.role.unit, 6, area)
-                if values.ndim == 0
-                else _format_array(values, one.role.unit, area)
-            )
+            with told_as(record.written_as(path) if isinstance(record, Rig) else WrittenAs()):
+                words = (
+                    format_quantity(float(values), one.role.unit, 6, area)
+                    if values.ndim == 0
+                    else _format_array(values, one.role.unit, area)
+                )
             rows.append((path, words, stress_name(one.role.doc, area)))
     yield table(rows, ("parameter", "value", "meaning"))
 

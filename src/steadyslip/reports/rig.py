@@ -15,6 +15,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_own, format_quantity
 from steadyslip.core.records import Address, choices
 from steadyslip.core.roles import PARAMETER_KINDS
+from steadyslip.core.written import told_as
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import column_html, figure_html
@@ -98,11 +99,13 @@ def input_table(
     for name, letter in letters_of_inputs.items():
         one = inputs[name]
         known = inline_math(sp.Symbol(letter))
+        with told_as(rig.written_as(name)):
+            text = format_own(float(one.value or 0.0), one.role.unit, rig.printed_area(name))
         rows.append(
             (
                 words_of(rig, name),
                 known,
-                format_own(float(one.value or 0.0), one.role.unit, rig.printed_area(name)),
+                text,
                 stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)),
                 *((tolerances.get(name, "none given"),) if tolerances else ()),
                 *((_remark(notes, name),) if notes else ()),

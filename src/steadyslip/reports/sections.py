@@ -16,7 +16,7 @@ from steadyslip import figures
 from steadyslip.core.areas import outside, stress_name
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import QuantityError, SteadyslipError
-from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.format import format_quantity
 from steadyslip.core.records import records_in
 from steadyslip.figures.inline import column_html
 from steadyslip.linear.formula import MEANINGS
@@ -35,7 +35,7 @@ from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, grown, motion_after
-from steadyslip.verdict.words import PACE
+from steadyslip.verdict.words import PACE, told_range
 
 CUT_SHORT = "too many steps"
 _LONGEST_UNIT = 12  # characters of a comment that may be a unit: N m s/rad has 9
@@ -55,11 +55,9 @@ def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -
 
 def tolerances_of(found: Tolerated | None) -> dict[str, str]:
     """Text of the tolerance of each parameter by name."""
-    return (
-        {}
-        if found is None
-        else {one.parameter: format_range(one.low, one.high, one.unit, one.area) for one in found.alone}
-    )
+    return {} if found is None else {
+        one.parameter: told_range(found.rig, one.parameter, one.low, one.high) for one in found.alone
+    }  # fmt: skip
 
 
 def notes_of(text: str) -> dict[str, str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from steadyslip.core.format import digits_apart, format_like
 from steadyslip.core.pages import Displayed
-from steadyslip.core.written import of_load
+from steadyslip.core.written import WrittenAs, told_as
 from steadyslip.linear.nearness import doublings, ends_about
 
 LEAST = 1e-12  # smallest value searched over the largest, of a parameter that is zero
@@ -38,7 +38,8 @@ class Window(Displayed):
     area: float | None = field(default=None, repr=False)
     told: tuple[float, str] | None = field(default=None, repr=False)
     """Factor and unit in which the values are told; those of `Rig.told`."""
-    load: float | None = field(default=None, repr=False)
+    written_as: WrittenAs = field(default=WrittenAs(), repr=False)
+    """How the rig's file writes the parameter."""
     beyond: tuple[str, float] | None = None
     """Side (above, below) and value of an edge outside `limits`, beyond which the rig without tolerances is stable."""
 
@@ -91,6 +92,6 @@ class Window(Displayed):
         if 0 == self.limits[0] < value < LEAST * self.limits[1]:
             return "anything above 0"  # the edge is 0 itself, as for the damping of a machine that nothing damps yet
         factor, unit = self.told or (1.0, self.unit)
-        with of_load(self.load):
+        with told_as(self.written_as):
             digits = digits_apart(value, self.value if beside is None else beside)
             return format_like(value * factor, self.value * factor, unit, digits, self.area)

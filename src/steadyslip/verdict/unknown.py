@@ -16,6 +16,7 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.written import WrittenAs, told_as
 from steadyslip.linear.status import STABLE, status
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -49,10 +50,13 @@ class ValuesWithin(Displayed):
     high: float
     values: tuple[tuple[float, float], ...]
     load: float | None = None
+    written_as: WrittenAs = field(default=WrittenAs(), repr=False)
+    """How the rig's file writes the parameter."""
 
     def shown(self, value: float) -> str:
         """Format a value with its unit; per load also as the contact has it."""
-        text = format_quantity(value, self.unit)
+        with told_as(self.written_as):
+            text = format_quantity(value, self.unit)
         if self.load is None or self.unit not in PER_LOAD or " at " in text:
             return text
         whole = format_quantity(value * self.load, PER_LOAD[self.unit])
@@ -192,7 +196,7 @@ def _values(rig: Slider | Machine, name: str, low: float, high: float) -> Values
         left, right = np.where(same, middle, left), np.where(same, right, middle)
     ends = [low, *spread_over(low, high, (left + right) / 2).tolist(), high]
     parts = tuple((a, b) for i, (a, b) in enumerate(pairwise(ends)) if bool(found[0]) != bool(i % 2))
-    return ValuesWithin(name, rig.parameters()[name].role.unit, low, high, parts, _load(rig))
+    return ValuesWithin(name, rig.parameters()[name].role.unit, low, high, parts, _load(rig), rig.written_as(name))
 
 
 def _load(rig: Slider | Machine) -> float | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
 from steadyslip.core.format import digits_apart, format_as_written, format_growth, format_quantity, format_range
-from steadyslip.core.written import of_load
+from steadyslip.core.written import told_as
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.machine.letters import said
 from steadyslip.verdict.reasons import NEXT_TO_IT
@@ -114,14 +114,14 @@ def told(rig: Rig, name: str, value: float, beside: float | None = None) -> str:
     """Value of a parameter in words, with as many digits as tell it from another `beside` it."""
     digits = 4 if beside is None else digits_apart(value, beside)
     own, (number, unit) = rig.told(name, rig.parameters()[name].value or 0.0)[0], rig.told(name, value)
-    with of_load(rig.load_of(name)):
+    with told_as(rig.written_as(name)):
         return format_as_written(number, own, unit, digits, area=rig.printed_area(name))
 
 
 def told_range(rig: Rig, name: str, low: float, high: float) -> str:
     """Range of a parameter in words."""
     (first, unit), (last, _) = rig.told(name, low), rig.told(name, high)
-    with of_load(rig.load_of(name)):
+    with told_as(rig.written_as(name)):
         return format_range(first, last, unit, rig.printed_area(name))
 
 

@@ -24,7 +24,7 @@ from steadyslip.core.errors import (
 )
 from steadyslip.core.format import enumerated
 from steadyslip.core.options import checked
-from steadyslip.core.quantities import parse, units_in
+from steadyslip.core.quantities import parse, units_in, units_named, units_told
 from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter
 from steadyslip.core.tolerances import Tolerance
@@ -255,8 +255,10 @@ def read_contents(
     found = read_tables(tables, key_lines(text), source, changes, further, complete, rig_needed)
     first, _, rest = text.partition("\n")
     if found.rig is not None and rest and first.startswith(TOLD_IN):
-        names = filter(None, first.removeprefix(TOLD_IN).split("; "))
-        found.rig.told_in(sorted(units_in([f"1 {name}" for name in names])))
+        names = [one.split(" = ") for one in first.removeprefix(TOLD_IN).split("; ") if one]
+        found.rig.told_in(sorted(units_in([f"1 {own}" for own, *of in names if not of])))
+        own = {name: f"1 {one[0]}" for name, *one in names if one}
+        found.rig.told_by(units_named({name: one for name, one in own.items() if name in found.rig.parameters()}))
     return found
 
 
@@ -291,7 +293,8 @@ def read_tables(
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
     if rig is not None:
-        rig.told_in(sorted(units_in(tables))).named(Path(source).name if source.endswith(".toml") else "")
+        rig.told_in(sorted(units_told(tables))).named(Path(source).name if source.endswith(".toml") else "")
+        rig.told_by(units_named({name: raw for name, (raw, _) in reader.questioned.items()}))
         faults += wrong_ends(rig, tolerances)
         if rig.written_in:  # numbers alone are SI units, as programs write them
             question_values(rig, reader.questioned, units_in(tables))

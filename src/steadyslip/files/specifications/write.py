@@ -106,8 +106,8 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
 
 
 def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
-    """Text of `rig_to_text` for stored results, with the units in which the rig is told, perhaps none."""
-    units = "; ".join(sorted(rig.written_in))
+    """Text of `rig_to_text` for stored results, with the units in which the rig and its parameters are told."""
+    units = "; ".join([*sorted(rig.written_in), *(f"{name} = {one}" for name, one in rig.units_named.items())])
     return f"{TOLD_IN}{units}\n{rig_to_text(rig, protocol)}"
 
 

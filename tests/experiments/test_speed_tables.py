@@ -5,13 +5,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
+from scipy.special import stdtrit
 from scipy.stats import binom
 
 import steadyslip as ss
 from command import run as command
 from steadyslip.core.quantities import parse
-from steadyslip.experiments.fitting.speed_fit import fit_loop, loop_forces
+from steadyslip.experiments.fitting.speed_fit import LEVELS, fit_loop, loop_forces
+from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET, steady_curve
 from steadyslip.experiments.measured.speeds import PreslidingLoop, read_speed_table
+from steadyslip.experiments.numerics.profiled import intervals, least
 from steadyslip.files.specifications.unknowns import read_unknowns
 from steadyslip.verdict import stable_within
 
@@ -70,6 +74,87 @@ def test_intervals_cover(errors):
 @pytest.mark.campaign
 def test_intervals_of_a_thousand_tables_cover():
     assert within_bounds(hits := covered(1000, 1), 1000), hits
+
+
+NARROW_VALLEYS = """n [1/min];M [Nm];Last [Nm]
+10;1,4;0\n30;1,2;0\n90;0,9;0\n300;0,7;0\n900;0,6;0
+10;2,4;10\n30;2,1;10\n90;1,7;10\n300;1,4;10\n900;1,2;10
+"""
+
+
+def test_an_end_is_where_the_sum_of_squares_has_risen_enough(tmp_path):
+    """Of a table whose search at far values ends in another valley: its 95 % interval ended at the estimate."""
+    (path := tmp_path / "t.csv").write_text(NARROW_VALLEYS)
+    found = ss.experiments.fit_friction_table(path, "lugre")
+    for one in found.main.estimates:
+        assert one.low <= one.likely[0] <= one.value <= one.likely[1] <= one.high
+    speed, torque = np.tile([10, 30, 90, 300, 900], 2) * np.pi / 30, found.main.friction
+    load, end = np.repeat([0.0, 10.0], 5), found["mu_coulomb"].high
+
+    def residuals(free):
+        mu_static, scale, viscous, exponent, preload, damping = free
+        mu = curve(speed, end, mu_static, np.exp(scale), viscous, exponent)
+        return np.log(((load + preload) * mu + damping * speed) / torque)
+
+    best = least_squares(residuals, [0.15, 1.9, 0, 0.6, 10, 0], x_scale=[0.1, 1, 1e-4, 0.3, 5, 1e-3], ftol=1e-12,
+                         bounds=([end, -20, 0, 0.02, 0, 0], [5, 8, 1, 10, 50, 10]))  # fmt: skip
+    rise = 2 * best.cost / found.main.scatter**2 - found.main.freedom
+    assert rise == pytest.approx(stdtrit(found.main.freedom, 0.975) ** 2, rel=0.02)
+
+
+def ends_of_random_tables(count, seed):
+    """Ends at which SciPy finds another rise, and the number of all: one or two loads, 0.5 or 2 % noise."""
+    chance, wrong, every = np.random.default_rng(seed), [], 0
+    for k in range(count):
+        n, loads = chance.integers(6, 11), chance.integers(1, 3)
+        speed = np.tile(np.sort(10 ** chance.uniform(-4, 0, n)), loads)
+        load = np.repeat([1000.0, 3000.0][:loads], n)
+        falls = 0.1 + 0.2 * chance.uniform(), 10 ** chance.uniform(-3, -1), 0.01 * 10 ** chance.uniform(-1, 1)
+        exact = (load + 300 * (loads - 1)) * curve(speed, 0.1, *falls, chance.uniform(0.4, 2))
+        force = exact * np.exp(chance.choice([0.005, 0.02]) * chance.normal(size=len(speed)))
+        held = {"stribeck_exponent": 2.0} if chance.integers(2) else {}
+        shape = steady_curve(ss.laws.LuGre, 0.01, held, (OFFSET, DAMPING) if loads > 1 else ())
+        low, high = shape.bounds(speed, load, force)
+
+        def residuals(inner, shape=shape, rows=(speed, load, force)):
+            return shape.residuals(inner, *rows, True)
+
+        starts = shape.starts(speed, load, force, True)
+        found, ends = intervals(least(residuals, starts, low, high), LEVELS)
+        limits = [float(stdtrit(found.freedom, 0.5 + level / 2)) for level in LEVELS]
+        for i, levels in enumerate(ends):
+            (low68, high68), (low95, high95) = levels
+            assert low95 <= low68 <= found.at[i] <= high68 <= high95, (k, shape.free[i], levels)
+            free = np.arange(len(low)) != i
+            for end, limit in [(end, t) for both, t in zip(levels, limits, strict=True) for end in both]:
+                if np.isfinite(end):
+                    ssq = min(refitted(residuals, start, end, free, low, high) for start in [found.at, *starts])
+                    rise = np.sqrt(max(ssq - found.ssq, 0.0) / found.variance)
+                    every += 1
+                    wrong += [] if rise == pytest.approx(limit, rel=0.02) else [(k, shape.free[i], end, rise, limit)]
+    return wrong, every
+
+
+def refitted(residuals, start, end, free, low, high):
+    """Least sum of squares with one parameter fixed, from a start, by SciPy."""
+
+    def parts(own, which):
+        inner = np.full(len(free), end)
+        inner[free] = own
+        return residuals(inner)[which]
+
+    own = np.clip(start[free], low[free], high[free])
+    found = least_squares(lambda x: parts(x, 0), own, lambda x: parts(x, 1)[:, free], (low[free], high[free]),
+                          x_scale="jac", max_nfev=300)  # fmt: skip
+    return 2 * found.cost
+
+
+@pytest.mark.campaign
+def test_ends_of_random_tables_are_where_the_sum_of_squares_has_risen_enough():
+    """But for one in a hundred, of tables that hardly tell a parameter: valleys that no start leads to."""
+    wrong, every = ends_of_random_tables(40, 3)
+    assert every > 300
+    assert len(wrong) <= every / 100, wrong
 
 
 def test_a_table_without_noise_gives_its_parameters():

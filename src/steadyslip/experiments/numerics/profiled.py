@@ -19,7 +19,8 @@ Residuals = Callable[[Array], tuple[Array, Array]]
 TOLERANCE = 1e-10  # relative, of a search's sum of squares and step: far below noise
 MOST_EVALUATIONS = 200  # of one search; dozens suffice
 FIRST_DAMPING, EASED, MOST_DAMPING = 1e-4, 10.0, 1e10  # of the descent, relative to the squared slopes
-MOST_STEPS = 40  # outward steps of an end of an interval, each half as long again: over all bounds
+MOST_STEPS, FURTHER = 40, 1.5  # outward steps of an end of an interval, each half as long again: over all bounds
+CLOSE = 0.01  # by how much of its limit the rise at an end may fall short after a search from all starts
 PRECISION = 1e-3  # of the ends of intervals, as a share of their width: three digits of an error are enough
 BETTER = 1e-6  # relative fall of the sum of squares that counts as another minimum
 EXACT = 1e-20  # mean square residual below which there is no noise to estimate, only rounding
@@ -35,6 +36,8 @@ class ProfiledMinimum:
     ssq : float
     low, high : ndarray (p,)
         Bounds.
+    starts : list of ndarray (p,)
+        From which other valleys are searched for.
     """
 
     residuals: Residuals
@@ -42,6 +45,7 @@ class ProfiledMinimum:
     ssq: float
     low: Array
     high: Array
+    starts: list[Array]
 
     @property
     def freedom(self) -> int:
@@ -76,7 +80,7 @@ def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) ->
         lambda at: residuals(at)[0], np.clip(start, low, high), lambda at: residuals(at)[1], bounds=(low, high),
         x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return ProfiledMinimum(residuals, found.x, float(2 * found.cost), low, high)
+    return ProfiledMinimum(residuals, found.x, float(2 * found.cost), low, high, starts)
 
 
 def _descended(residuals: Residuals, start: Array, low: Array, high: Array, free: Array) -> tuple[Array, float]:
@@ -141,51 +145,86 @@ def intervals(minimum: ProfiledMinimum, levels: tuple[float, ...]) -> tuple[Prof
             ends = [_ends(minimum, i, limits) for i in range(len(minimum.at))]
             return minimum, np.array(ends)
         except _Improved as better:
-            minimum = least(minimum.residuals, [better.at], minimum.low, minimum.high)
+            starts = [better.at, *minimum.starts]
+            minimum = least(minimum.residuals, starts, minimum.low, minimum.high)
     return minimum, np.full((len(minimum.at), len(levels), 2), (-np.inf, np.inf))
 
 
 def _ends(minimum: ProfiledMinimum, i: int, limits: list[float]) -> Array:
-    """Ends of the intervals of one parameter (levels, 2) at limits of t."""
+    """Ends of the intervals of one parameter (levels, 2) at rising limits of t."""
     error = float(np.sqrt(minimum.covariance()[i, i]))
     own = float(minimum.at[i])
     if minimum.variance < EXACT and np.isfinite(error):
         return np.array([[own - t * error, own + t * error] for t in limits])
     width = float(minimum.high[i] - minimum.low[i])
     step = error if 0 < error < width else 0.01 * width
-    return np.array([[_end(minimum, i, t, side * step) for side in (-1.0, 1.0)] for t in limits])
+    sides = []
+    for side in (-1.0, 1.0):
+        profile = _Profile(minimum, i)
+        lengths = [abs(_end(profile, t, side * t * step) - own) for t in limits]
+        sides.append(own + side * np.maximum.accumulate(lengths))  # ends of one steep rise may differ by rounding
+    return np.array(sides).T
 
 
-def _end(minimum: ProfiledMinimum, i: int, limit: float, step: float) -> float:
-    """Value beyond which the sum of squares exceeds its least by t² times the variance; infinite without one."""
+class _Profile:
+    """Rise of the least sum of squares over one parameter, as t: the root of its ratio to the variance.
+
+    A value is searched for from the nearest known ones of both sides, so that no search that went astray leads the
+    next ones; `check` also searches it from everywhere.
+    """
+
+    def __init__(self, minimum: ProfiledMinimum, i: int) -> None:
+        self.minimum, self.place, self.own = minimum, i, float(minimum.at[i])
+        self._at = {self.own: minimum.at}
+        self.known = {self.own: 0.0}  # rise by value
+
+    def rise(self, value: float) -> float:
+        if value not in self.known:
+            near = (
+                max((x for x in self.known if x < value), default=None),
+                min((x for x in self.known if x > value), default=None),
+            )
+            self._search(value, [self._at[x] for x in near if x is not None])
+        return self.known[value]
+
+    def check(self, value: float) -> float:
+        """Rise at a known value from all starts; where it is another, values beyond it are forgotten."""
+        before, at = self.known[value], self._at[value]
+        self._search(value, [at, self.minimum.at, *self.minimum.starts])
+        if self.known[value] < before * (1 - PRECISION):
+            self.known = {x: r for x, r in self.known.items() if abs(x - self.own) <= abs(value - self.own)}
+        return self.known[value]
+
+    def _search(self, value: float, starts: list[Array]) -> None:
+        own, free = self.minimum, np.arange(len(self.minimum.at)) != self.place
+        searches = [_descended(own.residuals, np.where(free, one, value), own.low, own.high, free) for one in starts]
+        at, ssq = min(searches, key=lambda one: one[1])
+        if ssq < own.ssq * (1 - BETTER):
+            raise _Improved(at)
+        self._at[value], self.known[value] = at, float(np.sqrt(max(ssq - own.ssq, 0.0) / own.variance))
+
+
+def _end(profile: _Profile, limit: float, step: float) -> float:
+    """Farthest value at which a profile rises to a limit; infinite where it does not within bounds."""
     from scipy.optimize import brentq
 
-    own, bound = float(minimum.at[i]), float(minimum.low[i] if step < 0 else minimum.high[i])
-    last, free = minimum.at, np.arange(len(minimum.at)) != i
-
-    def excess(value: float) -> float:
-        nonlocal last
-        start = last.copy()
-        start[i] = value
-        at, ssq = _descended(minimum.residuals, start, minimum.low, minimum.high, free)
-        if ssq < minimum.ssq * (1 - BETTER):
-            raise _Improved(at)
-        last = at
-        return float(np.sqrt(max(ssq - minimum.ssq, 0.0) / minimum.variance)) - limit
-
-    inner, size = own, limit * step
-    known = {own: -limit}  # computed again from other starts, values that are rounding may have the other sign
+    own, minimum = profile.own, profile.minimum
+    bound, far = float((minimum.low if step < 0 else minimum.high)[profile.place]), float(np.copysign(np.inf, step))
+    size = step
     for _ in range(MOST_STEPS):
-        outer = own + size
-        beyond = outer <= bound if step < 0 else outer >= bound
-        outer = bound if beyond else outer
-        known[outer] = excess(outer)
-        if known[outer] >= 0:
-            if inner == own:
-                last = minimum.at
-            found = brentq(lambda x: known[x] if x in known else excess(x), inner, outer, xtol=PRECISION * abs(size))
-            return float(found)
-        if beyond:
+        outer = max(own + size, bound) if step < 0 else min(own + size, bound)
+        size *= FURTHER
+        if profile.rise(outer) < limit:
+            if outer == bound:
+                break
+            continue
+        inner = max((x for x, rise in profile.known.items() if rise < limit), key=lambda x: abs(x - own))
+        beyond = [x for x in profile.known if abs(x - own) > abs(inner - own)]
+        if not beyond:
             break
-        inner, size = outer, 1.5 * size
-    return float(np.copysign(np.inf, step))
+        outer = min(beyond, key=lambda x: abs(x - own))
+        end = float(brentq(lambda x: profile.rise(x) - limit, inner, outer, xtol=PRECISION * abs(outer - own)))
+        if profile.check(end) > limit * (1 - CLOSE):
+            return end
+        size = FURTHER * (end - own)
+    return far

@@ -1,6 +1,7 @@
 """Every public kind of result is asked for its HTML, as notebooks ask."""
 
 import functools
+import json
 import tempfile
 from pathlib import Path
 
@@ -117,6 +118,8 @@ def shows_itself(name):
     assert type(found).__name__ == name.partition(" ")[0]
     if name != "MapResult":  # whose folder is gone; it was asked
         assert len(found._repr_html_()) > 100
+    if hasattr(found, "to_dict"):
+        json.dumps(found.to_dict(), allow_nan=False)
 
 
 def test_no_kind_of_result_is_left_out():

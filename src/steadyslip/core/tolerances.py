@@ -27,7 +27,7 @@ _APART = re.compile(
     rf"-\s*(?P<below>{_NUMBER})\s*(?P<below_share>%)?(?P<last>.*)"
 )
 _RANGE = re.compile(rf"(?P<low>{_SIGNED})\s*\.\.\s*(?P<high>{_SIGNED})(?P<last>.*)")
-_MARK = re.compile(r"±|\d\s*\.\.|\(normal\)")
+_MARK = re.compile(r"±|\d\s*\.\.|\(\w+\)|\d\s*(?:to|-|–)\s*\d|[-+]\s*[\d.]+\s*%")
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,10 @@ def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
         raise decimal_comma(text)
     if found := _RANGE.fullmatch(plain):
         return _range(found, text, normal)
-    if found := _SAME.fullmatch(plain):
+    if (found := _SAME.fullmatch(plain) or _APART.fullmatch(plain)) and "%" in found["last"]:
+        raise QuantityError(f"{repr_short(text)}: the per cent sign stands behind its number; write for example {EXAMPLES}")
+    same = _SAME.fullmatch(plain)
+    if (found := same) and "(" not in found["last"]:
         width, unit = _width(found["width"], found["share"], found)
         return f"{found['value']} {unit}".strip(), Tolerance(width, width, normal)
     if found := _APART.fullmatch(plain):

@@ -212,7 +212,7 @@ def _result(
     force = "N m" if rig.drive.turns else rig.result_unit("Pa")
     return Hunt(
         rig=rig, protocol=protocol, hunts=hunts, lowest=ratio * float(seen.min()), highest=ratio * float(seen.max()),
-        period=float(period), repeats=bool(count), runs_away=motion.runs_away,
+        period=float(period), repeats=bool(count), runs_away=bool(motion.runs_away),
         strokes=tuple(_told(one, ratio) for one in strokes), time=table[:, 0], error=ratio * table[:, 1],
         velocity=ratio * table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol, settled_at=float(settled),
         unit="rad" if turns else "m", force_unit=force, version=version(), scatter=ratio * scatter,

@@ -13,6 +13,7 @@ from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, ONE_MEMORY, STICKING, plain_guide, rig
 from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
+from steadyslip.motion.events import Event, slip_events
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.motion.sentence import growing_swings, sentence, steady_swings
 
@@ -309,6 +310,38 @@ def test_ringing_is_told_beside_a_slip_event(changes, slip, drop, recurrence, ri
     assert many["event_rings"] == rings
     assert many["event_slip"] == pytest.approx(last.slip, rel=1e-5)
     assert many["event_ring_frequency"] == pytest.approx(last.ring_frequency, rel=1e-4, nan_ok=True)
+
+
+@pytest.mark.parametrize("knock", ["pulse", "traverse"])
+def test_judder_after_a_knock_is_told_as_judder(knock):
+    """It sheds a tenth of what the knock did, and was counted as its ringing to the end of the run."""
+    a_rig = plain_guide()
+    plan = [ss.protocol.DisturbancePulse(at=1.0, by=6e3 / a_rig.area, duration=0.2)]
+    if knock == "traverse":
+        feed = a_rig.drive.velocity
+        plan = [ss.protocol.VelocityStep(at=1.0, to=20 / 60), ss.protocol.VelocityStep(at=1.2, to=feed)]
+    run = ss.simulate(a_rig, plan, until=45.0)
+    last = run.slip_events[-1]
+    assert (last.slip, last.stress_drop * 0.02) == pytest.approx((3.3218e-5, 393.5467), rel=1e-3)
+    assert last.recurrence == pytest.approx(4.9244285, rel=1e-4)
+    assert run.sentence.startswith(
+        "judders: every 4.92 s it sticks, then slips 33.2 um within 50.7 ms, a drop of 394 N"
+    )
+    first, *again = [one.recurrence for one in run.slip_events if one.begin > 15.0]
+    assert np.isnan(first)
+    assert again == pytest.approx([4.9244285] * len(again), rel=1e-3)
+    assert len(again) + 1 == int((45.0 - 15.0) / 4.9244285)
+
+
+def test_a_short_pause_among_long_ones_does_not_end_judder():
+    """Of irregular events the last two may be close to each other."""
+    events = []
+    for begin in np.cumsum([5.0, 1.0, 0.7, 0.8, 0.03]):
+        events += [Event("slip begins", begin, 1.0, 1.0, 1.0, 1.0, begin),
+                   Event("slip ends", begin + 0.01, 0.1, 1.0, 1.0, 0.5, begin + 1e-3)]  # fmt: skip
+    slips = slip_events(events)
+    assert "judders" in sentence(events, slips, end=8.0)
+    assert "no more after" in sentence(events, slips, end=10.0)
 
 
 def test_backward_strokes_mirror_forward_ones():

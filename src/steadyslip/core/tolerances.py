@@ -69,7 +69,9 @@ def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
     if found := _RANGE.fullmatch(plain):
         return _range(found, text, normal)
     if (found := _SAME.fullmatch(plain) or _APART.fullmatch(plain)) and "%" in found["last"]:
-        raise QuantityError(f"{repr_short(text)}: the per cent sign stands behind its number; write for example {EXAMPLES}")
+        raise QuantityError(
+            f"{repr_short(text)}: the per cent sign stands behind its number; write for example {EXAMPLES}"
+        )
     same = _SAME.fullmatch(plain)
     if (found := same) and "(" not in found["last"]:
         width, unit = _width(found["width"], found["share"], found)

@@ -15,7 +15,18 @@ from steadyslip.explorer.programs import program
 from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
-from steadyslip.kernels.layout import LOG_COLUMNS, NUMBER, SETTINGS, Cursor, Final, Kind, Out, Recorded, Setting
+from steadyslip.kernels.layout import (
+    EVENT_SHARE,
+    LOG_COLUMNS,
+    NUMBER,
+    SETTINGS,
+    Cursor,
+    Final,
+    Kind,
+    Out,
+    Recorded,
+    Setting,
+)
 from steadyslip.kernels.nodes import Program, as_node
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
@@ -130,6 +141,7 @@ def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str,
         "contacts": [contact.name for contact in model.contacts],
         "bodies": _bodies(reduction) if model.contacts[0].name else [],
         "kinds": len(LOG_KINDS) - 2,
+        "share": EVENT_SHARE,
         "constants": len(kernel.constants.symbols),
         "all": len(kernel.constants.all),
         "kept": len(reduction.continuous),

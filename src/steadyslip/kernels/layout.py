@@ -57,19 +57,21 @@ class Row(IntEnum):
     # slip in progress that may become a slip event, with its sign: state at its lowest speed
     NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN, NOW_SIGN = 58, 59, 60, 61, 62
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 63, 64, 65, 66, 67, 68
-    Z_OLD = 69
+    # end of the last fast forward slip; of those too small for an event, each after a rest: number and last drop
+    FAST_END, SMALL_COUNT, SMALL_DROP = 69, 70, 71
+    Z_OLD = 72
     """First unknown of the balances at the start of the last step."""
-    H_OLD = 70
+    H_OLD = 73
     """Size of the last accepted step."""
-    PULL, STRETCH = 71, 72
+    PULL, STRETCH = 74, 75
     """Force (less that of steady sliding) of a drive that is let go and moves on, at the end of the last segment, and
     the part of it that the drive's own motion would cause with the load point at rest."""
-    LOAD_SPEED = 73
+    LOAD_SPEED = 76
     """Velocity of the load point at the end of the last segment, kept where its jump moves velocity variables."""
 
 
-TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
-"""Number of rows of event statistics, EVENTS to NOW_SEGMENT; further contacts have theirs in a group of their own."""
+TALLIED = Row.SMALL_DROP - Row.EVENTS + 1
+"""Number of rows of event statistics, EVENTS to SMALL_DROP; further contacts have theirs in a group of their own."""
 
 
 MOST_FAILURES = 400.0
@@ -79,6 +81,10 @@ EVENT_SHARE = 0.1
 """Least drop of a slip event, as a share of the largest so far, and least reload between two events: what changes the
 force by less is ringing. Any share between the largest ring of a damped block (some hundredths) and the drop of a full
 event tells the two apart; a tenth is far from both."""
+RESTED = 3.0
+"""Least time of rest before a slip over its own duration, that tells it from ringing, whose rests are at most twice as
+long: at a peak of SLIP_EVENT times the load point's velocity a sine is faster than it for a third of the period."""
+ALIKE = 3.0  # slips in a row, each after a rest and within EVENT_SHARE of each other, that are events after a knock
 SLIP_EVENT = 2.0  # least ratio of peak velocity to load-point velocity of a slip event: stick-slip of a block on a
 # spring with constant friction exceeds 2 (see docs/explanation/motion.md)
 

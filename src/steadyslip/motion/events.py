@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.errors import InternalError
 from steadyslip.core.pages import Displayed
 from steadyslip.kernels.events import RING
-from steadyslip.kernels.layout import NUMBER, Kind
+from steadyslip.kernels.layout import EVENT_SHARE, NUMBER, Kind
 from steadyslip.kernels.runner import LOG_KINDS
 
 BEGINS = {"slip begins": 1.0, "backward slip begins": -1.0}
@@ -56,8 +56,9 @@ class SlipEvent(Displayed):
     and ends where it is slower again and rests: the spring is loaded by more than a tenth of the largest drop before
     it slips again. Its peak speed is at least twice that of the load point (of the rig's drive while the load point
     rests) and twice its own at the beginning; it sheds at least a tenth of the largest drop so far, and an event after
-    it at most ten times as much as all before. Fast slip that sheds less rings. A backward stroke is an event of its
-    own, by the same definition with the speed.
+    it at most ten times as much as all before. Fast slip that sheds less rings; where it comes three times in a row
+    after rests and is alike, as after a knock, the count begins anew with the third. A backward stroke is an event of
+    its own, by the same definition with the speed.
 
     Attributes
     ----------
@@ -219,7 +220,21 @@ def _slips(events: Sequence[AnyEvent]) -> list[AnySlip]:
             found.append((begin, peak, event))
             rings.append([])
             begin = None
-    return [_slip(*one, _recurrence([each[0] for each in found[: i + 1]]), rings[i]) for i, one in enumerate(found)]
+    slips = [_slip(*one, _recurrence([each[0] for each in found[: i + 1]]), rings[i]) for i, one in enumerate(found)]
+    return list(_begun_anew(slips))
+
+
+def _begun_anew(slips: Sequence[AnySlip]) -> Iterator[AnySlip]:
+    """Slip events, of which the first after a knock that shed far more has no known recurrence."""
+    largest = 0.0
+    for one in slips:
+        anew = _drop(one) < EVENT_SHARE * largest
+        largest = _drop(one) if anew else max(largest, _drop(one))
+        yield replace(one, recurrence=float("nan")) if anew else one
+
+
+def _drop(slip: AnySlip) -> float:
+    return slip.force_drop if isinstance(slip, ContactSlip) else slip.stress_drop
 
 
 def _recurrence(begins: Sequence[AnyEvent]) -> float:

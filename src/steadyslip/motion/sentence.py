@@ -39,7 +39,7 @@ TREND = 0.01  # relative growth or decay of swings in the last half of a run up 
 LAST = 0.9  # share of a run after which swings that grew before must be alike if they have come to an end
 BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
 SUDDEN = 10.0  # peak over mean speed of an event; a half sine has 1.6, stick-slip without creep before it 2 to 4
-OVER = 2.0  # recurrences without another event after which events have come to an end
+OVER = 2.0  # times the longest recurrence of late without another event, after which events have come to an end
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
@@ -103,7 +103,7 @@ def sentence(
         "drop": drop, "rings": str(last.rings), "often": _told([last.ring_frequency], "Hz"), "backward": str(len(back)),
         "count": str(len([one for one in slips if one.slip > 0])), "ended": _told([last.end], "s"),
     }  # fmt: skip
-    over = end - last.end > OVER * last.recurrence
+    over = end - last.end > OVER * _longest(slips, last, end)
     words = JUDDERS["over" if over else "again" if math.isfinite(last.recurrence) else "alone"]
     if last.peak_velocity > SUDDEN * last.slip / last.duration > 0:
         words += CREEPS.format(peak=_told([last.peak_velocity], "m/s"))
@@ -116,6 +116,12 @@ def sentence(
         holes |= {"back": _told([abs(back[-1].slip)], "m"), "during": _told([back[-1].duration], "s")}
         words += JUDDERS["backward"]
     return words.format(**holes)
+
+
+def _longest(slips: Sequence[AnySlip], last: AnySlip, end: float) -> float:
+    """Longest recurrence (s) of the forward events in the last half of a run, that of the last one at least."""
+    late = [one.recurrence for one in slips if one.slip > 0 and one.begin > 0.5 * end and math.isfinite(one.recurrence)]
+    return max([last.recurrence, *late])
 
 
 def sentences(

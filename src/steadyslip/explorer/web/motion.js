@@ -149,7 +149,7 @@ export class Motion {
   /** Slip events of a log, in order of their ends, as in Python. */
   slipEvents(log) {
     const { SLIP_BEGINS, SLIP_ENDS, PEAK, TROUGH, ARREST, BACKWARD_BEGINS, BACKWARD_ENDS } = this.facts.kind, events = /** @type {any[]} */ ([]);
-    const open = /** @type {any[]} */ (this.sliding.map(() => null)), last = /** @type {any[]} */ (this.sliding.map(() => null)), arrest = this.sliding.map(() => -1);
+    const open = /** @type {any[]} */ (this.sliding.map(() => null)), last = /** @type {any[]} */ (this.sliding.map(() => null)), arrest = this.sliding.map(() => -1), largest = this.sliding.map(() => 0);
     for (const [number, time, v, , , stress, slip, , count] of this.valid(log)) {
       const [c, kind] = this.kindOf(number), { name: contact, area } = this.sliding[c], one = open[c];
       if (kind === ARREST) arrest[c] = time;
@@ -160,7 +160,9 @@ export class Motion {
         open[c] = { contact, sign, begin: time, peak: v, stress, slip, rings: [], every: before ? time - before.begin : null, sticks: before && arrest[c] > before.begin };
       } else if (one && (kind === PEAK || kind === TROUGH)) one.peak = one.sign * Math.max(one.sign * one.peak, one.sign * v);
       else if (one && (kind === SLIP_ENDS || kind === BACKWARD_ENDS)) {
-        events.push((last[c] = { ...one, end: time, slip: slip - one.slip, drop: one.sign * area * (one.stress - stress) }));
+        const drop = one.sign * area * (one.stress - stress), anew = drop < this.facts.share * largest[c]; // after a knock
+        largest[c] = anew ? drop : Math.max(largest[c], drop);
+        events.push((last[c] = { ...one, every: anew ? null : one.every, end: time, slip: slip - one.slip, drop }));
         open[c] = null;
       }
     }

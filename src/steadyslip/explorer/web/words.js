@@ -148,7 +148,8 @@ export function outcome({ events, status, end, contacts, at }, { area, phrases, 
 /** Sentence on the slip events of one contact, as in Python (steadyslip.motion.sentence). @param {any} slips @param {Record<string, any>} words @param {(value: number) => string} force @param {number} until */
 function sentence(slips, words, force, until) {
   const back = slips.filter((one) => one.slip < 0), last = slips.findLast((one) => one.slip > 0) ?? back[back.length - 1], { rings } = last, hindmost = back[back.length - 1];
-  const over = last.every !== null && until - last.end > words.recurrences * last.every;
+  const late = slips.filter((one) => one.slip > 0 && one.begin > 0.5 * until && one.every !== null).map((one) => one.every);
+  const over = last.every !== null && until - last.end > words.recurrences * Math.max(last.every, ...late);
   const text = words[over ? "over" : last.every !== null ? "again" : "alone"] + (rings.length > 1 ? words.rings : "") + (hindmost ? words.backward : "");
   return fill(text, {
     every: shown(last.every, "s", 3), waits: words[last.sticks ? "sticks" : "lags"], slip: shown(Math.abs(last.slip), "m", 3), within: shown(last.end - last.begin, "s", 3),

@@ -50,7 +50,7 @@ def events_per_contact(layout: Layout) -> int:
 
 
 def tally_at(layout: Layout, contact: int) -> int:
-    """Offset that turns a row between `Row.EVENTS` and `Row.NOW_SEGMENT` into that of a contact."""
+    """Offset that turns a row between `Row.EVENTS` and `Row.SMALL_DROP` into that of a contact."""
     return layout.further_statistics + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
 
 

@@ -7,7 +7,7 @@ import math
 from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.places import events_per_contact, outputs_at, tally_at
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import EVENT_SHARE, NUMBER, SLIP_EVENT, Cursor, Kind, Layout, Out, Row
+from steadyslip.kernels.layout import ALIKE, EVENT_SHARE, NUMBER, RESTED, SLIP_EVENT, Cursor, Kind, Layout, Out, Row
 
 
 def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y: Array) -> None:
@@ -86,12 +86,33 @@ def begin_event(R: Array, layout: Layout, contact: int, log: Array, cursor: Arra
     log_begin(R, layout, contact, kind, R[own + Row.EVENTS], log, cursor)
 
 
+def goes_on_after_knock(R: Array, layout: Layout, contact: int, tau: float, drop: float) -> bool:
+    """Tell if small forward slip is stick-slip of its own: the last of `ALIKE` in a row that are alike after rests.
+
+    A knock, or a fast stroke of the drive, sheds so much that what comes after it sheds less than EVENT_SHARE of that.
+    Ringing has no rests, and each of its slips sheds less than the one before. What was before is forgotten then.
+    """
+    own = tally_at(layout, contact)
+    begin, before = R[own + Row.NOW_BEGIN], R[own + Row.SMALL_DROP]
+    if not begin - R[own + Row.FAST_END] > RESTED * (clock(R, tau) - begin):
+        return False
+    alike = R[own + Row.SMALL_COUNT] > 0.0 and EVENT_SHARE * before < drop < before / EVENT_SHARE
+    R[own + Row.SMALL_COUNT] = R[own + Row.SMALL_COUNT] + 1.0 if alike else 1.0
+    R[own + Row.SMALL_DROP] = drop
+    if R[own + Row.SMALL_COUNT] < ALIKE:
+        return False
+    R[own + Row.FORWARD_BEGIN] = math.nan
+    R[own + Row.LARGEST_DROP] = drop
+    return True
+
+
 def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
     """Tell at the end of slip what it was: a slip event, more of the one before, a ring, or too slow for any.
 
     A slip event sheds at least EVENT_SHARE of the largest drop so far. It is more of the one before (in the same
     direction) if the block did not rest between: the force rose by less than that share. If all that was counted before
-    shed less than EVENT_SHARE of its drop, that was ringing too, and the count begins anew.
+    shed less than EVENT_SHARE of its drop, that was ringing too, and the count begins anew. Smaller slip counts where
+    it goes on after a knock.
     """
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     sign, fast = R[own + Row.NOW_SIGN], R[own + Row.NOW_EVENT]
@@ -101,10 +122,16 @@ def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: 
     drop = sign * (R[own + Row.NOW_STRESS] - stress)
     if not (fast > 0.0 and drop > 0.0):
         return
-    if drop < EVENT_SHARE * largest:
+    small = drop < EVENT_SHARE * largest
+    known = small and sign > 0.0 and goes_on_after_knock(R, layout, contact, tau, drop)
+    if sign > 0.0:
+        R[own + Row.FAST_END] = clock(R, tau)
+    if small and not known:
         if sign > 0.0:
             count_ring(R, layout, contact, log, cursor)
         return
+    R[own + Row.SMALL_COUNT] = 0.0
+    largest = R[own + Row.LARGEST_DROP]
     if largest < EVENT_SHARE * drop:
         R[own + Row.EVENTS] = 0.0
         R[own + Row.FORWARD_BEGIN] = math.nan
@@ -112,7 +139,7 @@ def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: 
     lowest = R[own + Row.EVENT_STRESS] - sign * R[own + Row.EVENT_STRESS_DROP]
     reload = sign * (R[own + Row.NOW_STRESS] - lowest)
     again = R[own + Row.EVENTS] > 0.0 and sign * R[own + Row.EVENT_SLIP] > 0.0
-    if not (again and reload < EVENT_SHARE * max(drop, largest)):
+    if known or not (again and reload < EVENT_SHARE * max(drop, largest)):
         begin_event(R, layout, contact, log, cursor)
     if R[own + Row.NOW_PEAK] > sign * R[own + Row.EVENT_PEAK_VELOCITY]:
         R[own + Row.EVENT_PEAK_VELOCITY] = sign * R[own + Row.NOW_PEAK]

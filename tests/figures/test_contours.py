@@ -89,3 +89,13 @@ def test_contours_of_a_growth_rate_are_where_it_has_their_levels(tmp_path):
         off = np.abs(rates - level) / abs(level)
         assert np.median(off) < 0.05
         assert np.quantile(off, 0.9) < 0.3
+
+
+@pytest.mark.parametrize("x", ["drive.velocity", "friction.mu_static", "lead_angle"])
+def test_a_narrow_chart_keeps_its_contours_and_every_area_its_word(x):
+    """One piece of a contour beside an edge took the whole contour away; of two stable areas one had its word."""
+    with ss.figures.journal():
+        ax = ss.figures.stability_chart(ss.read_rig("examples/lead-screw.toml"), x, "stiffness", points=101)
+    assert len(_contours_of(ax)) >= 2
+    words = sorted(text.get_text() for text in ax.texts if text.get_text().isalpha())
+    assert words == (["stable"] if x != "drive.velocity" else ["stable", "stable"]) + ["unstable"]

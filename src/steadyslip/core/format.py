@@ -20,6 +20,8 @@ _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "
 _SPEED, _ANGLE, _TURNING = (unit(name)[1] for name in ("m/s", "rad", "rad/s"))
 _PLAIN_FORCE = re.compile(r"(?:N|Pa)(?![A-Za-z])")
 """Unit of a force, stress or what is in proportion to one, without a prefix."""
+_EXPONENT = re.compile(r"(?<![\w./=-])(−?-?\d(?:\.\d+)?)e([+-]\d+)(?![\w/-]|\.\w)")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _FINE = ("arcsec", "arcmin")
 """Parts of a degree: whoever writes one has the others told in it too."""
 
@@ -310,11 +312,16 @@ def format_percent(share: float) -> str:
     return f"{100 * share:.8g} %" if 0 < share < 1 and float(text) in (0, 100) else f"{text} %"
 
 
-def typeset(text: str) -> str:
-    """Replace ASCII units in a text by typeset ones: µm, m², kg/m³.
+def typeset_powers(text: str) -> str:
+    """Replace powers of ten in a text by typeset ones, such as 2 × 10⁵ for 2e+05."""
+    return _EXPONENT.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_SUPERSCRIPTS)}", text)
 
-    >>> typeset("9.2 us, 3 um/s, 2 uN m at 5 m^2: ours")
-    '9.2 µs, 3 µm/s, 2 µN m at 5 m²: ours'
+
+def typeset(text: str) -> str:
+    """Replace ASCII units and powers of ten in a text by typeset ones: µm, m², kg/m³, 2 × 10⁵.
+
+    >>> typeset("9.2 us, 3 um/s, 2 uN m at 5 m^2, 2e+05 1/m: ours")
+    '9.2 µs, 3 µm/s, 2 µN m at 5 m², 2 × 10⁵ 1/m: ours'
     """
-    text = text.replace("^2", "²").replace("^3", "³")
+    text = typeset_powers(text).replace("^2", "²").replace("^3", "³")
     return re.sub(r"(?<![A-Za-z])u(?=(?:m|s|N|Pa)(?![A-Za-z]))", "µ", text)

@@ -209,11 +209,19 @@ def _draw_contours(
 
 
 def write_inside(ax: Axes, region: Any, words: str, place: Place, lines: Sequence[Any] = ()) -> bool:
-    """Write words into the widest place of a region, upright if there is room for them only so; True if there is room.
+    """Write words into the widest place of each area of a region, upright if they fit only so; True if any has room.
 
     `region` is true inside, shape (rows, columns); `place` gives the units of the axes for fractions of them, (n, 2).
     Words keep clear of `lines`, vertices (n, 2) each, if they can.
     """
+    from scipy.ndimage import label
+
+    areas, many = label(region)
+    written = [_write_in_area(ax, areas == n, words, place, lines) for n in range(1, many + 1)]
+    return any(written)
+
+
+def _write_in_area(ax: Axes, region: Any, words: str, place: Place, lines: Sequence[Any]) -> bool:
     mask, length = region.copy(), _LETTER * len(words)
     rows, columns = np.indices(mask.shape)
     own = [np.asarray(line.get_xydata())[0] for line in ax.lines if line.get_label() == OWN_RIG["label"]]

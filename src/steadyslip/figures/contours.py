@@ -22,7 +22,8 @@ _FALL = (
 )
 _ROUNDING = 1e-6  # of that share at its edge, where the status depends on rounding: 1e10 times that of a double
 _ROOM = 24.0  # pixels between a label of a contour and the next line (by trial)
-_BESIDE = 12.0  # pixels in the mean to the edge or a contour, below which another contour is not drawn (by trial)
+_BESIDE = 0.017  # mean distance to the edge or a contour, over the width of a figure, below which a piece of another
+# contour is not drawn (by trial)
 _CLOSE = 6.0  # pixels between vertices of a label's line (by trial)
 
 
@@ -79,7 +80,7 @@ def draw_levels(
     """Draw contours of fields over a plane with a label each; return the lines drawn, as vertices (n, 2).
 
     They end at the outline `within`, a path in the units of the axes or None. Labels keep clear of the lines `beside`;
-    contours that run along one of these, or along another contour, are left out.
+    pieces of contours that run along one of these, or along another contour, are left out.
     """
     drawn, clip = [], None if within is None else PathPatch(within, transform=ax.transData, visible=False)
     for field in fields:
@@ -87,18 +88,18 @@ def draw_levels(
         if not shown:
             continue
         drawing = CONTOURS | style
-        trial = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
-        apart = _not_along(ax, [pieces_of(path) for path in trial.get_paths()], beside)
-        shown = [n for n, keep in zip(shown, apart, strict=True) if keep]
-        lines = trial
-        if not all(apart):
-            trial.remove()
+        lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
+        pieces = _not_along(ax, [pieces_of(path) for path in lines.get_paths()], beside)
+        if not all(pieces):  # again without the levels of which nothing is left, which have no label
+            lines.remove()
+            shown = [n for n, several in zip(shown, pieces, strict=True) if several]
+            pieces = [several for several in pieces if several]
             if not shown:
                 continue
             lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
+        lines.set_paths([Path.make_compound_path(*map(Path, several)) for several in pieces])
         if clip is not None:
             lines.set_clip_path(clip)
-        pieces = [pieces_of(path) for path in lines.get_paths()]
         found = {n: max(several, key=len) for n, several in zip(shown, pieces, strict=True) if several}
         of = {level: words[n] for n, level in enumerate(levels)}
         longest = list(found.values())
@@ -120,27 +121,30 @@ def pieces_of(path: Path) -> list[Array]:
     return [piece for piece in np.split(vertices, starts[1:]) if len(piece) > 1]
 
 
-def _not_along(ax: Axes, contours: Sequence[Sequence[Array]], beside: Sequence[Array]) -> list[bool]:
-    """Mask of the contours, several pieces each, that keep `_BESIDE` from the lines `beside` and from each other.
+def _not_along(ax: Axes, contours: Sequence[Sequence[Array]], beside: Sequence[Array]) -> list[list[Array]]:
+    """Pieces of the contours that keep `_BESIDE` from the lines `beside` and from each other.
 
     Of two that do not, the one is kept that is farther from these lines.
     """
+    least = _BESIDE * ax.get_figure(root=True).bbox.width  # type: ignore[union-attr]
 
     def in_pixels(lines: Sequence[Array]) -> list[Array]:
         return [_thinned(ax.transData.transform(one)) for one in lines if len(one) > 1]
 
-    def away(lines: Sequence[Array], others: Sequence[Array]) -> float:
-        if not lines or not others:
+    def away(line: Array, others: Sequence[Array]) -> float:
+        if not others:
             return np.inf
-        points, rest = np.concatenate(lines), np.concatenate(others)
-        return float(np.median(np.linalg.norm(points[:, None] - rest[None], axis=-1).min(axis=1)))
+        rest = np.concatenate(others)
+        return float(np.median(np.linalg.norm(line[:, None] - rest[None], axis=-1).min(axis=1)))
 
-    edges, found = in_pixels(beside), [in_pixels(one) for one in contours]
-    far, kept = [away(one, edges) for one in found], [False] * len(found)
-    for n in sorted(range(len(found)), key=lambda n: -far[n]):
-        others = [away(found[n], found[m]) for m, keep in enumerate(kept) if keep]
-        kept[n] = min([far[n], *others]) >= _BESIDE
-    return kept
+    edges, pieces = in_pixels(beside), [(n, piece) for n, several in enumerate(contours) for piece in several]
+    found = in_pixels([piece for _, piece in pieces])
+    far = [away(one, edges) for one in found]
+    kept: list[int] = []
+    for k in sorted(range(len(found)), key=lambda k: -far[k]):
+        if min(far[k], away(found[k], [found[m] for m in kept if pieces[m][0] != pieces[k][0]])) >= least:
+            kept.append(k)
+    return [[piece for k, (m, piece) in enumerate(pieces) if m == n and k in kept] for n in range(len(contours))]
 
 
 def _apart(ax: Axes, line: Array, others: Sequence[Array], labels: Sequence[Array]) -> tuple[float, float]:

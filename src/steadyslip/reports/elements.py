@@ -13,15 +13,12 @@ import sympy as sp
 from sympy.printing.mathml import MathMLPresentationPrinter
 
 from steadyslip.core.expressions import LONG_POWER, asinh_exp, power_of_ten
+from steadyslip.core.format import typeset_powers
 
 _REPLACEMENTS = (
     (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
     (r"^x (?=-?\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
 )  # fmt: skip
-_EXPONENT, _SUPERSCRIPTS = (
-    re.compile(r"(?<![\w./=-])(−?\d(?:\.\d+)?)e([+-]\d+)(?![\w/-]|\.\w)"),
-    str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
-)
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
 _NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # between a number and its unit, or what it counts
 _POWER = re.compile(r"(?<=10)([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) (?=[A-Za-zµ])")  # between a power of ten and its unit
@@ -104,7 +101,7 @@ def typographic(text: Any) -> str:
     words = str(text)
     for pattern, better in _REPLACEMENTS:
         words = re.sub(pattern, better, words)
-    return _EXPONENT.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_SUPERSCRIPTS)}", words)
+    return typeset_powers(words)
 
 
 def why(refused: Exception) -> str:

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from explored import page_modules
 from explored_edges import Edges, other_edges, written
+from javascript import Script
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
 from steadyslip.motion.events import ContactSlip
 from steadyslip.motion.sentence import sentences
 from steadyslip.motion.status import remedy
+from steadyslip.reports.elements import typographic
 from steadyslip.verdict import machine as machine_words, slider as slider_words
 
 BRISTLES = ss.laws.LuGre(
@@ -244,3 +247,12 @@ def test_no_sentence_is_written_in_python_and_again_in_the_modules_of_a_page():
     assert len(known) > 5e3
     assert len(web) > 20
     assert not twice, "pass it as page data, as `page_reasons` is passed"
+
+
+def test_powers_of_ten_are_written_as_in_documents_and_can_be_typed():
+    """The page had −1.001e5 where the report has −1.001 × 10⁵."""
+    page = Script(page_modules())
+    for value, text in ((-100_123.0, "−1.001 × 10⁵"), (3.2e-7, "3.2 × 10⁻⁷"), (1e21, "1 × 10²¹")):
+        assert page("digits(value)", value=value).replace("\u00a0", " ") == text
+        assert page("parse(`${digits(value)} m`, 'm', 'm')", value=value) == float(f"{value:.4g}")
+    assert typographic("-1.001e+05 1/s") == "−1.001 × 10⁵ 1/s"

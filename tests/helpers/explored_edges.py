@@ -113,8 +113,12 @@ def in_python(found, is_machine):
 
 
 def written(text):
-    """Text with the typography of pages, but for signs."""
-    return re.sub(r"e\+?(-?)0*(?=\d)", r"e\1", typeset(text).replace("−", "-"))
+    """Text with the typography of pages, but for signs and powers of ten, which are those of computers: 2e5."""
+    plain = re.sub(r"\s×\s10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda found: f"e{found[1].translate(_POWERS)}", typeset(text))
+    return plain.replace("−", "-")
+
+
+_POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def same_text(mine, theirs):

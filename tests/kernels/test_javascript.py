@@ -2,7 +2,6 @@
 
 import math
 import os
-import re
 import shutil
 import struct
 import subprocess
@@ -266,5 +265,5 @@ def test_pages_tell_quantities_as_texts_do():
     cases = [[float(size), str(unit)] for size, unit in zip(sizes, units, strict=True)] + [[0.0, "m/s"]]
     told = script("cases.map(([value, unit]) => shown(value, unit))", cases=cases)
     for (value, unit), words in zip(cases, told, strict=True):
-        plain = re.sub(r"e([+-])0*", lambda sign: "e" + sign[1].strip("+"), typeset(format_quantity(value, unit)))
-        assert words.replace("\N{MINUS SIGN}", "-") == plain, (value, unit)
+        plain = words.replace("\N{MINUS SIGN}", "-").replace("\N{NO-BREAK SPACE}", " ")
+        assert plain == typeset(format_quantity(value, unit)), (value, unit)

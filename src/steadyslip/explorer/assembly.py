@@ -112,10 +112,11 @@ def style() -> str:
     return minify_css(themes + _read_web("style.css"))
 
 
-def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
+def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "", theme: str = "") -> str:
     """HTML of the explorer of a rig as a part of a document, which may have several.
 
-    With the `text` of a rig file it shows values in the units of the file, and saves it with its comments.
+    With the `text` of a rig file it shows values in the units of the file, and saves it with its comments. The `theme`
+    is "light" in documents that are, and that of the browser unless given.
 
     Raises
     ------
@@ -123,8 +124,9 @@ def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> 
         If an equation has a function that cannot be printed, or numbers leave the range of floating point.
     """
     code, known = page_parts(rig, title, branch, text)
+    shown = f' data-theme="{theme}"' if theme else ""
     return (
-        '<div class="steadyslip-root"></div>\n'
+        f'<div class="steadyslip-root"{shown}></div>\n'
         f'<script type="application/json" class="steadyslip-data">{json_for_html(known)}</script>\n'
         f'<script>\n"use strict";(()=>{{\n{code}'
         "const place=document.currentScript.previousElementSibling;"

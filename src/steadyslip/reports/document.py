@@ -108,7 +108,7 @@ def document_html(
     live = ""
     if explorer and parts.rig is not None:
         with suppress(NotAvailable):  # such as of a drive that holds a place
-            live = fragment(parts.rig, title, parts.branch, source_text(source))
+            live = fragment(parts.rig, title, parts.branch, source_text(source), "light")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
         '<article class="report steadyslip-told" role="' + ("region" if live else "main") + '" aria-label="report">'

@@ -38,7 +38,7 @@ export class Banner {
     if (differs.length) this.notice.textContent = `This browser computes otherwise than Python did (${differs.slice(0, 3).join("; ")}): do not rely on this page.`;
     this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: one.name, textContent: inMenu(one, this.data.parameters), selected: i === page.rig.bar })));
     this.choice.addEventListener("change", () => page.tell(this.choice.selectedIndex));
-    this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar ", this.choice));
+    this.values = make("p", { className: "values" }, make("label", {}, "parameter of the bar: ", this.choice));
     const ask = (kind) => make("button", { type: "button", textContent: kindWords(kind, this.data), onclick: () => page.guessed(kind) });
     const guess = make("p", { className: "guess" }, "Will it slide steadily at these values? It is ", ask("stable"), " ", ...(page.rig.assess().status === UNDAMPED ? [ask("undamped"), " "] : []), ask("unstable"), " ", ask("none"));
     this.box = make("section", { className: "verdict", "aria-label": "verdict", tabIndex: -1 }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice, guess);

@@ -49,7 +49,7 @@ export class Facts {
     this.far = make("details", {}, make("summary", {}), make("ol", { className: "edges" }));
     const head = make("thead", {}, make("tr", {}, ...page.rig.data.columns.map((text) => make("th", { textContent: text, scope: "col" }))));
     this.box = make("section", { className: "facts", "aria-label": "details", tabIndex: -1 },
-      make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: `one parameter changed, the others as they are; press to go ${100 * BESIDE} % to its stable side, or to the one that slides steadily` }), this.near, this.far),
+      make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint" }, "one parameter changed, the others as they are", make("span", { className: "press", textContent: `; press to go ${100 * BESIDE} % to its stable side, or to the one that slides steadily` })), this.near, this.far),
       this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
       this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas, this.locus.note,
         this.shape = make("p", { className: "mode" }), legend()));
@@ -60,7 +60,7 @@ export class Facts {
     const { rig } = this.page, { area, phrases, aperiodic } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
     this.sliding.hidden = this.swings.hidden = absent;
     tell(this.shape, answer.mode ? `In the leading mode ${words(answer.mode, rig.data.facts.shape)}.` : "");
-    const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/_/g, " "), answer.observed[name], unit, meaning])];
+    const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/: v$/, ": velocity v").replace(/_/g, " "), answer.observed[name], unit, meaning])];
     rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(named(name, area && unit === "Pa" ? "N" : unit) + (meaning && `: ${meaning}`)).replace(/Theta/g, "Θ").replace(/theta/g, "θ").replace(/sigma.e\b/g, "σₑ").replace(/_(\d)|(?<=Θ|θ) (\d)/gi, (_, a, b) => "₀₁₂₃₄₅₆₇₈₉"[a ?? b]), quantity(value, unit, area)]),
       () => [make("dt", {}), make("dd", {})], 2);
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);

@@ -1,6 +1,6 @@
 // Axes and curves as SVG: positions run from 0 to 1, boxes are in units of the drawing.
 import { svg } from "./dom.js";
-import { digits, unitFor } from "./quantities.js";
+import { digits, raised, unitFor } from "./quantities.js";
 import { NEW } from "./rig.js";
 
 /**
@@ -35,7 +35,7 @@ export function ticks(low, high, logarithmic, most) {
 /** Text of a number as a power of ten, such as 10⁶ or 2·10⁶. @param {number} value */
 function inPowers(value) {
   const power = Math.floor(Math.log10(value) + 1e-9), first = digits(value / 10 ** power, 3);
-  return power === 0 || power === 1 ? digits(value, 3) : `${first === "1" ? "" : `${first}·`}10${String(power).replace("-", "⁻").replace(/\d/g, (n) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(n)])}`;
+  return power === 0 || power === 1 ? digits(value, 3) : `${first === "1" ? "" : `${first}·`}10${raised(String(power))}`;
 }
 
 /** Axis with ticks, numbers and label, in the unit of `one` or a readable one. @param {any} one name, unit and factor */
@@ -47,7 +47,7 @@ export function axis(box, scale, [low, high], one, label, upright) {
   let marks = ticks(...ends, logarithmic, most);
   if (marks.length < 2) marks = ticks(...ends, false, 2 * most); // one number tells no scale
   const many = Math.min(12, Math.max(3, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (Math.abs(high - low) || 1))) + 3)); // digits that distinguish the ticks
-  const powers = logarithmic && marks.some((value) => digits(value, 3).includes("e"));
+  const powers = logarithmic && marks.some((value) => digits(value, 3).includes("×"));
   for (const value of marks) {
     const at = scale.of(value * factor);
     if (at < -1e-9 || at > 1 + 1e-9) continue;

@@ -65,7 +65,7 @@ export function exactly(digits, factor) {
  * @param {[string, number]} [own] a unit that needs no look-up, and its size
  */
 export function parse(text, si, unit, own = ["", 1]) {
-  const found = NUMBER.exec(text.slice(0, 200));
+  const found = NUMBER.exec(plainly(text.slice(0, 200)));
   if (!found) throw new Error(`“${text.slice(0, 40)}” is not a number with a unit, such as 2.5 ${unit === "1" ? "" : printed(unit)}`.trim());
   if (EITHER.test(found[1])) throw new Error(`“${found[1]}” may be ${found[1].replace(",", ".")} or ${found[1].replace(",", "")}: write it without a comma`);
   const name = found[2] || unit, [factor, exponents] = own[0] && printed(name) === printed(own[0]) ? [own[1], unitOf(si)[1]] : unitOf(name), expected = unitOf(si)[1];
@@ -77,14 +77,22 @@ export function parse(text, si, unit, own = ["", 1]) {
 export const printed = (name) => name.replace(/(?<![A-Za-z])[uμ](?=[A-Za-z])/g, "µ").replace(/(?<=[A-Za-z])\^?2(?!\d)/g, "²").replace(/(?<=[A-Za-z])\^?3(?!\d)/g, "³"); // not those of "at 3.2 kN"
 
 /** Unit in a text of number and unit; empty if it has none. @param {string} text */
-export const unitIn = (text) => NUMBER.exec(text.slice(0, 200))?.[2] ?? "";
+export const unitIn = (text) => NUMBER.exec(plainly(text.slice(0, 200)))?.[2] ?? "";
+
+const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+/** Digits of a power as superscripts. @param {string} power */
+export const raised = (power) => power.replace("-", "⁻").replace(/\d/g, (n) => SUPERSCRIPTS[Number(n)]);
+
+/** Text in which powers of ten are written for a computer: 2e5 for 2 × 10⁵. @param {string} text */
+const plainly = (text) => text.replace(/\s*[×*]\s*10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)/, (_, power) => `e${power.replace("⁻", "-").replace(/[⁰¹²³⁴⁵⁶⁷⁸⁹]/g, (n) => SUPERSCRIPTS.indexOf(n))}`);
 
 /** Text of a number with few digits. @param {number} value */
 export function digits(value, many = 4) {
   const size = Math.abs(value);
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "–" : value > 0 ? "∞" : "−∞";
   const text = size !== 0 && (size >= 1e5 || size < 1e-4) ? value.toExponential(many - 1).replace(/\.?0+e/, "e") : String(Number(value.toPrecision(many)));
-  return text.replace("-", "−").replace(/e([+-−]?)(\d+)/, (_, sign, power) => `e${sign === "+" ? "" : "−"}${power}`);
+  return text.replace("-", "−").replace(/e([+-−]?)(\d+)/, (_, sign, power) => `\u00a0×\u00a010${raised(sign === "+" ? power : `-${power}`)}`);
 }
 
 /** Units in which the file of the rig was written, [name, size], by SI unit. @type {Record<string, [string, number][]>} */

@@ -1,5 +1,6 @@
 """Comparison of two rigs: parts agree with closed forms and with all orders by hand."""
 
+import dataclasses
 import itertools
 import json
 import math
@@ -207,6 +208,41 @@ def test_a_held_axis_is_named_with_what_to_do():
     done = run("compare", "examples/slow-axis.toml", "examples/hunting-axis.toml")
     assert done.returncode == 2
     assert done.stderr.startswith("error: examples/hunting-axis.toml: drive.velocity is 0")
+
+
+def test_the_oscillation_is_that_of_the_mode_whose_growth_rate_is_told():
+    """A carriage that drifts away at 561 1/s was told the period of a mode that dies out."""
+    axis, chance, kinds = ss.rig_from_text(AXIS), np.random.default_rng(33), set()
+    for many in 10.0 ** chance.uniform(-3, 3, (10, 3)):
+        names = ("slider.stiffness", "slider.mass", "drive.velocity")
+        other = axis.with_values({name: axis.value(name) * x for name, x in zip(names, many, strict=True)})
+        found = ss.compare_rigs(axis, other)
+        row = {label: second for label, _, second in found.side_by_side()}
+        verdict = found.verdicts[1]
+        leading = verdict.eigenvalues[0]
+        period = found.to_dict()["rigs"][1]["period"]
+        assert leading.real == pytest.approx(verdict.growth_rate)
+        kinds.add(bool(leading.imag))
+        if not leading.imag:
+            assert (period, row.get("oscillation", "none")) == (None, "none")
+            continue
+        assert period == pytest.approx(2 * math.pi / abs(leading.imag))
+        ratio = float(row["oscillation"].rpartition(" ")[2])
+        assert ratio == pytest.approx(-leading.real / abs(leading), rel=6e-3)
+    assert kinds == {True, False}
+
+
+def test_what_stands_for_a_value_that_is_not_given_is_told():
+    """The exponent of a Stribeck curve is 2 without one; contacts are told by their friction, ends by their names."""
+    axis = ss.rig_from_text(AXIS.replace("stribeck_exponent = 0.8", ""))
+    found = ss.compare_rigs(axis, axis.with_values({"stribeck_exponent": 0.8}))
+    assert [(one.first, one.second) for one in found.differences] == [("2", "0.8")]
+    first = ss.read_rig("examples/machines/feed-axis.toml")
+    contact = next(iter(first.contacts))
+    contacts = {**first.contacts, "wiper": first.contacts[contact]}
+    told = {one.parameter: (one.first, one.second) for one in
+            ss.compare_rigs(first, dataclasses.replace(first, contacts=contacts)).differences}  # fmt: skip
+    assert told["contacts.wiper"] == ("none", f"{first.contacts[contact].friction.name} friction")
 
 
 def test_orders_and_subsets_are_complete():

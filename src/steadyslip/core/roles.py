@@ -187,6 +187,12 @@ class Parameter(Entry):
         """`doc` without the hints for who writes a file: what to give instead, or what stands for nothing given."""
         return _HINTS.sub("", self.doc)
 
+    @property
+    def unless_given(self) -> str:
+        """What stands for nothing given, by `doc`, such as ``2`` or ``infinite``; empty if nothing does."""
+        found = re.search(r"; ([^;]+) unless given", self.doc)
+        return found[1] if found else ""
+
     def __post_init__(self) -> None:
         if self.kind and self.kind not in PARAMETER_KINDS:
             raise TypeError(unknown_name("kind of parameter", self.kind, PARAMETER_KINDS))

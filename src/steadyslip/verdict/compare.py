@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -178,7 +179,8 @@ class RigComparison(Displayed):
         rigs = [
             {
                 "name": name, "stable": one.stable, "reason": one.reason, "safety_factor": _factor(one),
-                "growth_rate": one.growth_rate, "period": one.period,
+                "growth_rate": one.growth_rate, "period": None if (s := _oscillation(one)) is None
+                else 2 * math.pi / abs(s.imag),
                 "nearest_edge": None if not one.margins or one.margins[0].edge is None else {
                     "parameter": one.margins[0].parameter, "value": one.margins[0].edge.value,
                     "unit": one.margins[0].unit, "own_value": one.margins[0].value,
@@ -313,10 +315,18 @@ def _growth(one: Findings) -> str:
     return "" if one.growth_rate is None else format_growth(one.growth_rate)
 
 
+def _oscillation(one: Findings) -> complex | None:
+    """Eigenvalue (1/s) of the leading mode if it oscillates, the one whose growth rate is told; None otherwise."""
+    leading = one.eigenvalues[0] if one.eigenvalues else None
+    return leading if leading is not None and leading.imag else None
+
+
 def _period(one: Findings) -> str:
-    if one.period is None or one.damping_ratio is None:
+    leading = _oscillation(one)
+    if leading is None:
         return ""
-    return f"period {format_quantity(one.period, 's')}, damping ratio {one.damping_ratio:.3g}"
+    period = format_quantity(2 * math.pi / abs(leading.imag), "s")
+    return f"period {period}, damping ratio {-leading.real / abs(leading):.3g}"
 
 
 def _edge(one: Findings) -> str:

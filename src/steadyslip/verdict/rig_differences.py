@@ -15,6 +15,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.records import FrozenRecord
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.machine.surfaces import Surface
 from steadyslip.verdict.between import Between, Place, ones_and_others, places, shapley
 from steadyslip.verdict.unknown_in_pairs import Pairs
 from steadyslip.verdict.words import told, told_range
@@ -137,16 +138,20 @@ def _within(rig: Slider | Machine, name: str, ends: tuple[float, float]) -> str:
 
 
 def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
-    """A value with its unit, and its key where `named`; empty for None."""
+    """A value with its unit, and its key where `named`; what stands for None, if anything does."""
+    known = rig.parameters().get(name)
     if value is None:
-        return ""
+        return "" if named or known is None else known.role.unless_given
+    if isinstance(value, Surface):
+        return f"{value.friction.name or type(value.friction).__name__} friction"
     if isinstance(value, FrozenRecord):
         return value.name or type(value).__name__
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, tuple) and all(isinstance(one, str) for one in value):
+        return " and ".join(value)
     if isinstance(value, tuple):
         return "; ".join(_item_text(rig, f"{name}.{i}") for i in range(1, len(value) + 1))
-    known = rig.parameters().get(name)
     if known is None or not isinstance(value, float):
         return str(value)
     words = told(rig, name, value)

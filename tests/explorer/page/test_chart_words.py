@@ -6,6 +6,7 @@ import pytest
 
 import steadyslip as ss
 from explored_pages import Visit
+from steadyslip.verdict.words import headline
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 SLIDING = sorted(
@@ -76,3 +77,15 @@ def test_every_large_area_of_the_chart_has_its_word(browser, pages):
     with Visit(browser, pages(EXAMPLES / "machines/telescope.toml")) as visit:
         words = visit.page.locator(".map .word").all_text_contents()
         assert sorted(words) == ["stable", "stable", "unstable"]
+
+
+def test_page_and_report_have_one_headline_and_a_phone_tells_it_once(browser, pages):
+    """The page told the slip rate of a bearing where the report had the speed of the drive."""
+    path = EXAMPLES / "machines/telescope.toml"
+    with Visit(browser, pages(path)) as visit:
+        assert visit.sentence() == headline(ss.analyze(ss.read_rig(path)), capitals=False)
+        visit.page.set_viewport_size({"width": 390, "height": 844})
+        word = visit.page.locator(".tabs b")
+        word.wait_for(state="hidden")
+        visit.page.mouse.wheel(0, 700)
+        word.wait_for(state="visible")

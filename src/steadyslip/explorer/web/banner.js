@@ -3,12 +3,11 @@ import { inMenu } from "./controls.js";
 import { make, put, svg, tell, unbroken } from "./dom.js";
 import { ABSENT, STABLE, UNDAMPED, isQuiet } from "./linear.js";
 import { ticks } from "./plot.js";
-import { apart, digits, shown, told, unitFor } from "./quantities.js";
+import { apart, digits, told, unitFor } from "./quantities.js";
 import { asStiffness, besides, beyondWords, headline, kindOf, kindWords, reason } from "./words.js";
 
 const DECADE = Math.log(10); // natural logarithm of ten: margin of the bar beyond its outermost marks
 const ASUNDER = 1e3; // largest ratio of marks that are written in one unit
-const TOLD_OF = 3; // most contacts that a sentence lists
 const WIDTH = 7.4; // width of a letter on the bar, SVG units
 
 /** Update marks or labels of a bar (class, position in per cent, text); elements that are unchanged stay. */
@@ -47,19 +46,15 @@ export class Banner {
   show(answer) {
     const { phrases } = this.data;
     this.box.dataset.kind = kindOf(answer);
-    tell(this.sentence, unbroken(headline(answer, this.speed(answer), this.data)));
+    tell(this.sentence, unbroken(headline(answer, this.speed(), this.data)));
     if (!phrases || !this.page.tracks) tell(this.reason, unbroken(phrases ? this.told(answer) : reason(answer, this.data) + besides(answer, this.data)));
     this.showBar(answer);
   }
 
-  /** Text of the sliding velocity: that of the drive, or slip rates of contacts by name where these differ from it. */
-  speed({ observed }) {
-    const { parameters, speed, facts } = this.data, i = parameters.findIndex((one) => one.name === speed), drive = this.page.rig.values[i], text = told(parameters[i], drive);
-    const slips = facts.contacts.map((name) => [name, observed[`${name}.slip_rate`]]).filter(([, v]) => v !== undefined);
-    if (!slips.length || slips.every(([, v]) => v === drive)) return `at ${text}`;
-    const many = slips.length > TOLD_OF, same = slips.every(([, v]) => v === slips[0][1]);
-    const each = same ? `${many ? "all contacts" : slips.map(([name]) => name).join(", ")} at ${shown(slips[0][1], "m/s")}` : slips.slice(0, TOLD_OF).map(([name, v]) => `${name} at ${shown(v, "m/s")}`).join(", ");
-    return `of ${each}${many && !same ? ", …" : ""} (drive ${text})`;
+  /** Text of the velocity of the drive, as in headlines of Python. */
+  speed() {
+    const { parameters, speed } = this.data, i = parameters.findIndex((one) => one.name === speed);
+    return `at ${told(parameters[i], this.page.rig.values[i])}`;
   }
 
   /** Update what depends on edges: the reason for the verdict on a machine, and the bar. @param {any} answer @param {any} [first] */

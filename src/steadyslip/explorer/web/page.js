@@ -103,6 +103,7 @@ export class Page {
       this.chart.show();
       this.course.draw();
     }).observe(root);
+    new IntersectionObserver((all) => (root.dataset.told = String(all[all.length - 1].isIntersecting))).observe(this.banner.sentence);
     window.addEventListener("beforeprint", () => this.chart.show(true));
     window.addEventListener("hashchange", (event) => {
       const link = new URL(event.newURL).hash; // not location.hash, which may have changed since

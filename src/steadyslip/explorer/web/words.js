@@ -28,7 +28,7 @@ export function kindOf(answer) {
 const begun = (text) => text[0].toUpperCase() + text.slice(1);
 export const NEXT_TO_IT = 1e-6; // relative distance from the edge that counts as on it; as in steadyslip/verdict/reasons.py, whose phrases are used here
 
-/** Headline of the verdict. @param {string} speed velocity with its preposition, "at" or "of" */
+/** Headline of the verdict. @param {string} speed velocity with its preposition */
 export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)].join(""), { speed });
 
 /** Words for a kind of answer, such as those in the areas of the chart. @param {string} kind @param {any} data */

@@ -130,6 +130,16 @@ def test_a_value_of_another_size_is_asked_about_once(text, right, wrong, answer)
     assert asked(text) == []
 
 
+@pytest.mark.parametrize(("control", "gains"), [("pid", "kp, kd or ki"), ("pd", "kp or kd")])
+def test_a_controller_without_gains_is_asked_about(control, gains):
+    """It was STABLE with the numbers of a load point."""
+    text = Path("examples/stick-slip.toml").read_text(encoding="utf-8")
+    head, _, _ = text.partition("[protocol]")
+    drive = head.replace("[drive]", f'[drive]\ncontrol = "{control}"')
+    assert asked(drive) == [f"the controller has no gain and does nothing: give {gains}, or write control = 'steady'"]
+    assert asked(drive.replace("[drive]", '[drive]\nkd = "1 MPa s/m"')) == []
+
+
 def test_rigs_in_stresses_and_friction_in_forces_are_not_asked_about():
     """Faults stretch by metres and wait for years; friction of a table without a load has 1 N at 1 m."""
     slow = AXIS.replace('area = "300 cm^2"\n', "").replace("5.5 ± 15 % kN", "5.5 MPa").replace("25 N/um", "1 kPa/mm")

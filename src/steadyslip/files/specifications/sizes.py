@@ -49,6 +49,7 @@ def questions_of_size(rig: Rig, read: Read) -> Iterator[Question]:
     read : mapping of str to (object, str)
         Names of the values read, each as it was written and with its SI unit.
     """
+    yield from _gainless(rig, read)
     if not (rig.in_forces or rig.area is not None) or any(isinstance(raw, Placeholder) for raw, _ in read.values()):
         return
     bodies = bodies_of(rig)
@@ -63,6 +64,15 @@ def questions_of_size(rig: Rig, read: Read) -> Iterator[Question]:
     yield from questions_of_contacts(rig, read, bodies)
     yield from _controlled(rig, read, bodies)
     yield from _massless(rig, read)
+
+
+def _gainless(rig: Rig, read: Read) -> Iterator[Question]:
+    """Question about a controller of a slider that has no gain."""
+    gains = [name for name in ("drive.kp", "drive.kd", "drive.ki") if name in rig.parameters()]
+    if gains and not any(name in read for name in gains):
+        *keys, last = (name.partition(".")[2] for name in gains)
+        text = f"give {', '.join(keys)} or {last}, or write control = 'steady'"
+        yield "drive.control", f"the controller has no gain and does nothing: {text}"
 
 
 def _stiff(rig: Rig, springs: Mapping[str, HoldingSpring], read: Read) -> Iterator[Question]:

@@ -147,3 +147,15 @@ def test_a_speed_that_is_measured_elsewhere_is_not_rounded():
     forces = found.force[np.flatnonzero(np.diff(found.force))]
     assert len(forces) > 20
     assert np.abs(np.diff(forces, 2)[2:]).max() > 1e-3  # an integral of an error that stays grows evenly
+
+
+@pytest.mark.parametrize(("derivative", "sample"), [("error", ""), ("measurement", ""), ("measurement", "0.01 ms")])
+def test_a_step_of_the_target_does_not_kick_a_cascade_of_the_measurement(derivative, sample):
+    """F = Kp (Kv x_e + ∫ v_e dt / Tn): with the jump of the target in that integral it hunted where it settles."""
+    drive = {"control": "rotary-p-pi", "body": "motor", "velocity": "0", "kv": "30 1/s", "kp": "2 N m s/rad",
+             "tn": "20 ms", "derivative": derivative} | ({"sample_time": sample} if sample else {})  # fmt: skip
+    lines = (f"{key} = {value if key == 'velocity' else repr(value)}" for key, value in drive.items())
+    rig = ss.rig_from_text("\n".join([RINGING.partition("[drive]")[0], "[drive]", *lines]))
+    found = ss.hunt(rig, ss.protocol.DisplacementStep(at=0.0, by=1e-4), until=2e-3)
+    after = np.interp(1e-4, found.time, found.force)
+    assert after == pytest.approx(2 * (30 + (1 / 0.02 if derivative == "error" else 0.0)) * 1e-4, rel=0.1)

@@ -48,9 +48,12 @@ def wanted_force(Y: Array, control: Array, loops: Array) -> float:
         if control[Control.RESOLUTION] > 0.0 and loop < control[Control.ROUNDED]:
             place = rounded_to(place, control[Control.RESOLUTION])
         moved = before - place
+        error = target - place
         if control[Control.ON_MEASUREMENT] == 0.0:
             moved += target - aim
-        error, rate = target - place, moved / period
+        elif loop > 0:
+            error = -place
+        rate = moved / period
         if loop == 0:
             banded = beyond_band(error, band)
             if control[Control.BANDS_RATE] > 0.0:

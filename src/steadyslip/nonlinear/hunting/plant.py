@@ -142,8 +142,12 @@ class Plant:
         return found
 
     def error(self, loop: int = 0) -> Array:
-        """Row of the error that a loop of the controller sees."""
-        return self.row(-self.places[loop], target=1.0)
+        """Row of the error that a loop of the controller sees.
+
+        That of a speed loop is the integral of its own, without the target where derivatives are of the measurement.
+        """
+        kicked = loop == 0 or not self.limits.on_measurement
+        return self.row(-self.places[loop], target=1.0 if kicked else 0.0)
 
     def error_rate(self, loop: int = 0) -> Array:
         """Row of its derivative, of the measured place alone where the limits say so."""

@@ -118,7 +118,7 @@ def result_html(result: Any) -> str:
 def sketch_of(record: Any) -> str:
     """HTML figure of a rig as a sketch; empty for other records."""
     if isinstance(record, Slider):
-        return figure(sketch(record))
+        return figure(sketch(record), "The rig.")
     if isinstance(record, Machine):
         return figure(figure_html(lambda: draw(record), "sketch of the machine"), _SKETCH_CAPTION)
     return ""

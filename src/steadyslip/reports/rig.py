@@ -17,7 +17,6 @@ from steadyslip.core.records import Address, choices
 from steadyslip.core.roles import PARAMETER_KINDS
 from steadyslip.core.written import told_as
 from steadyslip.experiments import Prediction
-from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import column_html, figure_html
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.formula import formula_in_parts
@@ -28,7 +27,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import states_of_laws
 from steadyslip.model.numeric import by_matrices
-from steadyslip.reports.brief import text_html
+from steadyslip.reports.brief import sketch_of, text_html
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import (
     beside,
@@ -70,7 +69,7 @@ def verdict_parts(
     speed = format_quantity(rig.drive.velocity, "m/s")
     body = [
         *recommendation(analysis, order, tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
-        heading("The rig"), figure(sketch(rig), "The rig."),
+        heading("The rig"), sketch_of(rig),
         input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), table(facts(analysis), caption="The verdict."),
         *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # the motion is below

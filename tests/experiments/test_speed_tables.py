@@ -265,6 +265,53 @@ def test_a_radius_is_of_what_turns(tmp_path):
     assert "radius: is of a table of torques, over rpm or rad/s; leave it out" in done.stderr
 
 
+NO_VALUE = ("", "-", "–", "--", "n/a", "nan")
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_cells_without_a_value_leave_their_row_out(tmp_path, separator, place):
+    """A dash in a column of numbers was read as -1, the word for backward in a column of directions."""
+    path, rows = tmp_path / "t.csv", [["1", "400", "9"], ["3", "350", "9"], ["9", "280", "8"], ["20", "230", "8"]]
+    for cell in NO_VALUE:
+        holed = [[*row[:place], cell, *row[place + 1 :]] if row[0] == "3" else row for row in rows]
+        path.write_text("\n".join(map(separator.join, [["speed [mm/s]", "force [N]", "load [kN]"], *holed])) + "\n")
+        found = read_speed_table(path)
+        assert found.friction.tolist() == [400, 280, 230], (cell, separator)
+        assert found.notes == ("1 row without a number left out",)
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_columns_of_words_are_left_out_with_a_word(tmp_path, separator):
+    rows = [["Lauf", "Datum", "v [m/min]", "F [N]", "Richtung", "Bemerkung"],
+            ["1", "12,03,2024", "0,06", "389,2", "vor", "ok"], ["2", "12,03,2024", "0,18", "363,8", "vor", "-"],
+            ["3", "13,03,2024", "0,48", "353,2", "zurück", "leicht feucht"], ["4", "", "0,9", "325,7", "vor", ""]
+            ]  # fmt: skip
+    (path := tmp_path / "t.csv").write_text("\n".join(map(separator.join, rows)) + "\n", encoding="utf-8")
+    found = read_speed_table(path)
+    assert found.speed * 60 == pytest.approx([0.06, 0.18, -0.48, 0.9])
+    assert found.friction.tolist() == [389.2, 363.8, 353.2, 325.7]
+    assert "left out, as it holds words: column 'Datum'" in found.notes
+    assert "left out, as it holds words: column 'Bemerkung'" in found.notes
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("speed [mm/s];force\n1;400 N\n3;350 N\n9;280 N\n", "force: holds words, such as '400 N'; allowed: numbers"),
+        (
+            "speed [mm/s];force [N];direction\n1;400;up\n3;350;up\n9;280;down\n",
+            "direction: holds words, such as 'up'; allowed: forward and backward, vor and zurück, + and -, 1 and -1",
+        ),
+    ],
+)
+def test_words_in_a_column_that_is_needed_are_named(tmp_path, rows, words):
+    (path := tmp_path / "t.csv").write_text(rows)
+    with pytest.raises(ss.ParameterError, match=r"t\.csv: ") as caught:
+        read_speed_table(path)
+    assert words in str(caught.value)
+
+
 BAD = {
     "speed [rpm],force [N]\n1,5\n2,4\n3,3\n": "got speeds in rpm and a force",
     "a,b\n1,5\n2,4\n3,3\n": "has no column for it",

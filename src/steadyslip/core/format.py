@@ -302,6 +302,15 @@ def format_growth(low: float, high: float | None = None) -> str:
     return " to ".join(_few(one, 4) for one in (low, high) if one is not None) + " 1/s"
 
 
+def format_count(number: int, word: str) -> str:
+    """A number with its word, which is plural but for one.
+
+    >>> format_count(1, "row"), format_count(3, "row")
+    ('1 row', '3 rows')
+    """
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
 def format_percent(share: float) -> str:
     """Format a fraction as percent with three digits, or more if it would otherwise read as 0 or 100 %.
 

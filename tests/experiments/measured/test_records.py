@@ -159,9 +159,9 @@ def test_every_mended_row_is_reported(clean):
     record = ss.record_from_arrays(rows[:, 0], friction=rows[:, 1], normal=rows[:, 2], displacement=rows[:, 3])
     same(record, clean)
     notes = "\n".join(record.notes)
-    assert "1 rows without a number in time left out (lines 102" in notes
-    assert "1 rows whose time goes back left out (lines 51" in notes
-    assert "1 rows repeat the time" in notes
+    assert "1 row without a number in time left out (lines 102" in notes
+    assert "1 row whose time goes back left out (lines 51" in notes
+    assert "1 row repeats the time" in notes
 
 
 def test_gaps_and_back_steps_are_reported(clean):

@@ -11,6 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.format import format_count
 from steadyslip.core.results import ReadOnly
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.fitting.estimates import Estimate
@@ -141,6 +142,7 @@ def _chosen(
     notes: list[str] = []
     reference = float(np.exp(np.mean(np.log(speed))))
     speeds, fixed = _distinct(speed), dict(held)
+    rows = f"{format_count(len(speed), 'row')} at {format_count(speeds, 'speed')}"
     curve = steady_curve(law, reference, fixed, ())
     if unknown := [name for name in held if name not in curve.roles]:
         raise ParameterError([Problem(unknown[0], unknown_name("parameter", unknown[0], curve.roles))])
@@ -150,14 +152,14 @@ def _chosen(
     for name in droppable:
         if len(curve.free) > speeds or len(curve.free) + len(more) >= len(speed):
             value = fixed[name] = curve.roles[name].standing or 0.0
-            notes.append(f"{name} is held at {value:g}: {len(speed)} rows at {speeds} speeds do not tell it as well")
+            notes.append(f"{name} is held at {value:g}: {rows} do not tell it as well")
             curve = steady_curve(law, reference, fixed, ())
     while more and len(curve.free) + len(more) >= len(speed):
         notes.append(f"{more.pop()} is left out: {len(speed)} rows do not tell it as well")
     if len(curve.free) > speeds or len(curve.free) >= len(speed):
         way = "forward" if forward else "backward"
         raise NotAvailable(
-            f"{table.source!r} has {len(speed)} rows at {speeds} speeds {way}; the law {law.name!r} needs "
+            f"{table.source!r} has {rows} {way}; the law {law.name!r} needs "
             f"{len(curve.free)} speeds in {len(curve.free) + 1} rows at least"
         )
     return (steady_curve(law, reference, fixed, more) if more else curve), notes
@@ -301,7 +303,9 @@ def fit_loop(loop: PreslidingLoop) -> BristleStiffness:
     """
     x, f = loop.displacement, loop.force
     if len(x) < FEWEST_ROWS:
-        raise NotAvailable(f"{loop.source!r} has {len(x)} rows of a loop; allowed: {FEWEST_ROWS} or more")
+        raise NotAvailable(
+            f"{loop.source!r} has {format_count(len(x), 'row')} of a loop; allowed: {FEWEST_ROWS} or more"
+        )
     if still := [name for name, column in (("displacement", x), ("force", f)) if not np.ptp(column) > 0]:
         raise NotAvailable(f"{loop.source!r}: its {still[0]} is the same in all rows; a loop goes forward and back")
     steps = np.diff(x)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.dimensions import unit
-from steadyslip.core.format import format_quantity, format_with_error
+from steadyslip.core.format import format_count, format_quantity, format_with_error
 from steadyslip.core.quantities import PER_LOAD
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.core.version import stamped
@@ -273,7 +273,10 @@ def _direction(found: SpeedFindings, one: DirectionFit) -> list[str]:
     else:
         scatter = format_quantity(one.scatter, "1" if table.is_coefficient else "N m" if table.turns else "N", 2)
     way = "forward" if one.forward else "backward"
-    lines = [f"{way}: {len(one.speed)} rows, {speeds}; scatter {scatter}, from {_count(one.freedom, 'row')} to spare"]
+    lines = [
+        f"{way}: {format_count(len(one.speed), 'row')}, {speeds}; scatter {scatter}, "
+        f"from {format_count(one.freedom, 'row')} to spare"
+    ]
     wide = max(len(estimate.name) for estimate in one.estimates)
     with display_units([table.speed_unit]):
         for estimate in one.estimates:
@@ -296,10 +299,6 @@ def _difference(one: DirectionFit) -> str | None:
         return None
     text = format_with_error(direct - found[0].value, found[0].error, found[0].unit)
     return f"  {a} - {b} = {text}: the table tells the difference alone; {a} is held at {direct:g}"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 def _shown(one: SpeedEstimate) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_quantity
+from steadyslip.core.format import format_count, format_quantity
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
 GAP = 10.0  # ratio to the usual spacing from which an interval is noted as a gap; chosen by trial
@@ -136,7 +136,9 @@ def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) 
     which = [role for role, values in si.items() if not np.all(np.isfinite(values))]
     where = ", ".join(map(str, lines[bad][:5]))
     more = ", ..." if bad.sum() > 5 else ""
-    notes.append(f"{int(bad.sum())} rows without a number in {', '.join(which)} left out (lines {where}{more})")
+    notes.append(
+        f"{format_count(int(bad.sum()), 'row')} without a number in {', '.join(which)} left out (lines {where}{more})"
+    )
     return {role: values[~bad] for role, values in si.items()}, lines[~bad]
 
 
@@ -149,7 +151,8 @@ def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str)
         _check_clock(time, high, back, lines, source)
         where = ", ".join(map(str, lines[back][:5]))
         notes.append(
-            f"{int(back.sum())} rows whose time goes back left out (lines {where}{', ...' if back.sum() > 5 else ''})"
+            f"{format_count(int(back.sum()), 'row')} whose time goes back left out "
+            f"(lines {where}{', ...' if back.sum() > 5 else ''})"
         )
         si, lines, time = {role: values[~back] for role, values in si.items()}, lines[~back], time[~back]
     return _separated_times(si, lines, notes)
@@ -210,7 +213,8 @@ def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tu
         notes.append(f"{rows} rows share a time with others; spread evenly to the next, as the usual spacing has it")
     if len(starts) < len(time):
         rows = len(time) - len(starts)
-        notes.append(f"{rows} rows repeat the time of the row before; each such group became its mean")
+        said = "row repeats" if rows == 1 else "rows repeat"
+        notes.append(f"{rows} {said} the time of the row before; each such group became its mean")
     si = {role: np.add.reduceat(values, starts) / sizes for role, values in si.items()}
     si["time"] = time[starts]
     return si, lines[starts]

@@ -15,12 +15,14 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.dimensions import unit
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, QuantityError
+from steadyslip.core.format import format_count
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.measured.columns import known_unit, listed, split_name
 from steadyslip.experiments.measured.formats import FORMATS, read_columns
 from steadyslip.experiments.measured.formats.table import Table
 from steadyslip.experiments.measured.formats.text import read_text
 from steadyslip.experiments.measured.table_questions import questions_of_table
+from steadyslip.experiments.measured.words_in_tables import BACKWARD, FORWARD, without_words
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
 FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
@@ -43,9 +45,6 @@ _SPREAD = re.compile(
     r"(?i)(?<![a-zäöü])(σ|sigma|std|stdev|sd|error|err|uncertainty|streuung|standardabweichung)(?![a-zäöü])"
 )
 """Words of headers whose column is the scatter of another."""
-_FORWARD = r"forward|forwards|fwd|fw|vor|vorwärts|hin|positive|pos|cw|\+"
-_BACKWARD = r"backward|backwards|bwd|back|bw|reverse|rück|rückwärts|zurück|negative|neg|ccw|[-−–]"
-_CELL = re.compile(rf"(?i)(?<![^\s,;|\t\"])(?:(?P<forward>{_FORWARD})|(?P<backward>{_BACKWARD}))(?![^\s,;|\t\"])")
 _SPELLED = {
     "nm": "N m", "n·m": "N m", "n.m": "N m", "n*m": "N m", "mnm": "mN m", "nmm": "N mm", "ncm": "N cm", "knm": "kN m",
     "u/min": "rpm", "min-1": "rpm", "1/min": "rpm", "r/min": "rpm", "rev/min": "rpm", "rps": "rev/s",
@@ -179,13 +178,19 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
         pressed, twisted = np.full(len(v), Parameter("N", positive, "load").checked(load)), False
     clean = np.isfinite(v) & np.isfinite(f) & (np.isfinite(pressed) if pressed is not None else True)
     if not np.all(clean):
-        notes.append(f"{np.sum(~clean)} rows without a number left out")
+        notes.append(f"{format_count(int(np.sum(~clean)), 'row')} without a number left out")
     if np.any(still := clean & (v == 0)):
-        notes.append(f"{np.sum(still)} rows at rest left out: friction at rest is not that of sliding")
+        notes.append(
+            f"{format_count(int(np.sum(still)), 'row')} at rest left out: friction at rest is not that of sliding"
+        )
     keep = clean & (v != 0)
     v, f, pressed = v[keep], f[keep], None if pressed is None else pressed[keep]
     if len(v) < FEWEST_ROWS:
-        raise _fault(source, "speed", f"got {len(v)} rows of sliding; a table of speeds has {FEWEST_ROWS} at least")
+        raise _fault(
+            source,
+            "speed",
+            f"got {format_count(len(v), 'row')} of sliding; a table of speeds has {FEWEST_ROWS} at least",
+        )
     if twisted and pressed is not None:  # which rubs by its size, also where it is zero
         pressed = np.abs(pressed)
         if not np.any(pressed > 0):
@@ -208,8 +213,8 @@ def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[st
         notes.append("all speeds are negative: the friction is that of backward motion")
     if np.any(wrong := (friction < 0) & (speed > 0)) and not np.any((friction > 0) & (speed > 0)):
         notes.append(
-            f"{kind} is negative at {np.sum(wrong)} forward speeds: its sign is left out, as friction opposes motion; "
-            "where the motion was backward, write those speeds negative"
+            f"{kind} is negative at {format_count(int(np.sum(wrong)), 'forward speed')}: its sign is left out, "
+            "as friction opposes motion; where the motion was backward, write those speeds negative"
         )
     return notes
 
@@ -273,22 +278,27 @@ def _fault(source: str, name: str, message: str) -> ParameterError:
 
 
 def _table(path: Path) -> Table:
-    return read_columns(path) if path.suffix.lower() in FORMATS else read_text(path, False, _directions)
+    if path.suffix.lower() in FORMATS:
+        return read_columns(path)
+    notes: list[str] = []
 
+    def plain(raw: bytes) -> bytes:
+        text, said = without_words(raw, lambda name: _needed(*_head(name, None)))
+        notes.extend(said)
+        return text
 
-def _directions(raw: bytes) -> bytes:
-    """Text with 1 and -1 for words of directions in lines that have numbers."""
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return raw
     try:
-        text = raw.decode("utf-8")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    lines = [
-        _CELL.sub(lambda word: "1" if word["forward"] else "-1", line) if re.match(r"[^#%]*\d", line) and i else line
-        for i, line in enumerate(text.splitlines())
-    ]
-    return ("\n".join(lines) + "\n").encode("utf-8")
+        table = read_text(path, False, plain)
+    except ParameterError as error:
+        raise ParameterError(error.problems, title=str(path)) from error
+    table.notes += notes
+    return table
+
+
+def _needed(head: str, own: str | None) -> str | None:
+    """Role of a column in a table of speeds or a loop; None of one that may be left out."""
+    role = _guess(head, own)
+    return None if role == "displacement" and own is None else role
 
 
 def _refuse_misfits(path: Path) -> None:
@@ -427,7 +437,7 @@ def _side(head: str) -> int:
     """1 for a name that says forward, -1 backward, 0 neither."""
     words = [word for word in re.split(r"[\s_()\[\],.]+", head.lower()) if word]
     words += [head[-1]] if head and head[-1] in "+-−–" else []
-    forward, backward = (any(re.fullmatch(side, word) for word in words) for side in (_FORWARD, _BACKWARD))
+    forward, backward = (any(re.fullmatch(side, word) for word in words) for side in (FORWARD, BACKWARD))
     return int(forward) - int(backward)
 
 

@@ -138,10 +138,10 @@ def _layout(path: Path, text: str) -> _Layout:
     rows = [(i, line) for i, line in numbered if line.lstrip()[:1] not in ("#", "%")]
     if not rows:
         raise NotAvailable(f"{str(path)!r} has no lines of numbers in it")
-    delimiter = _delimiter(rows)
+    delimiter = delimiter_of(rows)
     header, body = _header(rows, delimiter)
     if not body:
-        hints = (_hint(cell) for _, line in rows[:50] for cell in _cells(line, delimiter))
+        hints = (_hint(cell) for _, line in rows[:50] for cell in cells_of(line, delimiter))
         advice = next((one for one in hints if one), "")
         where = "it" if len(rows) <= MOST_HEADER else f"its first {MOST_HEADER} lines"
         begins = f"it begins with {rows[0][1][:60]!r}{advice}"
@@ -149,7 +149,7 @@ def _layout(path: Path, text: str) -> _Layout:
     count = _usual_count(header, body, delimiter)
     names, units = _names(header, comments, body[0][0], delimiter, count)
     _check_split(path, header, body, delimiter, count)
-    cells = _cells(body[0][1], delimiter)[: len(names)]
+    cells = cells_of(body[0][1], delimiter)[: len(names)]
     moments = tuple(k for k, cell in enumerate(cells) if _is_moment(cell.strip('"')))
     days = tuple(k for k in moments if day(cells[k].strip('"')) is not None)
     return _Layout(names, units, delimiter, moments, days, header or comments, body)
@@ -157,7 +157,7 @@ def _layout(path: Path, text: str) -> _Layout:
 
 def _check_split(path: Path, header: list[Line], body: list[Line], delimiter: str | None, count: int) -> None:
     """Raise an error if commas separate columns and thousands, so that numbers such as 1,234.5 are split."""
-    named = max((len(_cells(line, delimiter)) for _, line in header), default=count)
+    named = max((len(cells_of(line, delimiter)) for _, line in header), default=count)
     if delimiter != "," or not 1 < named < count:
         return
     torn = next(((i, line) for i, line in body[:200] if _SPLIT_THOUSANDS.search(line)), None)
@@ -207,7 +207,7 @@ def _read_with_numpy(path: Path, raw: bytes) -> Table | None:
     return Table(layout.names, np.ascontiguousarray(values.T), lines, layout.units, notes)
 
 
-def _delimiter(rows: list[Line]) -> str | None:
+def delimiter_of(rows: list[Line]) -> str | None:
     """Column separator; None for blanks."""
     middle = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
     sample = [_QUOTED.sub("0", line) for line in middle if _BEGINS_WITH_NUMBER.match(line)]
@@ -231,7 +231,7 @@ def _is_number(cell: str, mark: str) -> bool:
     return number(cell, mark) is not None and not cell.endswith(COMMA)
 
 
-def _cells(line: str, delimiter: str | None, least: int = 1) -> list[str]:
+def cells_of(line: str, delimiter: str | None, least: int = 1) -> list[str]:
     """Cells of a line, without more than `least` trailing empty ones."""
     if delimiter is None:
         return line.split()
@@ -277,20 +277,23 @@ def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[L
     return rows, []
 
 
+def value_of(cell: str) -> float | None:
+    """Time, or number with either decimal mark, in a cell; NaN for an empty cell, None for other text."""
+    return number_with_any_mark(cell) if (found := _moment(cell)) is None else found
+
+
 def _holds_numbers(line: str, delimiter: str | None) -> bool:
-    numbers = [
-        number_with_any_mark(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)
-    ]
+    numbers = [value_of(cell) for cell in cells_of(line, delimiter)]
     return all(n is not None for n in numbers) and any(n == n for n in numbers)
 
 
 def _usual_count(header: list[Line], body: list[Line], delimiter: str | None) -> int:
     """Number of columns: that of most lines, or of a header that also names an often empty last column."""
-    counts = [len(_cells(line, delimiter)) for _, line in body[:200]]
+    counts = [len(cells_of(line, delimiter)) for _, line in body[:200]]
     usual = max(set(counts), key=counts.count)
     if delimiter is not None:
         whole = [len(line.split(delimiter)) for _, line in body[:200] if _holds_numbers(line, delimiter)]
-        named = [len(_cells(line, delimiter)) for _, line in header]
+        named = [len(cells_of(line, delimiter)) for _, line in header]
         usual = max([count for count in named if usual < count and whole.count(count) > len(whole) / 2], default=usual)
     return usual
 
@@ -300,11 +303,11 @@ def _names(
 ) -> tuple[list[str], list[str | None]]:
     """Names and units of the columns from the header or from comments; numbers as names without both."""
     lines = [line for _, line in header] or [line for i, line in comments if i < first]
-    split = [cells for line in lines[-NAMED:] if len(cells := _header_cells(line, delimiter, count)) == count]
+    split = [cells for line in lines[-NAMED:] if len(cells := header_cells(line, delimiter, count)) == count]
     return names_and_units(split, count)
 
 
-def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
+def header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
     """Cells of a header line, whose separator may differ from the body's; none for a ruled line."""
     if delimiter == "|":
         line = line.strip().strip("|")
@@ -325,7 +328,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
     count = len(layout.names)
     lines, table, faults = [], [], []
     for line_number, line in layout.body:
-        cells = _cells(line, layout.delimiter, count)
+        cells = cells_of(line, layout.delimiter, count)
         if len(cells) == count:
             lines.append(line_number)
             table.append(cells)

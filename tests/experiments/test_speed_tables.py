@@ -389,6 +389,44 @@ def test_a_column_in_another_unit_is_named_with_it(tmp_path, header, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["load", "Normalkraft", "preload", "normal stress"])
+@pytest.mark.parametrize(
+    ("size", "advice"),
+    [("bar", "bar is a pressure: multiply it by the area"), ("V", "V is none of its units: .* voltage .* N/V"),
+     ("mm", "mm is none of its units: write N"), ("%", "% is a share: multiply it by the rated value")],
+)  # fmt: skip
+def test_a_load_in_another_unit_is_refused(tmp_path, name, size, advice):
+    """It was left out without a word, so that coefficients came out as forces."""
+    (path := tmp_path / "t.csv").write_text(f"speed [mm/s],force [N],{name} [{size}]\n1,5,3\n2,4,3\n5,3.9,3\n")
+    words = re.escape(f"{name} [{size}]: ") + advice + '.*; or give one load of all rows, --set load="3.2 kN"'
+    with pytest.raises(ss.ParameterError, match=words):
+        read_speed_table(path)
+    read = read_speed_table(path, load="40 N")
+    assert read.load == pytest.approx([40.0] * 3)
+    assert f"not used: column '{name} [{size}]'" in read.notes
+
+
+@pytest.mark.parametrize("head", ["T [°C]", "T [C]", "t (K)", "Temp [°C]", "n [V]", "p [bar]", "t [s]", "No."])
+def test_other_columns_are_left_out_with_a_word(tmp_path, head):
+    """A temperature T was taken for a torque."""
+    (path := tmp_path / "t.csv").write_text(f"{head},speed [mm/s],force [N]\n20,1,5\n20,2,4\n21,5,3.9\n")
+    read = read_speed_table(path)
+    assert read.friction == pytest.approx([5, 4, 3.9])
+    assert read.notes == (f"not used: column '{head}'",)
+
+
+@pytest.mark.parametrize("option", ["load=3 bar", "load=foo", "load=0", "radius=3 bar", "radius=-1 mm"])
+def test_an_option_that_is_not_valid_is_named(tmp_path, option):
+    name = option.split("=")[0]
+    header = "speed [rpm],torque [N m]" if name == "radius" else "speed [mm/s],force [N]"
+    (path := tmp_path / "t.csv").write_text(f"{header}\n1,5\n2,4\n5,3.9\n9,3.8\n")
+    said = command("fit", path, "--law", "coulomb", "--set", option)
+    assert said.returncode == 2
+    assert f"t.csv: {name}: got " in said.stderr
+    assert f"allowed: a {name} in {'m' if name == 'radius' else 'N'} above 0" in said.stderr
+    assert "[contacts" not in said.stderr
+
+
 def test_coefficients_in_per_cent_and_loads_named_m_are_read(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("speed [mm/min],mu [%],m [kg]\n1,15,10\n2,14,10\n5,13,10\n")

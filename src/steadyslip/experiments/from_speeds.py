@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.domains import positive
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, keywords_of, refuse_unknown, unknown_name
 from steadyslip.core.options import checked
 from steadyslip.core.records import role_of
@@ -20,6 +19,7 @@ from steadyslip.experiments.fitting.speed_result import SpeedFit
 from steadyslip.experiments.measured.speeds import (
     UNITS_OF_ROLES,
     SpeedTable,
+    checked_option,
     is_loop,
     read_loop,
     read_speed_table,
@@ -105,14 +105,14 @@ def fit_friction_table(
     if isinstance(table, SpeedTable):
         read = table
     elif isinstance(table, Mapping):
-        pressed = {} if load is None else {"load": Parameter("N", positive, "load").checked(load)}
+        pressed = {} if load is None else {"load": checked_option("load", load, "N", "arrays")}
         read = table_from_arrays({**table, **pressed})
     else:
         read = read_speed_table(table, load=load, **columns)
     if radius is not None:
         if not read.turns:
             raise ParameterError([Problem("radius", "is of a table of torques, over rpm or rad/s; leave it out")])
-        read = replace(read, radius=Parameter("m", positive, "radius").checked(radius))
+        read = replace(read, radius=checked_option("radius", radius, "m", read.source))
     kind = _law(law)
     held = _held(kind, hold or {})
     sides = {

@@ -14,7 +14,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.dimensions import unit
 from steadyslip.core.domains import positive
-from steadyslip.core.errors import ParameterError, Problem, QuantityError
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short
 from steadyslip.core.format import format_count
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.measured.columns import known_unit, listed, split_name
@@ -146,7 +146,7 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
         If the file cannot be read.
     """
     source = str(path)
-    found, notes = _roles(Path(path), columns)
+    found, notes = _roles(Path(path), columns, () if load is None else ("load",))
     kinds = [role for role in ("force", "torque", "friction") if role in found]
     if "speed" not in found or len(kinds) != 1:
         lacking = "speed" if "speed" not in found else "force"
@@ -175,7 +175,9 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     if twisted and not turns:
         raise _fault(source, "load", f"got {found['load'][0].unit} beside a {kind}; allowed: a load in N, what presses")
     if load is not None:
-        pressed, twisted = np.full(len(v), Parameter("N", positive, "load").checked(load)), False
+        pressed, twisted = np.full(len(v), checked_option("load", load, "N", source)), False
+    elif pressed is None:
+        _refuse_misfits(Path(path), "load")
     clean = np.isfinite(v) & np.isfinite(f) & (np.isfinite(pressed) if pressed is not None else True)
     if not np.all(clean):
         notes.append(f"{format_count(int(np.sum(~clean)), 'row')} without a number left out")
@@ -204,6 +206,23 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     return SpeedTable(
         source, v, friction, pressed, turns, kind == "friction", speed.unit, (*notes, *asked), twisted, questions=asked,
     )  # fmt: skip
+
+
+def checked_option(name: str, value: Any, si_unit: str, source: str) -> float:
+    """A positive load or radius in SI units.
+
+    Raises
+    ------
+    ParameterError
+        Naming the option.
+    """
+    try:
+        return float(Parameter(si_unit, positive, name).checked(value))
+    except ParameterError as error:
+        usual = {"N": "3.2 kN", "m": "40 mm"}[si_unit]
+        more = "; multiply a pressure by the area that it acts on" if si_unit == "N" else ""
+        message = f"got {repr_short(value)}; allowed: a {name} in {si_unit} above 0, such as '{usual}'{more}"
+        raise _fault(source, name, message) from error
 
 
 def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[str]:
@@ -301,26 +320,33 @@ def _needed(head: str, own: str | None) -> str | None:
     return None if role == "displacement" and own is None else role
 
 
-def _refuse_misfits(path: Path) -> None:
-    """Refuse columns that are named like a speed, force or torque and have another unit."""
+def _refuse_misfits(path: Path, role: str = "") -> None:
+    """Refuse columns that are named like a speed, force, torque or load, or like one role, and have another unit."""
     table = _table(path)
     heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
+    heads = [head if not role or role in _named(_bracketed(*head)[0]) else ("", None) for head in heads]
     problems = [Problem(name, why) for name, head in zip(table.names, heads, strict=True) if (why := _misfit(*head))]
     if problems:
         raise ParameterError(problems, title=str(path))
 
 
-def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]], list[str]]:
-    """Columns of a file by role, and notes; of friction there may be two, forward and backward."""
+def _roles(
+    path: Path, given: Mapping[str, Any], without: Sequence[str] = ()
+) -> tuple[dict[str, list[_Role]], list[str]]:
+    """Columns of a file by role but those `without`, and notes; of friction there may be two, forward and backward."""
     table = _table(path)
     heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
     chosen = {role: _asked(str(path), role, value, table.names, heads) for role, value in given.items()}
     taken = {place for place, _ in chosen.values() if place is not None}
     notes = list(table.notes)
     found: dict[str, list[_Role]] = {}
+    unused: list[str] = []
     for i, (name, (head, own)) in enumerate(zip(table.names, heads, strict=True)):
         asked = next((role for role, (place, _) in chosen.items() if place == i), None)
         role = asked or (None if i in taken else _guess(head, own))
+        role = None if role in without else role
+        if role is None and not _SPREAD.search(head) and np.any(np.isfinite(table.values[i])):
+            unused.append(name)
         if role is None or (asked is None and chosen.get(role, (None, None))[0] is not None):
             continue
         stated = chosen.get(role, (None, None))[1] or own
@@ -339,6 +365,7 @@ def _roles(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, list[_Role]]
             factor *= WEIGHT
             notes.append(f"load: kg press with {WEIGHT} N each")
         found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, _side(head), is_bare))
+    notes += [f"not used: column {name!r}" for name in unused]
     for role, several in found.items():
         if len(several) > 1 and not (role in ("force", "torque", "friction") and all(one.side for one in several)):
             alike = [name for name, head in zip(table.names, heads, strict=True) if _guess(*head) == role]
@@ -387,6 +414,8 @@ def _guess(head: str, own: str | None) -> str | None:
     """Role of a column by its name and unit; None if none is, or if they contradict each other."""
     if _SPREAD.search(head):
         return None
+    if _is_other(head, own):
+        return None
     fits, named = list(UNITS_OF_ROLES), _named(head)
     if own is not None and own != "1":
         dimension = unit(own)[1]
@@ -409,28 +438,58 @@ def _named(head: str) -> list[str]:
 
 
 def _misfit(head: str, own: str | None) -> str:
-    """What is wrong with the unit of a column that is named like a speed, force or torque; empty if it fits.
+    """What is wrong with the unit of a column that is named like a speed, force, torque or load; empty if it fits.
 
-    Names of one letter say little: a mass may be m or t, a displacement s.
+    Names of one letter say little: a mass may be m or t, a temperature T, a displacement s.
     """
-    bracket = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", head)
-    said = own or (bracket[1] if bracket else "")
-    kinds = [role for role in _named(head) if role in ("force", "torque", "speed")]
-    if not said or said == "1" or not kinds or (len(head) == 1 and head.lower() != "f"):
+    name, said = _bracketed(head, own)
+    kinds = [role for role in _named(name) if role in ("force", "torque", "speed", "load")]
+    if not said or said == "1" or not kinds or _is_letter(name) or _is_other(head, own):
         return ""
     lever = " cm" if "torque" in kinds else ""
     good = " or ".join(one for role in kinds for one in UNITS_OF_ROLES[role])
+    instead = '; or give one load of all rows, --set load="3.2 kN"' if kinds == ["load"] else ""
     try:
         dimension = unit(said)[1]
     except QuantityError:
-        return f"{said} is none of its units: write {good}; multiply a current by the torque constant"
+        return f"{said} is none of its units: write {good}{_MULTIPLIED.get(said[-1:], '')}{instead}"
     if dimension in [unit(one)[1] for role in kinds for one in UNITS_OF_ROLES[role]]:
         return ""
+    if dimension == unit("Pa")[1]:
+        return f"{said} is a pressure: multiply it by the area that it acts on, and write {good}{instead}"
     if dimension.mass == 1 and not dimension.time:
         return f"{said} is a mass: write kgf{lever} for the reading of a balance, which is 9.80665 N{lever}"
     if dimension == unit("1")[1]:
-        return f"{said} is a share: multiply it by the rated value, and write {good}"
-    return f"{said} is none of its units: write {good}"
+        return f"{said} is a share: multiply it by the rated value, and write {good}{instead}"
+    return f"{said} is none of its units: write {good}{instead}"
+
+
+_MULTIPLIED = {"A": "; multiply a current by the constant of the motor, N/A or N m/A",
+               "V": "; multiply a voltage by what the sensor has of it, such as N/V"}  # fmt: skip
+"""Advice by the last letter of a unit."""
+_TEMPERATURES = ("c", "k", "f", "degc", "degf", "celsius", "kelvin", "fahrenheit")
+
+
+def _bracketed(head: str, own: str | None) -> tuple[str, str]:
+    """Name of a column without a unit in brackets that is not known, and its unit or an empty text."""
+    bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", head)
+    return (bracket[1], own or bracket[2]) if bracket else (head, own or "")
+
+
+def _is_letter(name: str) -> bool:
+    """True for a name of one letter that may be of many things."""
+    return len(name) == 1 and name.lower() != "f"
+
+
+def _is_other(head: str, own: str | None) -> bool:
+    """True for a temperature, and for a name of one letter with a unit that no column of such tables has."""
+    name, said = _bracketed(head, own)
+    if said.lower().replace("°", "").replace("℃", "c") in _TEMPERATURES:
+        return True
+    if not said or said == "1" or not _is_letter(name):
+        return False
+    allowed = [unit(one)[1] for units in UNITS_OF_ROLES.values() for one in units]
+    return own is None or unit(own)[1] not in allowed
 
 
 def _side(head: str) -> int:

@@ -144,7 +144,7 @@ def cure(
 
     check_output(output or (), (".html",))
     found = run(*rig_and_tolerances(rig, changes or ()), sure=sure)
-    output_result(found, output or (), as_json, partial(write_page, kind="Cures"))
+    output_result(found, output or (), as_json, partial(write_page, kind="Cures", source=rig))
 
 
 def compare(

@@ -261,7 +261,7 @@ def _values_of(rig: Rig, names: Iterable[str]) -> Iterator[str]:
         one = rig.parameters()[name]
         if one.value and np.ndim(one.value) == 0:
             with told_as(rig.written_as(name)):
-                word = format_quantity(float(one.value), one.role.unit, 4, rig.printed_area(name))
+                word = format_quantity(*rig.told(name, float(one.value)), 4, rig.printed_area(name))
             yield _unbroken(f"{said(rig, name)} {typeset(word)}")
 
 

@@ -13,12 +13,10 @@ from typing import Any
 from steadyslip.core.errors import ParameterError, Problem, keywords_of, refuse_unknown, repr_short
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
-from steadyslip.machine.rig import Rig
 from steadyslip.reports import lab, two_rigs  # noqa: F401 -- register documents of fits and of comparisons
 from steadyslip.reports.brief import brief
 from steadyslip.reports.document import Report, document_html, source_text
 from steadyslip.reports.results import parts_of
-from steadyslip.verdict import Analysis, Tolerated
 
 __all__ = ["Report", "brief", "report"]
 
@@ -79,11 +77,12 @@ def report(
     except TypeError as error:
         message = f"got {repr_short(source)}; allowed: a path, or a sequence of paths"
         raise ParameterError([Problem("source", message)]) from error
-    _, *further = keywords_of(parts_of.dispatch(type(result)), ["source"])
+    maker = parts_of.dispatch(type(result))
+    _, *further = keywords_of(maker, ["source"])
     allowed = [*keywords_of(report, ["result"]), *further]
     refuse_unknown(f"report({type(result).__name__})", options, allowed)
     block = {"project": project, "author": author, "revision": revision, "approval": approval}
-    if isinstance(result, Rig | Analysis | Tolerated):
+    if "source" in keywords_of(maker):
         options["source"] = source_text(paths[0]) if paths else ""
     return Report(document_html(parts_of(result, **options), title, explorer, paths, block), title)
 

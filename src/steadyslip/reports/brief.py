@@ -19,7 +19,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord, parameters
-from steadyslip.core.written import WrittenAs, si_units, told_as
+from steadyslip.core.written import si_units, told_as
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.machine.machine import Machine
@@ -76,7 +76,7 @@ DIMENSIONLESS = frozenset(
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _HIDDEN = frozenset(
     """rig version plan data protocol area unit units html start fit fits draws search noise plot map resonances told
-    where columns""".split()  # noqa: SIM905
+    where columns windows fails unlisted""".split()  # noqa: SIM905
 )
 _SKETCH_CAPTION = (
     "Motion is to the right. Thick bars and the rounded frame: the drive; dashed line: what it measures; arrows with a "
@@ -189,12 +189,13 @@ def _record_html(record: FrozenRecord) -> Iterator[str]:
         if one.value is not None:
             values = np.asarray(one.value)
             area = record.printed_area(path) if isinstance(record, Rig) else None
-            with told_as(record.written_as(path) if isinstance(record, Rig) else WrittenAs()):
-                words = (
-                    format_quantity(float(values), one.role.unit, 6, area)
-                    if values.ndim == 0
-                    else _format_array(values, one.role.unit, area)
-                )
+            if values.ndim:
+                words = _format_array(values, one.role.unit, area)
+            elif isinstance(record, Rig):
+                with told_as(record.written_as(path)):
+                    words = format_quantity(*record.told(path, float(values)), 6, area)
+            else:
+                words = format_quantity(float(values), one.role.unit, 6)
             rows.append((path, words, stress_name(one.role.doc, area)))
     yield table(rows, ("parameter", "value", "meaning"))
 

@@ -38,7 +38,8 @@ from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.recommendation import Order
 from steadyslip.reports.sections import notes_of, references
-from steadyslip.verdict import Analysis, Tolerated, analyze, tolerate
+from steadyslip.verdict import Analysis, Cures, Tolerated, analyze, tolerate
+from steadyslip.verdict.words import told_range
 
 MAX_ROWS = 24  # rows of a table of slip events or cycles, so that a document stays short (by trial)
 PHASE_PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
@@ -70,15 +71,21 @@ def parts_of(result: Any) -> Parts:
         heading("What was found"),
         worded(rig, result_html(result)) if rig else result_html(result),
     ]
-    return Parts(sentence(first).rstrip("."), "", f"What does the {kind} say?", body, rig)
+    many = kind.endswith("s") and not kind.endswith(("is", "ss"))
+    return Parts(sentence(first).rstrip("."), "", f"What {'do' if many else 'does'} the {kind} say?", body, rig)
 
 
-def rig_section(rig: Slider | Machine | None, source: str = "") -> list[str]:
-    """HTML of the sketch and inputs of a rig, with comments of its file if its text is given; empty for None."""
+def rig_section(
+    rig: Slider | Machine | None, source: str = "", tolerances: Mapping[str, str] | None = None
+) -> list[str]:  # fmt: skip
+    """HTML of the sketch and inputs of a rig, with comments of its file if its text is given; empty for None.
+
+    Tolerances are texts by name, or None for a result that knows of none.
+    """
     if rig is None:
         return []
     what = "The machine" if isinstance(rig, Machine) else "The rig"
-    return [heading(what), sketch_of(rig), rig_report.input_table(rig, {}, notes_of(source))]
+    return [heading(what), sketch_of(rig), rig_report.input_table(rig, tolerances, notes_of(source))]
 
 
 @parts_of.register
@@ -234,6 +241,44 @@ def _verdict_parts(result: Analysis, order: Order, within: Tolerated | None = No
     if result.rig.in_forces:
         return machine_report.verdict_parts(result, within, order)
     return rig_report.verdict_parts(result, tolerated=within, order=order)
+
+
+@parts_of.register
+def _cures(result: Cures, source: str = "") -> Parts:
+    rig, lines = result.rig, [worded(result.rig, one) for one in result.sentences()]
+    ranges = {name: told_range(rig, name, *ends) for name, ends in result.ranges.items()}
+    body = [
+        *rig_section(rig, source, ranges),
+        heading("What was found"), *(paragraph(sentence(one)) for one in lines[1:]), *_changes(result),
+    ]  # fmt: skip
+    stable = f"is stable with a chance of {format_percent(result.sure)}" if result.error else "is stable"
+    of = "machine" if rig.in_forces else "rig"
+    question = f"What is to be changed so that this {of} {stable}, and what does it cost?"
+    if result.chance >= result.sure:
+        question = f"Is it certain enough that this {of} is stable, and what would lose it?"
+    return Parts(lines[0].rstrip(":"), "", question, body, rig)
+
+
+def _changes(result: Cures) -> Iterator[str]:
+    """HTML tables of the values of every parameter at which the chance is reached, or beyond which it is lost."""
+    rig = result.rig
+    if result.chance >= result.sure:
+        rows = [
+            (said(rig, one.parameter), one.written(one.value), " or ".join(map(one.written, ends)))
+            for one, ends in result.losses().items()
+        ]
+        yield (
+            table(rows, ("parameter", "now", "lost from"), caption="Changes of one value that lose it.") if rows else ""
+        )
+        return
+    for several, words in ((result.windows, "may be changed"), (result.unlisted, "are not listed as adjustable")):
+        found = [
+            (said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.3g}" if one.windows else "none")
+            for one in several
+        ]
+        if found:
+            head = ("parameter", "now", "enough alone", "cost of the nearest")
+            yield table(found, head, caption=f"Values that {words}, one at a time.")
 
 
 @parts_of.register

@@ -23,6 +23,7 @@ from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
 from steadyslip.machine.letters import MEMBERS, letter_of, said, worded, words_of
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import states_of_laws
@@ -53,7 +54,7 @@ from steadyslip.reports.sections import (
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.change_costs import unit_cost
 from steadyslip.verdict.whole_text import facts, meaning
-from steadyslip.verdict.words import EDGE_WORDS, edge_rows, headline
+from steadyslip.verdict.words import EDGE_WORDS, edge_rows, headline, told
 
 VALIDITY = (
     "The verdict is on small disturbances of steady sliding: it holds for the model and the inputs below, and says "
@@ -66,7 +67,7 @@ def verdict_parts(
 ) -> Parts:
     """Contents of the document of a verdict on a slider, with its uncertainty from a fit or tolerances if given."""
     rig = analysis.rig
-    speed = format_quantity(rig.drive.velocity, "m/s")
+    speed = told(rig, "drive.velocity", float(rig.drive.velocity))
     body = [
         *recommendation(analysis, order, tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
         heading("The rig"), sketch_of(rig),
@@ -85,12 +86,13 @@ def verdict_parts(
 
 def input_table(
     rig: Slider | Machine,
-    tolerances: Mapping[str, str] = MappingProxyType({}),
+    tolerances: Mapping[str, str] | None = MappingProxyType({}),
     notes: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """HTML table of the parameters of a rig: words, letter, value (totals if it has an area), meaning.
 
-    With its tolerance if any is given, and where it comes from: the comment behind it in the rig file, if there is one.
+    With its tolerance if any is given, None for a result that knows of none, and where it comes from: the comment
+    behind it in the rig file, if there is one. The speed of the drive is that of the body that the file names.
     """
     model = None if rig.holds or by_matrices(rig) else build_model(rig)
     rows, inputs = [], rig.parameters()
@@ -98,14 +100,15 @@ def input_table(
     for name, letter in letters_of_inputs.items():
         one = inputs[name]
         known = inline_math(sp.Symbol(letter))
+        number, of = rig.told(name, float(one.value or 0.0))
         with told_as(rig.written_as(name)):
-            text = format_own(float(one.value or 0.0), one.role.unit, rig.printed_area(name))
+            text = format_own(number, of, rig.printed_area(name))
         rows.append(
             (
                 words_of(rig, name),
                 known,
                 text,
-                stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)),
+                stress_name(_meaning(one, letter_of(rig, name)), rig.printed_area(name)) + _fed_body(rig, name),
                 *((tolerances.get(name, "none given"),) if tolerances else ()),
                 *((_remark(notes, name),) if notes else ()),
             )
@@ -116,12 +119,20 @@ def input_table(
             both = *(("",) if tolerances else ()), *((_remark(notes, name),) if notes else ())
             rows.append((said(rig, name), "", chosen, choice.doc, *both))
     more = (*(("tolerance",) if tolerances else ()), *(("source or remark",) if notes else ()))
-    words = "Inputs." if tolerances else "Inputs. Tolerances: none given."
+    words = "Inputs." if tolerances or tolerances is None else "Inputs. Tolerances: none given."
     own = [name for name in letters_of_inputs if name.partition(".")[0] in MEMBERS]
     if shared := [one for one in own if letters_of_inputs[one].endswith(f"_{subscript_of(one)}")]:
         example = f"{said(rig, shared[0])} for {letters_of_inputs[shared[0]]}"
         words += f" Behind the name of a member its letter stands without the subscript: {example}."
     return table(rows, ("input", "letter", "value", "meaning", *more), caption=words)
+
+
+def _fed_body(rig: Slider | Machine, name: str) -> str:
+    """Clause on the body whose speed is told for that of the drive, and on this; empty where they are the same."""
+    if not isinstance(rig, Machine) or name != "drive.velocity" or rig.told(name, 1.0) == Rig.told(rig, name, 1.0):
+        return ""
+    own = format_quantity(*Rig.told(rig, name, float(rig.drive.velocity)))
+    return f", that of {rig.fed}; in the equations it is that of {rig.drive.driven() or 'the load point'}, {own}"
 
 
 def _remark(notes: Mapping[str, str], name: str) -> str:

@@ -14,7 +14,7 @@ from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.recommendation import Order, recommendation
 from steadyslip.reports.results import parts_of, rig_section
 from steadyslip.reports.rig import VALIDITY, edge_table
-from steadyslip.reports.sections import assumptions, motion, references
+from steadyslip.reports.sections import assumptions, motion, references, tolerances_of
 from steadyslip.verdict import RigComparison, Tolerated
 from steadyslip.verdict.between import IMPOSSIBLE
 from steadyslip.verdict.words import headline
@@ -35,9 +35,10 @@ def _comparison(result: RigComparison) -> Parts:
         *_assumed(result),
         heading("Side by side"), table(told, (label or "of", *names), caption="The two rigs."),
         heading("What differs?"), *_differences(result), _chart(result),
-        *(part for name, one, _ in of_each
+        *(part for name, one, within in of_each
           for part in (heading(f"How far is the edge of {name}?"), *edge_table(one),
-                       *motion(one, f"The motion of {name}"), heading(f"Inputs of {name}"), *rig_section(one.rig)[1:])),
+                       *motion(one, f"The motion of {name}"), heading(f"Inputs of {name}"),
+                       *rig_section(one.rig, tolerances=tolerances_of(within))[1:])),
         *references(*rigs, names=result.names),
     ]  # fmt: skip
     verdicts = [headline(one, capitals=False).partition(":")[0].lower() for one in result.verdicts]

@@ -82,6 +82,8 @@ class Cures(ReadOnly):
         True if nothing of the rig varies: what is told is then of the rig itself, whatever chance is asked for.
     unknown : tuple of ValuesWithin
         Parameters whose values are not known, at all of which the chance is reached.
+    ranges : dict of str to (float, float)
+        Tolerances: least and largest value by dotted name, SI units; of normal distributions where 95 % lie.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -95,6 +97,7 @@ class Cures(ReadOnly):
     unlisted: tuple[Window, ...] = ()
     without_tolerances: bool = False
     unknown: tuple[ValuesWithin, ...] = ()
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict, repr=False)
 
     @property
     def best(self) -> Window | None:
@@ -104,18 +107,35 @@ class Cures(ReadOnly):
 
     def __str__(self) -> str:
         wide = 2 + max(len(one.parameter) for one in (*self.windows, *self.fails, *self.unlisted))
-        now = self._now()
+        lines = self.sentences()
+        if self.chance >= self.sure:
+            rows = [f"{one.parameter:<{wide}}{_change(one, *ends)}" for one, ends in self.losses().items()]
+            return "\n".join([lines[0], *rows, *lines[1:]])
+        enough = [one for one in self.unlisted if one.windows]
+        rows = [f"{one.parameter:<{wide}}{one.written(one.value)} now; {one}" for one in (*self.windows, *enough)]
+        if self.unlisted:
+            names = ", ".join(one.parameter for one in self.unlisted)
+            words = (
+                "not listed as adjustable, but enough alone:" if enough else f"nor would do alone, not listed: {names}"
+            )
+            rows.insert(len(self.windows), words)
+        return "\n".join([*lines, *rows])
+
+    def losses(self) -> dict[Window, list[float]]:
+        """Of a rig with enough chance the parameters whose change would lose it, with the values that are not far."""
+        near = {one: [end for end in one.edges_around if one.doublings(end) <= FAR] for one in self.fails}
+        return {one: ends for one, ends in near.items() if ends}
+
+    def sentences(self) -> list[str]:
+        """Lines on what is asked for, on what it holds for, and on the cheapest changes, without those by parameter."""
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
-        tried = places(len(self.unknown))
+        now, tried = self._now(), places(len(self.unknown))
         alone = [f"at every value of {one.parameter} from {one.given}, {tried} of them tried" for one in self.unknown]
         alone += [OWN_VALUES.format(" for all else" if alone else "")] if self.without_tolerances else []
         if self.chance >= self.sure:
             already = f"Already {wanted} (now {now})" if self.error else f"Already {wanted}"
-            near = {one: [end for end in one.edges_around if one.doublings(end) <= FAR] for one in self.fails}
-            lines = [f"{one.parameter:<{wide}}{_change(one, *ends)}" for one, ends in near.items() if ends]
             whatever = f"whatever single value changes by less than a factor of {REMOTE}"
-            found = [f"{already}. What would lose it first:", *lines] if lines else [f"{already}, {whatever}"]
-            return "\n".join([*found, *alone])
+            return [f"{already}. What would lose it first:" if self.losses() else f"{already}, {whatever}", *alone]
         lines = [f"To be {wanted} (now {now})", *alone]
         if (best := self.best) is not None:
             only = best.parameter == SPEED and not any(one.nearest for one in self.windows if one is not best)
@@ -129,15 +149,7 @@ class Cures(ReadOnly):
             lines.append(f"cheapest pair: {both}, cost {self.pair_cost:.3g}")
         else:
             lines.append("no pair is cheaper" if best is not None else "nor does any pair of changes")
-        enough = [one for one in self.unlisted if one.windows]
-        rows = [f"{one.parameter:<{wide}}{one.written(one.value)} now; {one}" for one in (*self.windows, *enough)]
-        if self.unlisted:
-            names = ", ".join(one.parameter for one in self.unlisted)
-            words = (
-                "not listed as adjustable, but enough alone:" if enough else f"nor would do alone, not listed: {names}"
-            )
-            rows.insert(len(self.windows), words)
-        return "\n".join([*lines, *rows])
+        return lines
 
     def _now(self) -> str:
         """Chance or verdict of the rig as it is, of unknown values the least."""
@@ -239,7 +251,8 @@ def cure(
     fails = _fails(chances, windows, wanted) if chance >= wanted else ()
     reached = chance >= wanted or pair or any(one.windows for one in windows)
     unlisted = () if reached else _unlisted(chances, given, wanted)
-    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, unlisted, chances.single, within)
+    ranges = {} if chances.spreads is None else {name: one.ends for name, one in chances.spreads.of.items()}
+    return Cures(rig, wanted, chance, error, windows, pair, cost, fails, unlisted, chances.single, within, ranges)
 
 
 def _share(sure: float | str) -> float:

@@ -564,6 +564,15 @@ QUESTIONS = {
         "v,F [N]\n1,800\n3,700\n10,500\n30,400\n",
         r"speeds up to 30 m/s\? Write their unit in the header, speed \[mm/min\], or give --set speed=mm/min",
     ),
+    "speeds of a slide in m/s for mm/s": (
+        "speed [m/s],force [N]\n1,400\n3,350\n9,280\n20,230\n60,210\n",
+        r"speeds up to 60 m/s\? They are in m/s in the header; guides reach 5 m/s, brakes 50 m/s",
+    ),
+    "a direction without load": (
+        "speed [rpm],torque [Nm],load [Nm]\n10,2.4,10\n30,2.1,10\n90,1.7,10\n300,1.4,10\n900,1.2,10\n"
+        "-10,1.5,0\n-30,1.25,0\n-90,1,0\n-300,0.75,0\n-900,0.62,0\n",
+        "backward: 5 rows left out, as load 0 N m throughout tells no coefficient: give the loads, or these rows as",
+    ),
     "speeds in another unit": ("v [m/s],F [N]\n1,800\n30,500\n600,400\n", r"up to 600 m/s\? They are in m/s in the"),
     "a weight": (
         "speed [mm/min],force [N]\n10,950\n60,930\n200,920\n-10,350\n-60,370\n-200,380\n",
@@ -585,6 +594,18 @@ def test_numbers_that_are_not_of_friction_are_asked_about_once(tmp_path, text, w
     found = ss.experiments.fit_friction_table(path, "coulomb")
     assert f"  to check: {question}\n" in str(found)
     assert f"# To check: {question}\n" in found.rig_text()
+
+
+@pytest.mark.parametrize("errors", ["relative", "absolute"])
+def test_scatter_beyond_the_friction_is_asked_about(errors):
+    """Of a law that gives a thousandth of it at half the speeds; never of curves of it with 10 % of noise."""
+    wild = np.where(np.arange(8) % 2, 1000.0, 1.0)
+    found = ss.experiments.fit_friction_table({"speed": SPEEDS, "force": wild}, "coulomb", errors=errors)
+    (line,) = [line for line in str(found).splitlines() if "to check" in line]
+    assert re.search(r"to check: forward: scatter .* %, more than the friction itself: the law coulomb does not", line)
+    assert f"# {line.strip().replace('to', 'To', 1)}\n" in found.rig_text()
+    noise = 1 + 0.1 * np.random.default_rng(4).standard_normal(8)
+    assert "to check" not in str(fitted(LOAD * curve(SPEEDS, **AXIS) * noise, errors=errors))
 
 
 @pytest.mark.parametrize(

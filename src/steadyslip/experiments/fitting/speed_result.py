@@ -87,7 +87,7 @@ def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -
         turned = found.table.turns and found.table.radius is None
         what = "torques in N m" if turned else "forces in N"
         lines += [f"# The table has no load: it is 1 N here, and coefficients are {what}."]
-    lines += [f"# To check: {text}" for text in found.table.questions]
+    lines += [f"# To check: {text}" for text in (*found.table.questions, *_scattered(found))]
     lines += ["", *(_joint if found.table.turns else _axis)(found, ranges)]
     where = "contacts.bearing.friction" if found.table.turns else "friction"
     if ranges:
@@ -233,6 +233,21 @@ def _written(found: SpeedFindings, name: str, value: float) -> str:
     return f'"{value:.8g} {own}"'
 
 
+MOST_SCATTER = 1.0  # share of the friction from which the law is told not to follow it: as wrong as none at all
+
+
+def _scattered(found: SpeedFindings) -> list[str]:
+    """Questions about directions whose scatter exceeds their friction."""
+    sides = [one for one in (found.forward, found.backward) if one is not None]
+    shares = [one.scatter / (1.0 if found.relative else float(np.median(one.friction))) for one in sides]
+    return [
+        f"{'forward' if one.forward else 'backward'}: scatter {100 * share:.2g} %, more than the friction itself: the "
+        f"law {found.law} does not follow these rows; are their signs, loads and units right?"
+        for one, share in zip(sides, shares, strict=True)
+        if share > MOST_SCATTER
+    ]
+
+
 CLOSE = 0.95  # correlation from which two parameters are told to stand for each other
 
 
@@ -241,6 +256,7 @@ def words(found: SpeedFindings) -> str:
     table = found.table
     lines = [f"Friction of {table.source} as the law {found.law}"]
     lines += [f"  to check: {note}" if note in table.questions else f"  {note}" for note in table.notes]
+    lines += [f"  to check: {note}" for note in _scattered(found)]
     for one in (found.forward, found.backward):
         lines += ["", *_direction(found, one)] if one is not None else []
     lines.append("")

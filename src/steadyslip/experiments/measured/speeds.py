@@ -193,19 +193,35 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
             "speed",
             f"got {format_count(len(v), 'row')} of sliding; a table of speeds has {FEWEST_ROWS} at least",
         )
+    unloaded: list[str] = []
     if twisted and pressed is not None:  # which rubs by its size, also where it is zero
         pressed = np.abs(pressed)
-        if not np.any(pressed > 0):
-            pressed, twisted = None, False
+        v, f, pressed, unloaded = _without_load(v, f, pressed)
+        twisted = pressed is not None
     elif pressed is not None and not np.all(pressed > 0):
         raise _fault(source, "load", f"got {pressed.min():g} N; allowed: loads above 0")
     friction = _unsigned(source, v, f, kind)
     units = {role: None if columns[0].is_bare else columns[0].unit for role, columns in found.items()}
-    asked = tuple(questions_of_table(v, f, None if twisted else pressed, kind, {"load": "N", **units}))
+    asked = (*unloaded, *questions_of_table(v, f, None if twisted else pressed, kind, {"load": "N", **units}))
     notes += _signs(v, f, kind, "direction" in found)
     return SpeedTable(
         source, v, friction, pressed, turns, kind == "friction", speed.unit, (*notes, *asked), twisted, questions=asked,
     )  # fmt: skip
+
+
+def _without_load(speed: Array, torque: Array, load: Array) -> tuple[Array, Array, Array | None, list[str]]:
+    """Rows of the directions that have a load somewhere, and questions on the other; no load where neither has."""
+    if not np.any(load > 0):
+        return speed, torque, None, []
+    for side, way in ((1.0, "forward"), (-1.0, "backward")):
+        rows = np.sign(speed) == side
+        if np.any(rows) and not np.any(load[rows] > 0):
+            question = (
+                f"{way}: {format_count(int(np.sum(rows)), 'row')} left out, as load 0 N m throughout tells no "
+                "coefficient: give the loads, or these rows as a table without the column"
+            )
+            return speed[~rows], torque[~rows], load[~rows], [question]
+    return speed, torque, load, []
 
 
 def checked_option(name: str, value: Any, si_unit: str, source: str) -> float:

@@ -14,7 +14,7 @@ FALLS, FALLS_POWER = 3.0, 3.0  # more than friction falls in a narrow table, and
 STEEPEST = 20.0  # more than friction rises in a narrow table: drag rises with the square of speed at most
 SMALLEST, LARGEST = 3e-4, 3.0  # of friction coefficients: rolling guides 0.001 to 0.005, rubber 1 to 2
 USUAL = (0.003, 1.0)  # friction coefficients that another unit is asked about for
-FAST, FASTEST = 1.0, 100.0  # m/s: speeds without and with a unit that tests of friction do not reach
+FAST, FASTEST = 1.0, 10.0  # m/s: speeds without and with a unit that guides do not reach; brakes have up to 50
 UNEQUAL = 2.0  # times the friction of the other direction: of gears, screws and seals up to 1.5 are measured
 NEAR = 1.5  # factor between speeds of two directions that are compared
 
@@ -63,7 +63,11 @@ def _fast(speed: Array, units: dict[str, str | None]) -> Iterator[str]:
         told = format_quantity(float(fastest), "m/s")
         yield f"speeds up to {told}? Write their unit in the header, speed [mm/min], or give --set speed=mm/min"
     elif own is not None and unit(own)[1].angle == 0 and fastest > FASTEST:
-        yield f"speeds up to {format_quantity(float(fastest), 'm/s')}? They are in {own} in the header"
+        told = format_quantity(float(fastest), "m/s")
+        yield (
+            f"speeds up to {told}? They are in {own} in the header; guides reach 5 m/s, brakes 50 m/s: is a smaller "
+            "unit meant, such as mm/s or mm/min?"
+        )
 
 
 def _coefficients(typical: float, kind: str, units: dict[str, str | None]) -> Iterator[str]:

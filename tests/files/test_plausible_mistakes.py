@@ -14,6 +14,14 @@ from toleranced import AXIS
 
 MISTAKES = {
     "a mass for a force": ('"2.56..3.84 kN"', '"320 kg"', "a mass presses with its weight"),
+    "a weight for a mass": ('"240 kg"', '"2354 N"', "it is the weight of 240 kg"),
+    "a per cent sign behind the unit": (
+        '"2.56..3.84 kN"',
+        '"3.2 ± 20 kN %"',
+        "the per cent sign stands behind its number",
+    ),
+    "a range in words": ('"2.56..3.84 kN"', '"2.56 to 3.84 kN"', r"or '10..14 N/um'"),
+    "a distribution of another name": ('"2.56..3.84 kN"', '"3.2 ± 0.2 kN (gauss)"', r"'12 ± 2 N/um .normal.'"),
     "a decimal comma": ('"0.11 ± 20 %"', "0,11", "0,11 has a decimal comma: write 0.11"),
     "a decimal comma before a unit": ('"0.5 mm/min"', '"0,5 mm/min"', "has a decimal comma: write 0.5"),
     "a decimal comma in a tolerance": ('"0.11 ± 20 %"', '"0.11 ± 0,02"', "has a decimal comma: write 0.11 ± 0.02"),

@@ -116,6 +116,8 @@ def parse(text: str, expected: str, instance: str = "") -> float:
             message += turned
         elif (found, wanted) == (_MASS, _WEIGHT):
             message += "; a mass presses with its weight, mass times 9.81 m/s^2"
+        elif (found, wanted) == (_WEIGHT, _MASS):
+            message += f"; it is the weight of {float(digits) * factor / 9.81:.4g} kg"
         raise QuantityError(message)
     return _scaled(digits, factor)
 

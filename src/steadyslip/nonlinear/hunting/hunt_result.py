@@ -112,7 +112,11 @@ class Hunt(ReadOnly):
             return f"RUNS AWAY: {size} from the target after {format_quantity(self._end, 's')}, and ever farther"
         if self.hunts:
             size = self._sizes(both=True)
-            often = f"every {format_quantity(self.period, 's')}" if np.isfinite(self.period) else "without a period"
+            often = (
+                f"every {format_quantity(self.period, 's')}"
+                if np.isfinite(self.period)
+                else "without a steady period so far"
+            )
             often += "" if self.repeats or np.isnan(self.period) else " on average"
             return f"HUNTS {size} about the target {often}"
         if self.hunts is None:

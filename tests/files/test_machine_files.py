@@ -73,7 +73,7 @@ def test_forces_and_stresses_of_a_contact():
     assert [problem.name for problem in caught.value.problems] == ["contacts.guide.area"]
     with pytest.raises(ss.RigFileError, match="wrong dimension; expected a quantity in N,"):
         ss.rig_from_text(TEXT.replace('"3 kN"', '"600 kPa"'))
-    with pytest.raises(ss.RigFileError, match="for example '2 kg'; it is the weight of 30.58 kg"):
+    with pytest.raises(ss.RigFileError, match=r"for example '2 kg'; it is the weight of 30.58 kg"):
         ss.rig_from_text(TEXT.replace('"300 kg"', '"300 N"'))
 
 

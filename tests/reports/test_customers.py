@@ -173,7 +173,7 @@ def test_what_may_be_adjusted_bounds_what_is_recommended():
     gain, preload = ss.verdict.Adjustment(high=1.1e6 / 40e-4), ss.verdict.Adjustment(low=500 / 40e-4)
     found = ss.analyze(rig)
     text = words("".join(recommendation(found, Order((), {"drive.kp": gain}))))
-    assert "Change drive proportional gain k_p from 600 kN/m to 1.068 MN/m" in text
+    assert "Change drive proportional gain k_p from 0.6 N/µm to 1.068 N/µm" in text
     text = words("".join(recommendation(found, Order((), {"contact.preload": preload}))))
     assert "None of the values below makes it stable" in text
     assert "Not enough alone, whatever the value within range: preload σ₀" in text
@@ -188,7 +188,7 @@ def test_a_recommendation_knows_all_windows_of_a_parameter():
     found = ss.analyze(ss.read_rig("examples/inclined-spring.toml"))
     assert "angle ψ −45 deg −4.785 deg above −11.49 deg yes" in words("".join(recommendation(found)))
     brake = ss.analyze(ss.rig_from_text(SHEETS["brake"]))
-    for limits, told in (({}, "1.083 m/s above 902.5 mm/s"), ({"high": "3 km/h"}, "27.91 mm/s below 34.89 mm/s")):
+    for limits, told in (({}, "3.899 km/h above 3.249 km/h"), ({"high": "3 km/h"}, "0.1005 km/h below 0.1256 km/h")):
         within = {end: brake.rig.read("drive.velocity", value) for end, value in limits.items()}
         order = Order((), {"drive.velocity": ss.verdict.Adjustment(**within)})
         assert told in words("".join(recommendation(brake, order)))
@@ -414,7 +414,7 @@ def test_changes_come_in_a_designers_order():
     """A setting before a part, the speed of the task last; what is ten times away is named only."""
     found = ss.analyze(ss.read_rig("examples/slow-axis.toml"))
     text = words("".join(recommendation(found)))
-    assert "Change drive proportional gain k_p from 600 kN/m to 1.068 MN/m" in text
+    assert "Change drive proportional gain k_p from 0.6 N/µm to 1.068 N/µm" in text
     assert text.index("drive proportional gain") < text.index("preload")
     left = text.partition("Left out, as they would have to change by more than a factor of 10: ")[2]
     assert left.startswith("drive derivative gain k_d, drive velocity v₀.")

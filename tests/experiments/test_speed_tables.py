@@ -102,6 +102,13 @@ def test_an_end_is_where_the_sum_of_squares_has_risen_enough(tmp_path):
     assert rise == pytest.approx(stdtrit(found.main.freedom, 0.975) ** 2, rel=0.02)
 
 
+def test_what_is_not_there_is_exactly_zero():
+    """Of friction that only falls; a viscosity of 1e-24 s/m made later searches begin there."""
+    found = ss.experiments.fit_friction_table({"speed": [1, 3, 9, 20, 60], "force": [400, 350, 280, 230, 210]}, "lugre")
+    assert found["viscous"].value == 0
+    assert 'viscous = "0 s/m"' in found.rig_text()
+
+
 def ends_of_random_tables(count, seed):
     """Ends at which SciPy finds another rise, and the number of all: one or two loads, 0.5 or 2 % noise."""
     chance, wrong, every = np.random.default_rng(seed), [], 0

@@ -80,7 +80,10 @@ def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) ->
         lambda at: residuals(at)[0], np.clip(start, low, high), lambda at: residuals(at)[1], bounds=(low, high),
         x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return ProfiledMinimum(residuals, found.x, float(2 * found.cost), low, high, starts)
+    reach = TOLERANCE * (high - low)  # SciPy stays within bounds, by 1e-24 of a viscosity that is 0
+    at = np.where(found.x - low < reach, low, np.where(high - found.x < reach, high, found.x))
+    own = residuals(at)[0]
+    return ProfiledMinimum(residuals, at, float(own @ own), low, high, starts)
 
 
 def _descended(residuals: Residuals, start: Array, low: Array, high: Array, free: Array) -> tuple[Array, float]:

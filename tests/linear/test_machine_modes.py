@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from explored import page_modules
+from javascript import Script
 from machines import brake, coulomb, rate_state, three_bodies, two_mass
+from steadyslip.linear.modes import HARDLY, MANY, MOVES, NAMED, WORDS, Mode
+from steadyslip.machine.mechanism import NORMAL
 from steadyslip.model.point import operating_point
 
 
@@ -93,7 +97,41 @@ def test_modes_are_those_of_an_undamped_pair():
 
 def test_a_pad_that_moves_both_ways_is_one_body():
     words = ss.modes(brake(rate_state(0.02, -0.01, 0.5)))[0].words()
-    assert words.startswith("the pad (along and normal) oscillates;")
+    assert words.startswith("the pad oscillates along the surface and away from it;")
+
+
+@pytest.mark.parametrize(
+    ("sizes", "words"),
+    [
+        ({"m": 0.01, "m.normal": 1}, "the m oscillates away from the surface and hardly along it"),
+        ({"m": 1, "m.normal": 0.02}, "the m oscillates along the surface and hardly away from it"),
+        ({"m": 1, "m.normal": 0.7, "c": 0.03}, "the m oscillates along the surface and away from it, "
+                                               "the c hardly moves"),
+        ({"m": 0.02, "m.normal": 0.7, "c": 1}, "the m (away from the surface) and the c oscillate against each other, "
+                                               "the m (along the surface) hardly moves"),
+        ({"m": 1, "m.normal": 0.3}, "the m oscillates along the surface, m (away from the surface) with 30 % of the "
+                                    "largest amplitude"),
+    ],
+)  # fmt: skip
+def test_directions_of_motion_are_named(sizes, words):
+    """A body that lifts was told as "the mass (normal) oscillates, the mass hardly moves"."""
+    amplitudes = {name: complex(size if name != "c" else -size) for name, size in sizes.items()}
+    assert Mode(1j, amplitudes, {}, {}).words() == words
+
+
+def test_a_page_tells_a_mode_in_the_words_of_python():
+    """Amplitudes at random, of bodies that move along their surface only or away from it as well."""
+    chance, script = np.random.default_rng(33), Script(f"{page_modules()}")
+    shape = {"moves": MOVES, "hardly": HARDLY, "many": MANY, "named": NAMED, "suffix": NORMAL, "words": WORDS}
+    for _ in range(200):
+        names = [name for body in "abcdef"[: chance.integers(1, 7)]
+                 for name in (body, *([body + NORMAL] if chance.random() < 0.5 else []))]  # fmt: skip
+        sizes = 10.0 ** chance.uniform(-2, 0, len(names)) * np.exp(1j * chance.uniform(0, 6, len(names)))
+        amplitudes = dict(zip(names, sizes / np.max(np.abs(sizes)), strict=True))
+        mode = Mode(complex(-1.0, chance.integers(0, 2)), amplitudes, {"bodies.a": 0.7}, {"links.s": 0.3})
+        page = {"eigenvalue": {"re": -1.0, "im": mode.eigenvalue.imag}, "energy": mode.energy,
+                "amplitudes": {name: {"re": one.real, "im": one.imag} for name, one in amplitudes.items()}}  # fmt: skip
+        assert script("words(mode, shape)", mode=page, shape=shape) == mode.words()
 
 
 def test_motors_and_tables_are_measured_by_the_rigid_motion():

@@ -373,10 +373,10 @@ def test_an_oscillation_without_slip_events_is_told():
     """That grows, or goes on, or dies out; by the extremes of the record itself."""
     run, period = oscillating(0.97, 30)
     assert run.slip_events == ()
-    told = "oscillates more and more: after {} s between ([\\d.]+) nm/s and ([\\d.]+) um/s, and still growing"
+    told = "oscillates more and more: after {} s between ([\\d.]+) um/s and ([\\d.]+) um/s, and still growing"
     (found,) = re.findall(told.format(f"{run.end:.3g}"), run.sentence)
     last = run["v"][run["t"] > run.end - 1.5 * period]
-    assert [1e-9 * float(found[0]), 1e-6 * float(found[1])] == pytest.approx([last.min(), last.max()], rel=0.02)
+    assert [1e-6 * float(found[0]), 1e-6 * float(found[1])] == pytest.approx([last.min(), last.max()], rel=0.02)
     assert run.sentence in run.summary()
     assert oscillating(0.997, 30)[0].sentence.startswith("oscillates more and more")
     assert oscillating(1.05, 30)[0].sentence == ""
@@ -457,8 +457,8 @@ def test_an_oscillation_after_a_slip_event_is_told_as_well():
     run = ss.simulate(a_rig, ss.protocol.VelocityStep(at=0.1, to=0.82e-3), until=5.0)
     late = run["t"] > 4.0
     assert all(one.begin < 2.5 for one in run.slip_events)
-    low, high = 1e6 * run["v"][late].min(), 1e3 * run["v"][late].max()
-    (found,) = re.findall(r"oscillates: every ([\d.]+) ms between (-[\d.]+) um/s and ([\d.]+) mm/s", run.sentence)
+    low, high = 1e3 * run["v"][late].min(), 1e3 * run["v"][late].max()
+    (found,) = re.findall(r"oscillates: every ([\d.]+) ms between (-[\d.]+) mm/s and ([\d.]+) mm/s", run.sentence)
     assert [float(one) for one in found[1:]] == pytest.approx([low, high], rel=0.01)
     assert run.sentence.startswith("slips ") is bool(run.slip_events)
 

@@ -25,8 +25,10 @@ from steadyslip.model.start import coordinate_speeds
 
 WORDS = {
     "oscillate": "oscillates|oscillate", "drift": "drifts|drift", "still": "hardly moves|hardly move",
-    "opposed": " against each other", "the": "the {name}", "and": " and ", "normal": " (normal)",
-    "both": " (along and normal)", "share": "{name} with {share} of the largest amplitude",
+    "opposed": " against each other", "the": "the {name}", "and": " and ", "way": " ({way})",
+    "along": "along the surface", "away": "away from the surface", "both": "along the surface and away from it",
+    "hardly_along": " and hardly along it", "hardly_away": " and hardly away from it",
+    "share": "{name} with {share} of the largest amplitude",
     "energy": "; {share} of the energy is in the {name}", "most": " most, of {count} coordinates",
 }  # fmt: skip
 """Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""
@@ -96,17 +98,25 @@ class Mode(Displayed):
         still = [name for name, size in sizes.items() if size < HARDLY]
         if many := len(sizes) > MANY:
             leads, rest, still = sorted(sizes, key=lambda name: -sizes[name])[:NAMED], [], []
-        movers = _merged(leads)
-        parts = [f"{_listed(movers)} {_does('oscillate' if self.eigenvalue.imag else 'drift', movers)}"]
+        movers = list(dict.fromkeys(name.removesuffix(NORMAL) for name in leads))
+        moves = _does("oscillate" if self.eigenvalue.imag else "drift", movers)
+        if len(movers) == 1:
+            parts = [f"{_listed(movers)} {moves}{self._direction(movers[0], leads, still)}"]
+            still = [name for name in still if name.removesuffix(NORMAL) != movers[0]]
+        else:
+            parts = [f"{_listed([self._with_way(name, leads) for name in movers])} {moves}"]
         if many:
             parts[0] += WORDS["most"].format(count=len(sizes))
         if len(leads) == 2 and self._opposed(*leads):
             parts[0] += WORDS["opposed"]
         if rest:
-            moves = [WORDS["share"].format(name=_called(name), share=format_percent(sizes[name])) for name in rest]
-            parts.append(", ".join(moves))
+            called = ((self._with_way(name.removesuffix(NORMAL), [name]), sizes[name]) for name in rest)
+            parts.append(
+                ", ".join(WORDS["share"].format(name=name, share=format_percent(size)) for name, size in called)
+            )
         if still:
-            parts.append(f"{_listed(still)} {_does('still', still)}")
+            bodies = list(dict.fromkeys(name.removesuffix(NORMAL) for name in still))
+            parts.append(f"{_listed([self._with_way(one, still) for one in bodies])} {_does('still', bodies)}")
         text = ", ".join(parts)
         if self.energy:
             shares = {
@@ -115,6 +125,23 @@ class Mode(Displayed):
             most = max(shares, key=lambda name: shares[name])
             text += WORDS["energy"].format(share=format_percent(shares[most]), name=most.partition(".")[2])
         return text
+
+    def _way(self, body: str, names: list[str]) -> str:
+        """Directions among `names` in which a body moves; empty for one that moves along its surface only."""
+        if body + NORMAL not in self.amplitudes:
+            return ""
+        away = body + NORMAL in names
+        return WORDS["both" if away and body in names else "away" if away else "along"]
+
+    def _with_way(self, body: str, names: list[str]) -> str:
+        way = self._way(body, names)
+        return body + WORDS["way"].format(way=way) if way else body
+
+    def _direction(self, body: str, leads: list[str], still: list[str]) -> str:
+        """Clause on the directions in which the one body that leads moves, and on the one in which it hardly does."""
+        way = self._way(body, leads)
+        hardly = WORDS["hardly_along"] if body in still else WORDS["hardly_away"] if body + NORMAL in still else ""
+        return f" {way}{hardly}" if way else ""
 
     def _opposed(self, one: str, other: str) -> bool:
         same = one.removesuffix(NORMAL) == other.removesuffix(NORMAL)
@@ -136,22 +163,8 @@ def _does(what: str, names: list[str]) -> str:
     return WORDS[what].split("|")[len(names) > 1]
 
 
-def _called(name: str) -> str:
-    return name.replace(NORMAL, WORDS["normal"])
-
-
-def _merged(names: list[str]) -> list[str]:
-    """Names in which a body that moves both along and normal to the surface occurs once."""
-    both = {name for name in names if name + NORMAL in names}
-    return [
-        n + WORDS["both"] if n in both else n
-        for n in names
-        if n.removesuffix(NORMAL) == n or n[: -len(NORMAL)] not in both
-    ]
-
-
 def _listed(names: list[str]) -> str:
-    words = [WORDS["the"].format(name=_called(name)) for name in names]
+    words = [WORDS["the"].format(name=name) for name in names]
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + WORDS["and"] + words[-1]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from steadyslip.core.format import format_quantity, format_range
+from steadyslip.core.format import format_like, format_quantity, format_range
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.events import AnyEvent, AnySlip, ContactSlip
@@ -220,8 +220,9 @@ def oscillates(swings: Swings) -> str:
 
 
 def speeds(swings: Swings) -> str:
-    """Lowest and highest velocity of an oscillation in words."""
-    return " and ".join(format_quantity(one, "m/s", DIGITS) for one in (swings.low, swings.high))
+    """Lowest and highest velocity of an oscillation in words, both in the unit of the highest."""
+    low = format_like(swings.low, swings.high, "m/s", DIGITS)
+    return f"{low} and {format_quantity(swings.high, 'm/s', DIGITS)}"
 
 
 def _seen(swings: Swings) -> bool:

@@ -94,23 +94,27 @@ export function percent(share) {
 /** Sentence on the shape of a mode. @param {any} mode @param {any} shape words and limits */
 export function words(mode, { moves, hardly, many, named: few, suffix, words: said }) {
   const sizes = Object.entries(mode.amplitudes).map(([name, one]) => /** @type {[string, number]} */ ([name, sizeOf(one)]));
-  const named = (test) => sizes.filter(([, size]) => test(size)).map(([name]) => name), called = (name) => name.replace(suffix, said.normal);
+  const named = (test) => sizes.filter(([, size]) => test(size)).map(([name]) => name), bodyOf = (name) => (name.endsWith(suffix) ? name.slice(0, -suffix.length) : name);
   const crowd = sizes.length > many, largest = [...sizes].sort(([, a], [, b]) => b - a).slice(0, few).map(([name]) => name);
   const leads = crowd ? largest : named((size) => size >= moves), rest = crowd ? [] : sizes.filter(([, size]) => size >= hardly && size < moves);
   const still = crowd ? [] : named((size) => size < hardly);
-  const movers = leads.flatMap((name) => (leads.includes(name + suffix) ? [name + said.both] : name.endsWith(suffix) && leads.includes(name.slice(0, -suffix.length)) ? [] : [name]));
+  const wayOf = (body, names) => (body + suffix in mode.amplitudes ? said[names.includes(body + suffix) ? (names.includes(body) ? "both" : "away") : "along"] : "");
+  const withWay = (body, names) => body + (wayOf(body, names) ? fill(said.way, { way: wayOf(body, names) }) : "");
+  const bodiesOf = (names) => [...new Set(names.map(bodyOf))], movers = bodiesOf(leads), [first] = movers, alone = movers.length === 1;
   const listed = (names) => {
-    const all = names.map((name) => fill(said.the, { name: called(name) }));
+    const all = names.map((name) => fill(said.the, { name }));
     return all.length === 1 ? all[0] : all.slice(0, -1).join(", ") + said.and + all[all.length - 1];
   };
-  const does = (what, names) => said[what].split("|")[names.length > 1 ? 1 : 0];
-  const parts = [`${listed(movers)} ${does(mode.eigenvalue.im ? "oscillate" : "drift", movers)}${crowd ? fill(said.most, { count: sizes.length }) : ""}`];
+  const does = (what, names) => said[what].split("|")[names.length > 1 ? 1 : 0], way = alone ? wayOf(first, leads) : "";
+  const direction = way && ` ${way}${still.includes(first) ? said.hardly_along : still.includes(first + suffix) ? said.hardly_away : ""}`;
+  const others = alone ? still.filter((name) => bodyOf(name) !== first) : still;
+  const parts = [`${listed(alone ? movers : movers.map((body) => withWay(body, leads)))} ${does(mode.eigenvalue.im ? "oscillate" : "drift", movers)}${direction}${crowd ? fill(said.most, { count: sizes.length }) : ""}`];
   if (leads.length === 2 && leads[0].replace(suffix, "") !== leads[1].replace(suffix, "")) {
     const [a, b] = leads.map((name) => mode.amplitudes[name]);
     if (a.re * b.re + a.im * b.im < 0) parts[0] += said.opposed;
   }
-  if (rest.length) parts.push(rest.map(([name, size]) => fill(said.share, { name: called(name), share: percent(size) })).join(", "));
-  if (still.length) parts.push(`${listed(still)} ${does("still", still)}`);
+  if (rest.length) parts.push(rest.map(([name, size]) => fill(said.share, { name: withWay(bodyOf(name), [name]), share: percent(size) })).join(", "));
+  if (others.length) parts.push(`${listed(bodiesOf(others).map((body) => withWay(body, others)))} ${does("still", bodiesOf(others))}`);
   const [most, share] = Object.entries(mode.energy).map(([name, own]) => /** @type {[string, number]} */ ([name, Math.round(1000 * own) / 1000])).reduce((a, b) => (b[1] > a[1] ? b : a), ["", 0]);
   return parts.join(", ") + (most ? fill(said.energy, { share: percent(share), name: most.slice(most.indexOf(".") + 1) }) : "");
 }

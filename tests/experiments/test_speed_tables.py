@@ -307,7 +307,7 @@ def test_columns_of_words_are_left_out_with_a_word(tmp_path, separator):
     [
         ("speed [mm/s];force\n1;400 N\n3;350 N\n9;280 N\n", "force: holds words, such as '400 N'; allowed: numbers"),
         (
-            "speed [mm/s];force [N];direction\n1;400;up\n3;350;up\n9;280;down\n",
+            "speed [mm/s];force [N];direction\n1;400;vor\n3;350;up\n9;280;down\n",
             "direction: holds words, such as 'up'; allowed: forward and backward, vor and zurück, + and -, 1 and -1",
         ),
     ],

@@ -78,7 +78,8 @@ def _plain(column: Sequence[str], role: str | None) -> list[str] | None:
 
 
 def _holds_words(name: str, role: str, column: Sequence[str]) -> Problem:
-    example = next(cell for cell in column if not _is_number(cell) and cell.lower() not in MISSING)
+    words = [cell for cell in column if not _is_number(cell) and cell.lower() not in MISSING]
+    example = next(cell for cell in words if role != "direction" or not _DIRECTION.fullmatch(cell))
     allowed = _DIRECTIONS if role == "direction" else "numbers, with their unit in the name of the column"
     return Problem(name, f"holds words, such as {repr_short(example)}; allowed: {allowed}")
 

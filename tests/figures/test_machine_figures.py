@@ -121,7 +121,7 @@ def test_what_bars_leave_out_is_said():
     assert f"{len(left)} more edges not drawn" in ax.get_xlabel()
     document = ss.report(found, explorer=False).html
     named = ", ".join(said(found.rig, name) for name in left)
-    assert f"the edge of {named}: a factor of 100 away or more" in words(document)
+    assert f"the edges of {named}: a factor of 100 away or more" in words(document)
 
 
 def test_the_leading_mode_and_the_eigenvalues_are_those_of_the_analysis():
@@ -150,10 +150,10 @@ def test_a_machine_has_a_document_with_its_sketch_and_its_picture(name, tmp_path
     path = EXAMPLES[0].with_name(f"{name}.toml")
     done = run("report", str(path), "-o", "a.html", folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    text, explorer, _ = (tmp_path / "a.html").read_text("utf-8").partition('<div class="steadyslip-root">')
+    text, explorer, _ = (tmp_path / "a.html").read_text("utf-8").partition('<div class="steadyslip-root"')
     machine = ss.read_rig(path)
     assert explorer
-    assert text.count("<svg") == 5  # sketch, mode for wide and narrow windows, motion over time and in its plane
+    assert text.count("<svg") == 6  # sketch, mode in wide and narrow windows, chart, motion over time and in its plane
     for one in (*machine.bodies, *machine.links, *machine.contacts):
         assert one in text
     assert "NaN" not in text

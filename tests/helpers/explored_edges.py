@@ -246,7 +246,8 @@ def _other_texts(told, page, seen):
     """Texts of a page in V8 that are not in the browser."""
     first, why, listed = seen
     texts = {page.names[one["i"]]: (one["told"][1].replace(" ", "\xa0"), one["words"]) for one in told["edges"]}
-    wrong = [] if first == told["headline"] and why.startswith(told["reason"]) else [f"{first} {why} for {told}"]
+    reason = told["reason"].replace("\xa0", " ")  # as the browser gives the text that it shows
+    wrong = [] if first == told["headline"] and why.startswith(reason) else [f"{first} {why} for {told}"]
     wrong += [] if texts.keys() == listed.keys() else [f"edges of {sorted(listed)} for {sorted(texts)}"]
     for name in texts.keys() & listed.keys():
         wrong += [f"{name}: {text!r} not in {listed[name]!r}" for text in texts[name] if text not in listed[name]]

@@ -28,7 +28,7 @@ import steadyslip as ss
 from rigs_of_theory import CONTACTS, rate_state
 from steadyslip.core.errors import SteadyslipError, UnitWarning
 from steadyslip.files.specifications import protocol_from_text, rig_from_text, rig_to_text
-from steadyslip.kernels import runner
+from steadyslip.kernels import build
 from steadyslip.kernels.build import interpreted
 from steadyslip.linear.stiffness import growth_rate, stable_stiffness
 
@@ -309,8 +309,8 @@ def asked(question: str, rig: ss.Slider, protocol: tuple[object, ...], chance: r
 
 def combinations(count: int, seed: object) -> Iterator[tuple[str, str]]:
     """Findings, with the rig and the question."""
-    plain = runner.compiled
-    runner.compiled = interpreted
+    plain = build.compiled
+    build.compiled = interpreted
     try:
         for i in _counted(count):
             chance = random.Random(f"{seed}-{i}")
@@ -322,7 +322,7 @@ def combinations(count: int, seed: object) -> Iterator[tuple[str, str]]:
             if fault:
                 yield fault, f"# {question} {protocol}\n{rig_to_text(rig)}"
     finally:
-        runner.compiled = plain
+        build.compiled = plain
 
 
 # -- by hand

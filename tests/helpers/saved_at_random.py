@@ -29,7 +29,7 @@ from moving_machines import two_tables
 from protocols_by_scipy import RandomProtocol
 from rigs_of_theory import CONTACTS
 from steadyslip.experiments.numerics.pooling import Pooled
-from steadyslip.kernels import runner
+from steadyslip.kernels import build
 from steadyslip.kernels.build import interpreted
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
@@ -180,7 +180,7 @@ def rigs(random, folder):
 
 def runs(random, folder):
     """Sliders and machines under pieces of every channel; the kernel's text as plain Python, a few steps."""
-    plain_python, runner.compiled = runner.compiled, interpreted
+    plain_python, build.compiled = build.compiled, interpreted
     try:
         if random.random() < 0.5:
             case = RandomProtocol(int(random.integers(10**6)))
@@ -194,7 +194,7 @@ def runs(random, folder):
         until = float(random.uniform(3, 5))
         run = asked(ss.simulate, rig, pieces, until=until, most_steps=60, rtol=1e-4, **more)
     finally:
-        runner.compiled = plain_python
+        build.compiled = plain_python
     run.save(folder / "run.nc")
     again = ss.load_history(folder / "run.nc")
     again.save(folder / "again.nc")

@@ -70,6 +70,18 @@ def pytest_sessionfinish():
     gc.freeze()
 
 
+@pytest.fixture(scope="session")
+def browser():
+    """One browser for all: a second one beside it is refused."""
+    from browser import chromium, driver
+
+    path = chromium()
+    with driver() as playwright:
+        opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
 @pytest.fixture(autouse=True)
 def _closed_figures():
     """Close all pyplot figures after a test, so that they cause no warning in another one."""

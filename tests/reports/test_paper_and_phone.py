@@ -5,7 +5,6 @@ import re
 import pytest
 
 import steadyslip as ss
-from browser import chromium, driver
 from steadyslip.reports.elements import table
 
 SCROLLED = "[...document.querySelectorAll('.wide')].filter(one => one.scrollWidth > one.clientWidth + 1).length"
@@ -23,13 +22,11 @@ def texts_on_axes(html):
 
 
 @pytest.mark.parametrize(("name", "many"), [("inclined-spring", 5), ("machines/brake-pad", 2)])
-def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephone(name, many, tmp_path):
+def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephone(browser, name, many, tmp_path):
     """A figure as wide as the page left a quarter of the page before it empty; tables of inputs scrolled sideways."""
     found = ss.report(ss.analyze(ss.read_rig(f"examples/{name}.toml")), explorer=False)
     found.save(tmp_path / "a.html")
-    with driver() as play:
-        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
-        page = browser.new_page(viewport=PAPER)
+    with browser.new_page(viewport=PAPER) as page:
         page.goto((tmp_path / "a.html").as_uri())
         page.emulate_media(media="print")
         places = page.evaluate(PLACES)
@@ -39,7 +36,6 @@ def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephon
         assert page.evaluate(SCROLLED) == 0
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
         alone = page.evaluate(PLACES)
-        browser.close()
     assert len(places) == many
     assert places[0]["top"] == places[1]["top"]
     assert places[0]["right"] < places[1]["left"]
@@ -51,15 +47,13 @@ def test_figures_stand_beside_each_other_on_paper_and_tables_stack_on_a_telephon
     assert sorted(texts_on_axes(found.html))[len(texts_on_axes(found.html)) // 2] >= least
 
 
-def test_letters_of_the_verdict_on_a_machine_can_be_read_on_a_telephone(tmp_path):
+def test_letters_of_the_verdict_on_a_machine_can_be_read_on_a_telephone(browser, tmp_path):
     """Half of the letters of a figure 8 inches wide are 7 pixels high there; a broad window and paper keep it."""
     found = ss.report(ss.analyze(ss.read_rig("examples/machines/two-guides.toml")), explorer=False)
     found.save(tmp_path / "a.html")
     heights = """[...document.querySelectorAll("figure:has(> .narrow) text")]
         .map(one => one.getBoundingClientRect().height).filter(one => one > 0)"""
-    with driver() as play:
-        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 390, "height": 740})
+    with browser.new_page(viewport={"width": 390, "height": 740}) as page:
         page.goto((tmp_path / "a.html").as_uri())
         letters = sorted(page.evaluate(heights))
         for width, media in ((390, "screen"), (1024, "screen"), (PAPER["width"], "print")):
@@ -67,7 +61,6 @@ def test_letters_of_the_verdict_on_a_machine_can_be_read_on_a_telephone(tmp_path
             page.emulate_media(media=media)
             shown = [page.locator(f".{one}").first.is_visible() for one in ("narrow", "broad")]
             assert shown == [width == 390, width != 390]
-        browser.close()
     assert letters[len(letters) // 2] >= 8  # CSS pixels, of half of them
 
 
@@ -78,29 +71,26 @@ def test_cells_of_wide_tables_have_the_names_of_their_columns():
     assert "data-head" not in table([("a", "1 m")], ("name", "now"))
 
 
-def test_large_figures_scroll_on_a_telephone_and_keep_their_letters(tmp_path):
+def test_large_figures_scroll_on_a_telephone_and_keep_their_letters(browser, tmp_path):
     """A figure 7 inches wide was shrunk to half of that; figures of one column fit as they are."""
     run = ss.simulate(ss.read_rig("examples/stick-slip.toml"), until="20 s")
     ss.report(run, explorer=False).save(tmp_path / "a.html")
     sizes = """[...document.querySelectorAll("figure")].filter(one => one.querySelector(".large"))
         .map(one => [one.clientWidth, one.scrollWidth])"""
     reached = "[...document.querySelectorAll('figure:has(> .large)')].every(one => one.tabIndex === 0)"
-    with driver() as play:
-        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 390, "height": 740})
+    with browser.new_page(viewport={"width": 390, "height": 740}) as page:
         page.goto((tmp_path / "a.html").as_uri())
         narrow, all_of_it = page.evaluate(sizes), page.evaluate("document.documentElement.scrollWidth")
         assert page.evaluate(reached), "what scrolls takes the focus of the keyboard"
         page.set_viewport_size({"width": 1024, "height": 740})
         broad = page.evaluate(sizes)
-        browser.close()
     assert narrow
     assert all(shown <= 390 and whole == 580 for shown, whole in narrow)
     assert all_of_it <= 390
     assert all(shown == whole for shown, whole in broad)
 
 
-def test_formulas_break_between_terms_on_a_telephone_and_nowhere_else(tmp_path):
+def test_formulas_break_between_terms_on_a_telephone_and_nowhere_else(browser, tmp_path):
     """Of eleven formulas three scrolled there; a broad window keeps each sum on its lines."""
     found = ss.report(ss.analyze(ss.read_rig("examples/machines/feed-axis.toml")), explorer=False)
     found.save(tmp_path / "a.html")
@@ -109,12 +99,9 @@ def test_formulas_break_between_terms_on_a_telephone_and_nowhere_else(tmp_path):
     hidden = """[...document.querySelectorAll(".formula mrow")].some(one => {
         const box = one.closest(".formula");
         return one.getBoundingClientRect().left < box.getBoundingClientRect().left - box.scrollLeft - 1; })"""
-    with driver() as play:
-        browser = play.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 390, "height": 740})
+    with browser.new_page(viewport={"width": 390, "height": 740}) as page:
         page.goto((tmp_path / "a.html").as_uri())
         assert len(page.evaluate(wide)) <= 1
         assert not page.evaluate(hidden), "no term begins where one cannot scroll to"
         page.set_viewport_size({"width": 1024, "height": 740})
         assert page.evaluate(wide) == []
-        browser.close()

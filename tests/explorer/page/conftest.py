@@ -1,19 +1,9 @@
-"""One browser for all, and pages that many tests look at."""
+"""Pages that many tests look at."""
 
 import pytest
 
 import steadyslip as ss
-from browser import chromium, driver
 from explored_pages import INCLINED, MOVED
-
-
-@pytest.fixture(scope="session")
-def browser():
-    path = chromium()
-    with driver() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="session")

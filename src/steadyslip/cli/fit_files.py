@@ -82,7 +82,7 @@ def write_population(found: Population, path: Path) -> None:
     """
 
     def as_text(target: Path) -> None:
-        target.write_text(json.dumps(stamped(found.to_dict()), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        write_text(target, json.dumps(stamped(found.to_dict()), indent=2, allow_nan=False) + "\n")
 
     def as_page(target: Path) -> None:
         write_page(found, target, "Population")

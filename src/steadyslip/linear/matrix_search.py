@@ -7,7 +7,7 @@ one that changes a whole structure by eigenvalues, which takes minutes for hundr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +22,7 @@ from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.change import LowRankChange, Turns, change_between, rank_one, real_crossings
 from steadyslip.model.numeric.machine_point import MachinePoint, MachinesAlong, absence, machine_point
-from steadyslip.model.numeric.pencil import ILL_POSED, UNDECIDED, StatePencil
+from steadyslip.model.numeric.pencil import ILL_POSED, UNDECIDED, StatePencil, real_product
 
 _SHARE = 4  # samples are fewer than those of a small machine by this factor: 10 per decade
 _BRACKET = 1e-9  # relative width to which a bracket is narrowed by counting; then Newton's method
@@ -35,7 +35,7 @@ _SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of 
 _FLOPS = 40  # cubed rows of a pencil whose eigenvalues take as long as one term of a count (`allowance`), measured
 _TOGETHER = 2**20  # numbers of matrices that are treated together, 8 MiB
 _NEWTON = 12  # steps of Newton's method at most; its convergence is quadratic
-_LIKELY = 3  # eigenvalues nearest to the axis, by either measure, that are tried as the one that crosses
+_LIKELY = 3  # eigenvalues nearest to the axis, by each measure, that are tried as the one that crosses
 _REACH = 4.0  # widths of the bracket that Newton's method may go
 _LAST = 4 * np.finfo(float).eps  # relative step at which Newton's method has ended
 _ROUNDING = 1e-11  # relative step up to which one that no longer falls is rounding of large matrices
@@ -293,11 +293,8 @@ class MatrixSearch:
         pencil = self._pencil(middle)
         if pencil is None:
             return middle, 0.0
-        roots = pencil.eigenvalues[pencil.eigenvalues.imag >= 0]
-        size, real = np.abs(roots), np.abs(roots.real)
-        likely = np.concatenate([np.argsort(real / np.maximum(size, 1e-300))[:_LIKELY], np.argsort(real)[:_LIKELY]])
         reach = _REACH * (high - low) + 1e-9 * abs(middle)
-        for beta in (float(roots[i].imag) for i in dict.fromkeys(likely.tolist())):
+        for beta in self._likely(pencil):
             value, last = middle, np.inf
             for _ in range(_NEWTON):
                 moved = self._crossing_step(value, beta)
@@ -310,7 +307,20 @@ class MatrixSearch:
                 last = step
             else:
                 return value, beta
-        return middle, float(roots[likely[0]].imag)
+        return middle, next(self._likely_of_roots(pencil))
+
+    def _likely(self, pencil: StatePencil) -> Iterator[float]:
+        """Frequencies at which a root may cross the axis near a pencil, the likeliest first."""
+        if not self._small and self.turns is not None:
+            yield from self.turns.least(self.turns.change.core_of(pencil), _LIKELY)
+        yield from self._likely_of_roots(pencil)
+
+    @staticmethod
+    def _likely_of_roots(pencil: StatePencil) -> Iterator[float]:
+        roots = pencil.eigenvalues[pencil.eigenvalues.imag >= 0]
+        size, real = np.abs(roots), np.abs(roots.real)
+        likely = np.concatenate([np.argsort(real / np.maximum(size, 1e-300))[:_LIKELY], np.argsort(real)[:_LIKELY]])
+        yield from (float(roots[i].imag) for i in dict.fromkeys(likely.tolist()))
 
     def _crossing_step(self, value: float, beta: float) -> tuple[float, float] | None:
         """Newton step of value and frequency towards a root on the imaginary axis, by the eigenvalue's own slopes."""
@@ -335,14 +345,12 @@ class MatrixSearch:
 
 def _followed(here: StatePencil, there: StatePencil, near: complex, step: float) -> tuple[complex, complex]:
     """Eigenvalue of a pencil nearest to a place, and its slope along the parameter (first-order perturbation)."""
-    at = near
-    e, a = here.e, here.a
-    for _ in range(2):  # inverse iteration from a place that is an eigenvalue to 1e-9
-        u, v = here.vectors(at)
-        normal = u @ e @ v
-        at = complex(at - (u @ (at * e - a) @ v) / normal)
-    slope = u @ ((there.a - a) - at * (there.e - e)) @ v / normal / step
-    return at, complex(slope)
+    u, v = here.vectors(near)
+    rates, places = real_product(here.e, v), real_product(here.a, v)
+    normal = u @ rates
+    at = near - (u @ (near * rates - places)) / normal
+    moved = (real_product(there.a, v) - places) - at * (real_product(there.e, v) - rates)
+    return complex(at), complex(u @ moved / normal / step)
 
 
 def _between(low: float, high: float) -> float:

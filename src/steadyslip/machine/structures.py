@@ -272,12 +272,15 @@ class StructureBody(Body, name="structure"):
         if name in self.data.points:
             return self.data.points[name]
         point = self.points[name]
-        unit, rows = np.eye(self.data.size), self._rows
-        places = (None if place is None else self._read.row(place) for place in (point.x, point.y))
-        x, y = (
-            None if place is None else unit[place if self.kept_modes is None else rows.index(place)] for place in places
-        )
-        return x, y
+        return self._axis(point.x), self._axis(point.y)
+
+    def _axis(self, place: int | str | None) -> Array | None:
+        """Row of the displacement that a place names."""
+        if place is None:
+            return None
+        row, found = self._read.row(place), np.zeros(self.data.size)
+        found[row if self.kept_modes is None else self._rows.index(row)] = 1.0
+        return found
 
     def moves_away(self, name: str) -> bool:
         """True if a point has a displacement away from the surface."""
@@ -303,5 +306,7 @@ class StructureBody(Body, name="structure"):
 
     def damping_matrix(self) -> Array:
         """Damping with that of modes, and the gyroscopic matrix at the speed of rotation."""
-        found = self.data.damping + (1.0 if self.spin is None else float(self.spin)) * self.data.gyroscopic
+        found = self.data.damping
+        if np.any(self.data.gyroscopic):
+            found = found + (1.0 if self.spin is None else float(self.spin)) * self.data.gyroscopic
         return found + float(self.modal_damping) * self.data.modal_damping if self.modal_damping else found

@@ -7,7 +7,9 @@ turns of Δ around 0 tell how many more roots grow (theory 13).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +36,7 @@ class LowRankChange:
     Attributes
     ----------
     own : StatePencil
-    into, out : ndarray (N, k)
+    into, out : ndarray (N, k), (N, m)
         U, and V.
     """
 
@@ -47,26 +49,38 @@ class LowRankChange:
     @property
     def is_wide(self) -> bool:
         """True if the directions are perhaps more than were found, as for what damps or turns a whole structure."""
-        return bool(self.into.shape[1] > _SKETCH)
+        return bool(max(self.into.shape[1], self.out.shape[1]) > _SKETCH)
 
     def core(self, e: Array, a: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Be and Ba (k, k) of another pencil whose rows and columns at places `at` (K,) are `e` and `a` (K, K)."""
+        """Be and Ba (k, m) of another pencil whose rows and columns at places `at` (K,) are `e` and `a` (K, K)."""
         both = np.ix_(at, at)
         before, after = self.rows[at].T, self.columns[at]
         return before @ (e - self.own.e[both]) @ after, before @ (a - self.own.a[both]) @ after
 
     def core_of(self, other: StatePencil) -> tuple[Array, Array]:
-        """Be and Ba (k, k) of another pencil."""
+        """Be and Ba (k, m) of another pencil."""
         return self.core(other.e, other.a, np.arange(len(other.a)))
 
     def response(self, omega: Array) -> ComplexArray:
-        """Vᵀ (iω E − A)⁻¹ U at frequencies (p,), (p, k, k)."""
-        return self.own.resolvent(1j * omega, self.out, self.into)
+        """Vᵀ (iω E − A)⁻¹ U at frequencies (p,), (p, m, k)."""
+        return self._resolvent(1j * omega)
+
+    @cached_property
+    def static_response(self) -> Array:
+        """The response to constant forces, (m, k)."""
+        return np.asarray(self._resolvent(np.zeros(1, dtype=complex))[0].real)
+
+    @cached_property
+    def _resolvent(self) -> Callable[[ComplexArray], ComplexArray]:
+        return self.own.resolvent(self.out, self.into)
 
     def ratio(self, omega: Array, response: ComplexArray, core: tuple[Array, Array]) -> ComplexArray:
         """Δ at frequencies (p,)."""
-        by = 1j * omega[:, None, None] * core[0] - core[1]
-        found: ComplexArray = np.linalg.det(np.eye(len(core[0])) + response @ by)
+        if response.shape[1] > response.shape[2]:  # det(1 + R B) = det(1 + Rᵀ Bᵀ), the smaller one
+            response, core = np.swapaxes(response, 1, 2), (core[0].T, core[1].T)
+        flat, size = response.reshape(-1, response.shape[2]), response.shape[1]
+        by_rate, by_place = ((flat @ one).reshape(-1, size, size) for one in core)  # faster than one by one
+        found: ComplexArray = np.linalg.det(np.eye(size) + 1j * omega[:, None, None] * by_rate - by_place)
         return found
 
 
@@ -86,8 +100,6 @@ def change_between(own: StatePencil, others: list[StatePencil]) -> LowRankChange
     if not left:
         return None
     u, v = (_directions(np.hstack(side)) for side in (left, right))
-    width = max(u.shape[1], v.shape[1])
-    u, v = (np.pad(side, ((0, 0), (0, width - side.shape[1]))) for side in (u, v))
     return LowRankChange(own, u / rows[:, None], v / columns[:, None], rows[:, None] * u, columns[:, None] * v)
 
 
@@ -137,6 +149,12 @@ class Turns:
             self.response = np.insert(self.response, steep + 1, fresh, axis=0)
             ratio = np.insert(ratio, steep + 1, self.change.ratio(middle, fresh, core))
         return None
+
+    def least(self, core: tuple[Array, Array], count: int) -> list[float]:
+        """Frequencies (rad/s) of the smallest minima of |Δ| after a change, the smallest first."""
+        size = np.abs(self.change.ratio(self.omega, self.response, core))
+        inner = np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
+        return [float(one) for one in self.omega[inner[np.argsort(size[inner])[:count]]]]
 
     def _ends(self, core: tuple[Array, Array], ratio: ComplexArray) -> float:
         """Turns (rad) below the first and beyond the last frequency, where Δ is nearly real."""
@@ -201,8 +219,7 @@ def real_crossings(change: LowRankChange, turns: Turns, unit: tuple[Array, Array
         same = np.sign(now) == np.sign(below)
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     found = 0.5 * (low + high)
-    at_zero = change.own.resolvent(np.zeros(1, dtype=complex), change.out, change.into)
-    static = scalar_response(np.zeros(1), at_zero, unit).real
+    static = scalar_response(np.zeros(1), change.static_response[None], unit).real
     h = np.concatenate([static, scalar_response(found, change.response(found), unit).real])
     with np.errstate(divide="ignore"):
         steps = -1 / h

@@ -7,7 +7,7 @@ and columns of the kept ones in the equations of motion are what they are in the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,22 +48,21 @@ class LeftOut:
         return replace(mechanism, structures=tuple(replace(part, pace=one.pace) for part, one in pairs))
 
 
-def left_out(mechanisms: Iterable[Mechanism]) -> LeftOut | None:
-    """What can be left out of mechanisms with the same structures; None if that is little, or follows nothing."""
+def left_out(mechanism: Mechanism, names: Set[str]) -> LeftOut | None:
+    """What can be left out of a mechanism without touched coordinates; None if that is little, or follows nothing.
+
+    Holds for all mechanisms with its structures (`alike`) that touch none but coordinates with these `names`.
+    """
     from scipy.linalg import block_diag  # slow to import
 
-    several = list(mechanisms)
-    first, touched = several[0], set().union(*map(_touched, several))
-    if any(not _alike(one.structures, first.structures) for one in several[1:]):
+    count = sum(len(part.coordinates) for part in mechanism.structures)
+    if count - len(names) < MANY:
         return None
-    count = sum(len(part.coordinates) for part in first.structures)
-    if count - len(touched) < MANY:
-        return None
-    at = len(first.coordinates)
+    at = len(mechanism.coordinates)
     kept, parts = list(range(at)), []
     stiffness, force, by_pace = [np.zeros((at, at))], [np.zeros(at)], [np.zeros((at, 0))]
-    for part in first.structures:
-        outer = np.array([name in touched for name in part.coordinates])
+    for part in mechanism.structures:
+        outer = np.array([name in names for name in part.coordinates])
         followed = _followed(part, outer)
         if followed is None:
             return None
@@ -78,7 +77,7 @@ def left_out(mechanisms: Iterable[Mechanism]) -> LeftOut | None:
     return LeftOut(tuple(parts), np.array(kept), block_diag(*stiffness), np.concatenate(force), block_diag(*by_pace))
 
 
-def _touched(mechanism: Mechanism) -> set[str]:
+def touched(mechanism: Mechanism) -> set[str]:
     """Coordinates in rows of links, contacts and controllers."""
     rows = [row for one in mechanism.elements for row in (one.acts, one.senses)]
     rows += [row for one in mechanism.contacts for row in (one.slip, one.separation)]
@@ -87,10 +86,12 @@ def _touched(mechanism: Mechanism) -> set[str]:
     return {name for row in rows for name in row}
 
 
-def _alike(some: tuple[StructurePart, ...], others: tuple[StructurePart, ...]) -> bool:
+def alike(some: tuple[StructurePart, ...], others: tuple[StructurePart, ...]) -> bool:
+    """True if structures have the same matrices, forces and rigid motions."""
     pairs = zip(some, others, strict=True)
     names = ("mass", "damping", "stiffness", "force", "motion")
-    return all(np.array_equal(getattr(one, name), getattr(two, name)) for one, two in pairs for name in names)
+    arrays = ((getattr(one, name), getattr(two, name)) for one, two in pairs for name in names)
+    return all(one is two or np.array_equal(one, two) for one, two in arrays)
 
 
 def _followed(part: StructurePart, outer: NDArray[np.bool_]) -> Array | None:

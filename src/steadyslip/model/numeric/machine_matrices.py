@@ -24,7 +24,7 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
 from steadyslip.model.numeric.contact_laws import ContactFunctions, functions_of, numbers_of
-from steadyslip.model.numeric.left_out import LeftOut, left_out
+from steadyslip.model.numeric.left_out import LeftOut, alike, left_out, touched
 
 _VARIED = inner_symbol("n_varied", real=True)
 NO_PULL = (
@@ -136,19 +136,29 @@ class VariedMachine:
         kind, _, rest = name.partition(".")
         self.machine, self.name = machine, name
         self.own = machine.mechanism()
+        self._left: dict[frozenset[str], LeftOut | None] = {}
         self.of_structure = kind == "bodies" and machine.bodies[rest.partition(".")[0]].is_structure
         if not self.of_structure:  # whose methods take numbers only
             self.mechanism = with_values(machine, {name: _VARIED}).mechanism()
-            self.left = left_out([self.own])
+            self.left = left_out(self.own, touched(self.own))
 
     def matrices(self, values: Array, whole: bool = False) -> MachineMatrices:
         """Matrices of the machines with values (p,), SI, which are not checked; if `whole`, of all coordinates."""
         if self.of_structure:
             mechanisms = [with_values(self.machine, {self.name: float(one)}).mechanism() for one in values]
-            left = None if whole else left_out([self.own, *mechanisms])
+            left = None if whole else self._left_of(mechanisms)
             nothing = np.zeros(())
             return _stacked([_Assembler(one, nothing, left).matrices() for one in mechanisms])
         return _Assembler(self.mechanism, values, None if whole else self.left).matrices()
+
+    def _left_of(self, mechanisms: Sequence[Mechanism]) -> LeftOut | None:
+        """What can be left out of all of the machines; None if their structures differ."""
+        if not all(alike(one.structures, self.own.structures) for one in mechanisms):
+            return None
+        names = frozenset().union(*map(touched, (self.own, *mechanisms)))
+        if names not in self._left:
+            self._left[names] = left_out(self.own, names)
+        return self._left[names]
 
 
 def _stacked(several: list[MachineMatrices]) -> MachineMatrices:

@@ -6,8 +6,10 @@ controller. Stresses of contacts are eliminated contact by contact.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ _SPOILT = 1e8  # condition of E from which dividing by it loses half of the digi
 _INVERSE_STEPS = 3  # of inverse iteration; one is enough where no other eigenvalue is near
 _MARGIN = 10.0  # rounding errors between a real part and zero that leave no doubt of its sign
 _SURE = 1e-9  # real part, relative to the largest eigenvalue, above which rounding cannot change its sign
+_PLAIN, _ADJOINT = 0, 2  # matrices of equations, as LAPACK counts them
 ILL_POSED, UNDECIDED = -1, -2  # in place of a number of growing eigenvalues
 _BATCH = 2**22  # complex numbers of matrices that are solved at once, 64 MiB
 
@@ -55,11 +58,15 @@ class StatePencil:
 
     @cached_property
     def inertial(self) -> bool:
-        """True if E can be inverted: every coordinate has inertia."""
+        """True if E can be inverted: every coordinate has inertia.
+
+        Beside the inertia E has ones on its diagonal, and rates of memories by accelerations below it.
+        """
         from scipy.linalg import lapack  # slow to import
 
+        moving = slice(self.size, 2 * self.size)
         rows, columns = self.scale
-        even = self.e * rows[:, None] * columns
+        even = self.e[moving, moving] * rows[moving, None] * columns[moving]
         factors, _, _ = lapack.dgetrf(even)
         estimate, _ = lapack.dgecon(factors, np.max(np.sum(np.abs(even), axis=0)))
         if estimate > _MASSLESS * len(even):  # in sums of entries, up to n times the singular values, which take longer
@@ -70,10 +77,46 @@ class StatePencil:
     @cached_property
     def _standard(self) -> tuple[Array, Array, Array]:
         """State matrix in modal coordinates, and matrices from its states to z and from the rows of E to its rates."""
-        basis, left = _modal_basis(self.e, self.a, self.size)
-        inverse = np.linalg.inv(left @ self.e @ basis)
-        left = inverse @ left
-        return left @ self.a @ basis, basis, left
+        basis, left = self._modal_basis()
+        at, moving, rest = slice(self.size), slice(self.size, 2 * self.size), slice(2 * self.size, None)
+        left[at, at] = np.linalg.solve(left[at, at] @ basis[at, at], left[at, at])  # E is the identity there
+        inertia = left[moving, moving] @ self.e[moving, moving] @ basis[moving, moving]
+        left[moving, moving] = np.linalg.solve(inertia, left[moving, moving])
+        left[rest, moving] = -(left[rest, rest] @ self.e[rest, moving]) @ basis[moving, moving] @ left[moving, moving]
+        state = np.zeros(self.a.shape)
+        state[at, moving] = left[at, at] @ basis[moving, moving]
+        pushed = self.a[self.size :]
+        pushed = np.hstack([pushed[:, part] @ basis[part, part] for part in (at, moving, rest)])
+        state[moving] = left[moving, moving] @ pushed[: self.size]
+        state[rest] = left[rest, moving] @ pushed[: self.size] + left[rest, rest] @ pushed[self.size :]
+        return state, basis, left
+
+    def _modal_basis(self) -> tuple[Array, Array]:
+        """Matrices from modal states to z, and from rows of the pencil to modal rows.
+
+        In modes of the symmetric parts of stiffness and inertia, with velocities beside displacements times frequency,
+        a structure's lowest mode keeps its digits beside the highest. Without such modes the pencil is only made even.
+        """
+        size, at, moving = self.size, slice(self.size), slice(self.size, 2 * self.size)
+        mass, stiffness = (0.5 * (m + m.T) for m in (self.e[moving, moving], -self.a[moving, at]))
+        try:
+            from scipy.linalg import eigh  # slow to import
+
+            squares, shapes = eigh(stiffness, mass)
+        except np.linalg.LinAlgError:
+            rows, columns = self.scale
+            return np.diag(columns), np.diag(rows)
+        own = np.sqrt(np.abs(squares))
+        omega = np.where(own > 1e-6 * np.max(own), own, 1e-6 * np.max(own) or 1.0)  # rigid motions
+        basis, left = np.zeros((2, *self.e.shape))
+        basis[at, at], basis[moving, moving] = shapes / omega, shapes
+        left[at, at], left[moving, moving] = omega[:, None] * (shapes.T @ mass), shapes.T
+        rest = range(2 * size, len(self.e))
+        inside = np.abs(self.a[2 * size :, : 2 * size] @ basis[: 2 * size]).max(axis=1, initial=0.0)
+        outside = np.abs(left @ self.a[:, 2 * size :]).max(axis=0, initial=0.0)
+        both = np.where((inside > 0) & (outside > 0), np.sqrt(inside / np.where(outside > 0, outside, 1.0)), 1.0)
+        basis[rest, rest], left[rest, rest] = both, 1 / both
+        return basis, left
 
     @cached_property
     def eigenvalues(self) -> ComplexArray:
@@ -117,21 +160,32 @@ class StatePencil:
 
     def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
         """Left and right null vectors of s E − A, (N,) each, for an eigenvalue s (1/s), by inverse iteration."""
+        rows, columns = self.scale
+        solved, found = self._solver(s), []
+        for way in (_ADJOINT, _PLAIN):
+            one = np.random.default_rng(0).standard_normal(len(rows)) + 0j
+            for _ in range(_INVERSE_STEPS):
+                one, _ = solved(one, way)
+            found.append(one)
+        return found[0].conj() * rows, found[1] * columns
+
+    def _solver(self, s: complex) -> Callable[[NDArray[Any], int], tuple[NDArray[Any], float]]:
+        """Solutions, of size one, and their sizes before, of equations with the matrix s E − A made even."""
         from scipy.linalg import lapack  # slow to import
 
         rows, columns = self.scale
         factors, pivots, _ = lapack.zgetrf(rows[:, None] * (s * self.e - self.a) * columns)
         diagonal = np.einsum("ii->i", factors)
         diagonal[diagonal == 0] = np.finfo(float).tiny  # an eigenvalue to the last digit
-        found = []
-        for way in (2, 0):  # of the adjoint for the left one, and plain
-            one = np.random.default_rng(0).standard_normal(len(rows)) + 0j
-            for _ in range(_INVERSE_STEPS):
-                one = lapack.zgetrs(factors, pivots, one, trans=way)[0]
-                one /= np.max(np.abs(one))
-                one /= np.linalg.norm(one)
-            found.append(one)
-        return found[0].conj() * rows, found[1] * columns
+
+        def solved(right: NDArray[Any], way: int) -> tuple[NDArray[Any], float]:
+            found = lapack.zgetrs(factors, pivots, right, trans=way)[0]
+            largest = np.max(np.abs(found))
+            found /= largest
+            size = np.linalg.norm(found)
+            return found / size, float(largest * size)
+
+        return solved
 
     def mode(self, s: complex) -> ComplexArray:
         """Right null vector of s E − A, (N,), for an eigenvalue s (1/s)."""
@@ -140,28 +194,41 @@ class StatePencil:
     def error(self, s: complex) -> float:
         """Distance (1/s) of `s` from an eigenvalue, by one step of inverse iteration on the matrices themselves.
 
-        Independent of how the eigenvalue was found; from the singular vectors of least value.
+        Independent of how the eigenvalue was found; from the singular vectors of least value, by inverse iteration.
         """
         rows, columns = self.scale
-        e = rows[:, None] * self.e * columns
-        shifted = s * e - rows[:, None] * self.a * columns
-        left, sizes, right = np.linalg.svd(shifted)
-        slope = abs(left[:, -1].conj() @ e @ right[-1].conj())
-        return float(sizes[-1] / slope) if slope else np.inf
+        solved, size = self._solver(s), np.inf
+        right = np.random.default_rng(0).standard_normal(len(rows)) + 0j
+        for _ in range(_INVERSE_STEPS):
+            left, _ = solved(right, _ADJOINT)
+            right, size = solved(left, _PLAIN)
+        slope = abs(left.conj() @ (rows * real_product(self.e, columns * right)))
+        return float(1 / (size * slope)) if slope else np.inf
 
-    def resolvent(self, s: ComplexArray, out: Array, into: Array) -> ComplexArray:
-        """`out`ᵀ (s E − A)⁻¹ `into` at places s (p,), for `out` (N, k) and `into` (N, m): (p, k, m)."""
+    def resolvent(self, out: Array, into: Array) -> Callable[[ComplexArray], ComplexArray]:
+        """Function of places s (p,): `out`ᵀ (s E − A)⁻¹ `into`, (p, k, m), for `out` (N, k) and `into` (N, m)."""
         known = self._decomposed
         if known is not None:
             values, right, rows = known
             left, tail = out.T @ right, rows @ into
-            return np.asarray((left / (s[:, None, None] - values)) @ tail)
-        found = np.empty((len(s), out.shape[1], into.shape[1]), dtype=complex)
-        step = max(_BATCH // self.a.size, 1)
-        for start in range(0, len(s), step):
-            part = s[start : start + step, None, None] * self.e - self.a
-            found[start : start + step] = out.T @ np.linalg.solve(part, np.broadcast_to(into, (len(part), *into.shape)))
-        return found
+            return lambda s: np.asarray((left / (s[:, None, None] - values)) @ tail)
+
+        def solved(s: ComplexArray) -> ComplexArray:
+            found = np.empty((len(s), out.shape[1], into.shape[1]), dtype=complex)
+            step = max(_BATCH // self.a.size, 1)
+            for start in range(0, len(s), step):
+                part = s[start : start + step, None, None] * self.e - self.a
+                several = np.broadcast_to(into, (len(part), *into.shape))
+                found[start : start + step] = out.T @ np.linalg.solve(part, several)
+            return found
+
+        return solved
+
+
+def real_product(matrix: Array, vector: NDArray[Any]) -> ComplexArray:
+    """Product of a real matrix (n, n) and a complex vector (n,), without a complex copy of the matrix."""
+    found = matrix @ vector.view(float).reshape(-1, 2)
+    return np.asarray(found).view(complex)[:, 0]
 
 
 def _even(e: Array, a: Array, size: int) -> tuple[Array, Array]:
@@ -179,37 +246,10 @@ def _even(e: Array, a: Array, size: int) -> tuple[Array, Array]:
     rows, columns = np.ones(e.shape[:-1]), np.ones(e.shape[:-1])
     for _ in range(4):  # sweeps; each halves what is left of the differences
         for factors, axis in ((rows, -1), (columns, -2)):
-            sizes = np.max(both * rows[..., None] * columns[..., None, :], axis=axis)
-            factors /= np.sqrt(np.maximum(sizes, 1e-300))
+            by = 1 / np.sqrt(np.maximum(np.max(both, axis=axis), 1e-300))
+            factors *= by
+            both *= np.expand_dims(by, axis)
     return rows, columns
-
-
-def _modal_basis(e: Array, a: Array, size: int) -> tuple[Array, Array]:
-    """Matrices from modal states to z, and from rows of the pencil to modal rows.
-
-    In modes of the symmetric parts of stiffness and inertia, with velocities beside displacements times frequency, a
-    structure's lowest mode keeps its digits beside the highest. Without such modes the pencil is only made even.
-    """
-    mass, stiffness = (0.5 * (m + m.T) for m in (e[size : 2 * size, size : 2 * size], -a[size : 2 * size, :size]))
-    rows, columns = _even(e, a, size)
-    try:
-        from scipy.linalg import eigh  # slow to import
-
-        squares, shapes = eigh(stiffness, mass)
-    except np.linalg.LinAlgError:
-        return np.diag(columns), np.diag(rows)
-    own = np.sqrt(np.abs(squares))
-    omega = np.where(own > 1e-6 * np.max(own), own, 1e-6 * np.max(own) or 1.0)  # rigid motions
-    basis, left = np.zeros((2, *e.shape))
-    basis[:size, :size], basis[size : 2 * size, size : 2 * size] = shapes / omega, shapes
-    left[:size, :size] = omega[:, None] * (shapes.T @ mass)
-    left[size : 2 * size, size : 2 * size] = shapes.T
-    rest = range(2 * size, len(e))
-    inside = np.abs(a[2 * size :] @ basis).max(axis=1, initial=0.0)
-    outside = np.abs(left @ a[:, 2 * size :]).max(axis=0, initial=0.0)
-    both = np.where((inside > 0) & (outside > 0), np.sqrt(inside / np.where(outside > 0, outside, 1.0)), 1.0)
-    basis[rest, rest], left[rest, rest] = both, 1 / both
-    return basis, left
 
 
 def _finite_eigenvalues(pencil: StatePencil) -> ComplexArray:

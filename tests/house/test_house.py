@@ -87,7 +87,9 @@ def test_only_laws_know_laws():
     sizes = ("mu_coulomb", "mu_static", "mu_ref", "sample_time", "drive.resolution")  # told by name from others
     sizes += ("stribeck_exponent",)
     arguments |= {("files/specifications/bare_numbers.py", name) for name in sizes}
-    arguments |= {("files/specifications/sizes.py", f"drive.{name}") for name in ("kp", "kd", "ki", "sample_time", "delay")}
+    arguments |= {
+        ("files/specifications/sizes.py", f"drive.{name}") for name in ("kp", "kd", "ki", "sample_time", "delay")
+    }
     arguments.add(("nonlinear/hunting/hunt_result.py", "drive.resolution"))  # an encoder's step in words
     telling = {word for word in words | fields if {"_", "-"} & set(word)}  # others mean more than a law
     found = []

@@ -24,11 +24,13 @@ from steadyslip.verdict.cures import default_adjust
 from steadyslip.verdict.tolerances import LEAST, format_chance
 from steadyslip.verdict.words import change_to, told
 
-BEYOND_EDGE = 0.2  # margin of a recommended value beyond the edge, share of it: uses up 10 % of error on both sides
+BEYOND_EDGE = 0.2  # recommended distance of an edge from a value, share of the value: 10 % of error on both sides
+_ROUNDED = 1.01  # factor of that distance, so that a value rounded to the four digits that are printed still keeps it
 FAR = 10.0  # factor between a value and its change from which the change is named only: nobody orders such a part
 SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
 _ROWS = 4  # changes that are recommended
 _STEPS = (1.1, 1.25, 1.5, 2.0)  # factors of a value that are tried to move a stable rig away from its edges (by trial)
+_FARTHER = (1.5, 2.0, 3.0, 4.0)  # factors of an edge tried where another edge is near to the value beyond it (by trial)
 
 
 @dataclass(frozen=True)
@@ -81,23 +83,35 @@ def recommendation(
         yield paragraph(_what_to_hold(analysis, adjustable))
         return
     able = [one for one in changeable(analysis, adjustable) if not adjustable or one.parameter in adjustable]
-    found = {one: row for one in able if (row := _change(analysis, one, adjustable.get(one.parameter)))}
-    if not found:
+    found = {one: begun for one in able if (begun := _begun(analysis, one, adjustable.get(one.parameter)))}
+    close = [one for one, begun in found.items() if adjustable or not _is_far(one.value, begun.edge)]
+    rows = [row for one in (close or list(found))[:_ROWS] if (row := _made_by(analysis, one, found[one].values))]
+    if not rows:
         yield from _cured(analysis, {}, adjustable, "stable", "stable at")
         return
-    close = [one for one, row in found.items() if adjustable or not _is_far(one.value, row.edge)]
-    first, *_ = close or found
-    rows = [found[one].cells for one in close or found][:_ROWS]
-    name, now, to, *_ = rows[0]
-    alone = " Each row below is enough alone, the others unchanged." if len(rows) > 1 else ""
-    because = _because(analysis, {first.parameter: found[first].to})
-    yield paragraph(f"Change {name} from {now} to {to}.{because}{alone}")
-    share = f"{100 * BEYOND_EDGE:g} %"
-    head = ("change", "now", "recommended", "edge", f"stable {share} beyond the edge")
-    sequence = "Changes that make it stable: settings first, then parts; the speed, which the task sets, last."
-    yield table(rows, head, caption=sequence)
-    if close and (far := [row.cells[0] for one, row in found.items() if one not in close]):
+    rows.sort(key=_best_first)
+    yield from _made_stable(analysis, rows, {one.parameter: begun for one, begun in found.items()})
+    if close and (far := [said(analysis.rig, one.parameter) for one in found if one not in close]):
         yield _left_out(far)
+
+
+def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str, _Begun]) -> Iterator[str]:
+    """HTML of the changes that make a rig stable, the first in words, all in a table."""
+    first, wanted = rows[0], format_percent(BEYOND_EDGE)
+    origin = "" if analysis.origin is None else f" Why it is unstable: {analysis.origin.words}."
+    near = f" No edge is then nearer than {wanted}."
+    if first.distance < BEYOND_EDGE:
+        near = f" One edge is even then nearer than the {wanted} that are recommended: that of {first.nearest}."
+    alone = " Each row below is enough alone, the others unchanged." if len(rows) > 1 else ""
+    name, now, to = first.cells
+    yield paragraph(f"Change {name} from {now} to {to}. Then {first.then.reason}.{near}{origin}{alone}")
+    head = ("change", "now", "recommended", "its edge", "nearest edge then", f"all edges {wanted} away")
+    caption = (
+        f"Changes that make it stable, each alone: those that put all edges {wanted} away first, of these settings "
+        "before parts; the speed, which the task sets, last."
+    )
+    cells = ((*one.cells, begun[one.parameter].words, one.nearest or "none within range", one.far) for one in rows)
+    yield table(cells, head, caption=caption)
 
 
 def _made_certain(
@@ -292,12 +306,13 @@ def _kept_apart(
     if not found:
         yield paragraph(f"No single change that was tried puts all edges {wanted} away.")
         return
-    name, first, to, after, _ = found[0].cells
+    name, first, to = found[0].cells
     yield paragraph(
-        f"Change {name} from {first} to {to}: it stays stable, and the nearest edge is then that of {after}."
+        f"Change {name} from {first} to {to}: it stays stable, and the nearest edge is then that of {found[0].nearest}."
     )
     head = ("change", "now", "recommended", "nearest edge then", f"all edges {wanted} away")
-    yield table((one.cells for one in found), head, caption="Changes that move it away from its edges, each alone.")
+    rows = ((*one.cells, one.nearest, one.far) for one in found)
+    yield table(rows, head, caption="Changes that move it away from its edges, each alone.")
 
 
 def _movable(analysis: Analysis, adjustable: Collection[str]) -> list[Margin]:
@@ -306,46 +321,63 @@ def _movable(analysis: Analysis, adjustable: Collection[str]) -> list[Margin]:
     return sorted(able[:_ROWS], key=lambda one: unit_cost(one.parameter))
 
 
-class _MovedAway(NamedTuple):
-    """Row of a table: name, value, recommended value, nearest edge then, whether all are far; that edge's distance."""
+class _Moved(NamedTuple):
+    """A changed value: its parameter, name, value now and then in words, analysis then, nearest edge, its distance."""
 
-    cells: tuple[str, str, str, str, str]
+    parameter: str
+    cells: tuple[str, str, str]
+    then: Analysis
+    nearest: str
     distance: float
 
+    @property
+    def far(self) -> str:
+        """Whether all edges are as far as is recommended."""
+        return "yes" if self.distance >= BEYOND_EDGE else "no"
 
-def _best_first(found: _MovedAway) -> float:
-    """Sort key: those at which all edges are far, in their order; of the others the farthest first."""
-    return -min(found.distance, BEYOND_EDGE)
+
+def _best_first(found: _Moved) -> tuple[bool, float]:
+    """Sort key: those at which all edges are far, then the others, the farthest first; the speed, the task, last."""
+    return unit_cost(found.parameter) == TASK, -min(found.distance, BEYOND_EDGE)
 
 
-def _moved_away(analysis: Analysis, margin: Margin) -> _MovedAway | None:
-    """Change of a parameter away from its edge by the steps of `_STEPS`, to the first at which all edges are far.
-
-    Else the one at which the nearest edge is farthest; None if none is farther than now.
-    """
-    rig: Any = analysis.rig
+def _moved_away(analysis: Analysis, margin: Margin) -> _Moved | None:
+    """Change of a parameter away from its edge by the steps of `_STEPS`; None if no edge is then farther than now."""
     rises = margin.edge is None or margin.edge.value < margin.value
     sign = 1 if rises == (margin.value > 0) else -1
-    best: _MovedAway | None = None
     now = min((_distance(one, edge) for one in analysis.margins for edge in one.about), default=math.inf)
-    for step in _STEPS:
-        to = margin.value * step**sign
+    found = [one for one in _tried(analysis, margin, [margin.value * step**sign for step in _STEPS]) if one.nearest]
+    best = max(found, key=lambda one: one.distance, default=None)
+    return best if best is not None and best.distance > now else None
+
+
+def _tried(analysis: Analysis, margin: Margin, values: Sequence[float]) -> list[_Moved]:
+    """Those of the values at which sliding is stable, up to the first at which all edges are far."""
+    rig: Any = analysis.rig
+    found = []
+    for to in values:
         with suppress(ParameterError, NotAvailable):
             changed = analyze(rig.with_values({margin.parameter: to}), branch=analysis.branch)
-            edges = [(one, edge) for one in changed.margins for edge in one.about]
-            if not changed.stable or not edges:
+            if not changed.stable:
                 continue
-            one, edge = min(edges, key=lambda found: _distance(*found))
-            away = _distance(one, edge)
-            if away <= (now if best is None else best.distance):
-                continue
-            after = f"{said(rig, one.parameter)}, {format_percent(away)} away"
+            edges = [(_distance(one, edge), one) for one in changed.margins for edge in one.about]
+            away, of = min(edges, key=lambda found: found[0], default=(math.inf, None))
+            near = "" if of is None else said(rig, of.parameter)
+            near += f", {format_percent(away)} away" if math.isfinite(away) else ""
             first, then = (_value(analysis, margin, value) for value in (margin.value, to))
-            far = "yes" if away >= BEYOND_EDGE else "no"
-            best = _MovedAway((said(rig, margin.parameter), first, then, after, far), away)
+            found.append(_Moved(margin.parameter, (said(rig, margin.parameter), first, then), changed, near, away))
             if away >= BEYOND_EDGE:
                 break
-    return best
+    return found
+
+
+def _made_by(analysis: Analysis, margin: Margin, values: Sequence[float]) -> _Moved | None:
+    """The first of the values at which all edges are far; else the first that is stable, as going farther is no help.
+
+    None if it is stable at none.
+    """
+    found = _tried(analysis, margin, values)
+    return next((one for one in found if one.distance >= BEYOND_EDGE), found[0] if found else None)
 
 
 def _side(analysis: Analysis, margin: Margin) -> str:
@@ -368,40 +400,43 @@ def _curing(margin: Margin) -> list[Boundary]:
     return sorted(begins, key=lambda edge: float(doublings(margin.value, edge.value, margin.unit)))
 
 
-class _Change(NamedTuple):
-    """Row of a table: name, value, recommended value, edge, that it is stable there; edge and new value in SI units."""
+class _Begun(NamedTuple):
+    """Window of stable values that is wide enough: its edge in SI units and in words, and values to try inside it."""
 
-    cells: tuple[str, str, str, str, str]
     edge: float
-    to: float
+    words: str
+    values: list[float]
 
 
-def _change(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Change | None:
-    """Change into the nearest window of stable values that is wide enough and allowed; None if there is none."""
+def _begun(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Begun | None:
+    """The nearest window of stable values that is wide enough and allowed; None if there is none."""
     rig: Any = analysis.rig
-    low, high = (None, None) if within is None else (within.low, within.high)
     for edge in (one.value for one in _curing(margin)):
-        away = BEYOND_EDGE * abs(edge - margin.value if margin.unit == "rad" else edge)
         rises = edge > margin.value
-        to = edge + away if rises else edge - away
-        nearer = low if rises else high  # the end of what is allowed that may ask for more than the margin
-        if nearer is not None:
-            to = max(to, nearer) if rises else min(to, nearer)
-        if (low is not None and to < low) or (high is not None and to > high):
+        sign = 1 if rises == (edge > 0) else -1
+        if margin.unit == "rad":
+            values = [edge + BEYOND_EDGE * (edge - margin.value)]
+        else:  # first that of which the edge is as far as is recommended
+            values = [edge / (1 - sign * _ROUNDED * BEYOND_EDGE), *(edge * step**sign for step in _FARTHER)]
+        values = _allowed(values, edge, rises, within)
+        if not values:
             continue
+        to = values[0]
         with suppress(ParameterError, NotAvailable):
             if stability(rig.with_values({margin.parameter: to})) == "stable":
-                now, then, end = (_value(analysis, margin, value) for value in (margin.value, to, edge))
-                word = "above" if rises else "below"
-                return _Change((said(rig, margin.parameter), now, then, f"{word} {end}", "yes"), edge, to)
+                end = _value(analysis, margin, edge)
+                return _Begun(edge, f"{'above' if rises else 'below'} {end}", values)
     return None
 
 
-def _because(analysis: Analysis, change: Mapping[str, float]) -> str:
-    """Sentence on why a change helps: what feeds the motion of a machine, or the reason for the verdict with it."""
-    because = "" if analysis.origin is None else f" Why it is unstable: {analysis.origin.words}."
-    rig: Any = analysis.rig
-    return f" Then {analyze(rig.with_values(change), branch=analysis.branch).reason}.{because}"
+def _allowed(values: Sequence[float], edge: float, rises: bool, within: Adjustment | None) -> list[float]:
+    """Values beyond an edge, outward, cut off at the ends of what is allowed; none if that ends before the edge."""
+    if within is None:
+        return list(values)
+    low = -math.inf if within.low is None else within.low
+    high = math.inf if within.high is None else within.high
+    cut = dict.fromkeys(min(max(one, low), high) for one in values)
+    return [one for one in cut if one != edge and (one > edge) == rises]
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:

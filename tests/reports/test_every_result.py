@@ -141,6 +141,17 @@ def test_results_that_take_long_show_themselves(name):
     shows_itself(name)
 
 
+@pytest.mark.campaign
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize(
+    "name",
+    ["Basin", "CycleBranch", "Draws", "Fit", "History", "Hunt", "LawComparison", "MachineFit"],
+)
+def test_tables_of_a_document_of_its_own_are_numbered(name):
+    page = ss.report(made(name), explorer=False).html.partition("Where it came from")[0]
+    assert page.count("<table") == page.count("<caption>")
+
+
 @pytest.mark.parametrize(
     "compute", [None, ["status"], ["status", "growth_rate"], ["growth_rate", ss.maps.Edge(along="drive.kp")]]
 )

@@ -124,8 +124,11 @@ def sketch_of(record: Any) -> str:
     return ""
 
 
-def text_html(text: str) -> str:
-    """HTML of printed text: lines with two or more columns (two spaces apart) as tables, the others as paragraphs."""
+def text_html(text: str, caption: str = "") -> str:
+    """HTML of printed text: lines with two or more columns (two spaces apart) as tables, the others as paragraphs.
+
+    Tables have the caption, by which a document numbers them.
+    """
     parts: list[str] = []
     words: list[str] = []
     rows: list[list[str]] = []
@@ -140,11 +143,11 @@ def text_html(text: str) -> str:
             words[-1] += f" {line.strip()}"
             parts[-1] = paragraph(words[-1])
         elif line.strip():
-            parts += [_padded_table(rows), paragraph(line.strip())]
+            parts += [_padded_table(rows, caption), paragraph(line.strip())]
             words.append(line.strip())
             rows = []
         indent = len(line) - len(line.lstrip())
-    return "".join([*parts, _padded_table(rows)])
+    return "".join([*parts, _padded_table(rows, caption)])
 
 
 def _is_wrapped(line: str, after: str, indent: int) -> bool:
@@ -156,9 +159,9 @@ def _is_wrapped(line: str, after: str, indent: int) -> bool:
     return cut and len(after) - len(after.lstrip()) >= indent and not re.match(r" *[A-Za-z][\w ]{0,20}: ", after)
 
 
-def _padded_table(rows: list[list[str]]) -> str:
+def _padded_table(rows: list[list[str]], caption: str) -> str:
     widest = max(map(len, rows), default=0)
-    return table([[*row, *[""] * (widest - len(row))] for row in rows])
+    return table([[*row, *[""] * (widest - len(row))] for row in rows], caption=caption)
 
 
 # -- one function for each kind

@@ -21,6 +21,7 @@ BAND = 2.0  # dead band over the amplitude; a band a little wider than the cycle
 STIFFER = 2.0  # factor of all gains that is tried
 LONGER = 4.0  # length of the runs with changes over that of the run without, which bounds their computing time
 WHY = "it hunts because the integral winds up while friction at rest, larger than in sliding, holds the axis"
+_ON_TARGET = "in the end on the target, which its ever smaller strokes approach"
 HOLDS = (
     "Each contact has one normal force, and bodies are rigid. The motion is simulated for the values and the change of "
     "target below; it says nothing of wear, heat or of what the laws leave out."
@@ -94,7 +95,7 @@ def _cures(result: Hunt) -> Iterator[str]:
     good = [one for one in found if one.verdict(allowed) == "ends it"]
     if good:
         told = f"Make this change: {good[0].what}. The axis then rests, "
-        told += f"within {format_quantity(good[0].reach, unit)} of the target" if good[0].reach else "on the target"
+        told += f"within {format_quantity(good[0].reach, unit)} of the target" if good[0].reach else _ON_TARGET
         yield paragraph(f"{told}; {WHY}.")
     else:
         yield paragraph(f"None of the changes below lets it rest within {limit} of the target; {WHY}.")
@@ -104,7 +105,7 @@ def _cures(result: Hunt) -> Iterator[str]:
             one.then.sentence.capitalize(),
             f"{format_quantity(one.reach, unit)}, {one.reach / own:.2g} times as far as now"
             if one.reach
-            else f"0 {unit}",
+            else f"0 {unit} in the end",
             one.verdict(allowed),
         )
         for one in found

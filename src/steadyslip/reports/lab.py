@@ -22,6 +22,7 @@ from steadyslip.reports.results import parts_of
 from steadyslip.verdict import analyze
 
 _FOUND = ("parameter", "value", "95 %")
+_FITTED = "Values that were fitted."
 _OVER_STRESS = "k/σ"  # name of stiffness over normal stress in the text of a fit
 
 
@@ -34,7 +35,7 @@ def record_names(fit: Fit) -> str:
 def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | None = None) -> Parts:
     rig, rows = result.rig(), _estimate_rows(result, result.rig())
     body = [
-        *_use(result), heading("What was found"), table(rows, _FOUND),
+        *_use(result), heading("What was found"), table(rows, _FOUND, caption=_FITTED),
         *(paragraph(worded(rig, text), "warning") for text in warnings(result)),
     ]  # fmt: skip
     if draws is not None:
@@ -107,7 +108,7 @@ def _lead(fit: Fit | MachineFit, rig: Rig) -> str:
 @parts_of.register
 def _machine_fit(result: MachineFit, comparison: None = None, draws: None = None) -> Parts:
     rig = result.rig()
-    body = [heading("What was found"), table(_estimate_rows(result, rig), _FOUND)]
+    body = [heading("What was found"), table(_estimate_rows(result, rig), _FOUND, caption=_FITTED)]
     for i, record in enumerate(result.plan.records):
         shown = figure_html(lambda i=i: figures.machine_fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
         body.append(figure(shown, f"{Path(record.source).name}: record and machine."))
@@ -128,7 +129,11 @@ def _draws_section(result: Draws) -> list[str]:
     details = ", ".join(f"{name} {value:.4g}" for name, value in result.details.items())
     many = f"{len(result)} draws, {result.kind}{f' ({details})' if details else ''}."
     body = [
-        table(rows, ("parameter", "of the fit", "error of the draws", "95 % of the draws")),
+        table(
+            rows,
+            ("parameter", "of the fit", "error of the draws", "95 % of the draws"),
+            caption="Values that the draws leave open.",
+        ),
         paragraph(many, "small"),
     ]
     if result.interrupted:
@@ -172,7 +177,8 @@ def _comparison(result: LawComparison) -> Parts:
     ]
     columns = ("law", "parameters", "sum of squares", "AIC", "BIC", "weight")
     body = [
-        heading("What was found"), table(rows, columns), figure(drawing, "How well each law explains the records."),
+        heading("What was found"), table(rows, columns, caption="The laws, the best first."),
+        figure(drawing, "How well each law explains the records."),
         heading("In words"), result_listing(result),
     ]  # fmt: skip
     question = f"Which law of friction explains the records best: {record_names(best)}?"
@@ -189,9 +195,18 @@ def _population(result: Population) -> Parts:
             said = "not determined alone" if alone is None else alone.shown()
             own.append((words, label, said, result.experiment(label, name).shown()))
     body = [
-        heading("What was found"), table(rows, ("parameter", "mean", "mean, 95 %", "another experiment, 95 %")),
+        heading("What was found"), table(
+            rows,
+            ("parameter", "mean", "mean, 95 %", "another experiment, 95 %"),
+            caption="Means of the population, and what another experiment would have.",
+        ),
         figure(figure_html(result.plot, "population"), "Every experiment alone and with the others."),
-        heading("The experiments"), table(own, ("parameter", "experiment", "alone", "with the others"), left=False),
+        heading("The experiments"), table(
+            own,
+            ("parameter", "experiment", "alone", "with the others"),
+            left=False,
+            caption="Every experiment, alone and with the others.",
+        ),
         heading("In words"), result_listing(result),
         *(heading(f"Fit {label}") + result_html(fit) for label, fit in result.fits.items()),
     ]  # fmt: skip

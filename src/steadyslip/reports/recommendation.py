@@ -298,7 +298,7 @@ def _kept_apart(
     whose = "their values are the edges" if len(near) > 1 else "its value is the edge"
     yield paragraph(
         f"It is stable, with less distance from the edge than the {wanted} that are recommended. Within {wanted} of "
-        f"{whose} of {listed}. Know what has an edge so near more closely than that, or make a change."
+        f"{whose} of {listed}. Make sure of these values to better than that, or make a change."
     )
     found = sorted(
         filter(None, (_moved_away(analysis, one) for one in _movable(analysis, adjustable))), key=_best_first

@@ -109,7 +109,7 @@ def _thresholds(result: Thresholds) -> Parts:
     basins = [found] if (found := result.__dict__.get("basin")) is not None else []
     body = [
         *rig_section(result.rig),
-        heading("What was found"), table(rows),
+        heading("What was found"), table(rows, caption="Kicks that are survived."),
         paragraph("Sizes have no unit: logarithms of ratios of velocities, natural lengths of displacement, shares of "
                   "the normal stress, and for blows velocities of the drive.", "small"),
         *(figure(figure_html(one.plot, "basin", 6.0), "What comes of every starting point.") for one in basins),
@@ -125,7 +125,8 @@ def _basin(result: Basin) -> Parts:
     reasons, numbers = np.unique(result.doubt[result.doubt != ""], return_counts=True)
     body = [
         *rig_section(result.rig),
-        heading("What was found"), table(rows, ("comes to", "share of the points")),
+        heading("What was found"),
+        table(rows, ("comes to", "share of the points"), caption="What comes of the points."),
         figure(figure_html(result.plot, "basin", 6.5), "What comes of every starting point."),
         *(paragraph(f"{n} undecided: {why}.", "small") for why, n in zip(reasons, numbers, strict=True)),
     ]  # fmt: skip
@@ -149,7 +150,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
     body = [
         *rig_section(result.rig),
         heading("What varied"),
-        table(ranges, ("parameter", "range", "spacing", "meaning")),
+        table(ranges, ("parameter", "range", "spacing", "meaning"), caption="What varied, within which range."),
     ]
     for name in result.first:
         rows = []
@@ -159,7 +160,10 @@ def _sensitivity(result: Sensitivity) -> Parts:
             rows.append((said(result.rig, parameter), f"{result.first[name][i]:.3f}", f"{least:.3f} to {most:.3f}",
                          f"{result.total[name][i]:.3f}", f"{low:.3f} to {high:.3f}"))  # fmt: skip
         columns = ("parameter", "alone", "95 %", "with others", "95 %")
-        body += [heading(name.replace("_", " ").capitalize()), table(rows, columns)]
+        body += [
+            heading(name.replace("_", " ").capitalize()),
+            table(rows, columns, caption="Shares of its variance that each parameter explains."),
+        ]
         if result.missing[name]:
             missing = f"It does not exist at {100 * result.missing[name]:.3g} % of the points, which are left out."
             body.append(paragraph(missing, "warning"))
@@ -218,7 +222,7 @@ def _hunt(result: Hunt, source: str = "") -> Parts:
     body = [
         *held.recommendation(result), heading("What was done to it"), *protocol_table(rig, result.protocol),
         paragraph("It is at rest before, and its target is where this puts it."),
-        heading("What was found"), text_html(worded(rig, rest)),
+        heading("What was found"), text_html(worded(rig, rest), "What was found."),
         figure(figure_html(lambda: hunting(result), words, 7.0), words),
         *rig_section(rig, source), *references(rig),
     ]  # fmt: skip
@@ -289,7 +293,7 @@ def _history(result: History) -> Parts:
     body = [
         *rig_section(rig),
         heading("What was done to it"), *protocol_table(rig, result.protocol),
-        heading("What it did"), text_html(worded(rig, result.summary())),
+        heading("What it did"), text_html(worded(rig, result.summary()), "What it did."),
         figure(figure_html(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load_name(rig)}."),
         plane,
         *_slip_table(result),
@@ -314,7 +318,7 @@ def _load_name(rig: Slider | Machine) -> str:
 def protocol_table(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
     """HTML table of the pieces of a protocol, with numbers in display units."""
     rows = [(name, ", ".join(items)) for name, items in (piece_words(rig, one) for one in protocol.pieces)]
-    yield table(rows) if rows else paragraph("Nothing: it starts in steady sliding.")
+    yield table(rows, caption="What was done to it.") if rows else paragraph("Nothing: it starts in steady sliding.")
 
 
 def _slip_table(result: History) -> Iterator[str]:
@@ -337,6 +341,7 @@ def _slip_table(result: History) -> Iterator[str]:
     yield table(
         rows[-MAX_ROWS:],
         ("contact" if result.rig.contacts else "number", "begins", "lasts", "slip", "peak velocity", drop),
+        caption="Slip events.",
     )
 
 
@@ -360,11 +365,11 @@ def _branch(result: CycleBranch) -> Parts:
     ]
     body = [
         *rig_section(result.rig),
-        heading("The cycles"), text_html(worded(result.rig, rest)),
+        heading("The cycles"), text_html(worded(result.rig, rest), "The branch of cycles."),
         figure(figure_html(lambda: figures.cycle_branch(result), "branch of cycles", 6.5),
                f"Cycles along {words}."),
-        table(special, ("special", words, "period")),
-        table(listed, (words, "period", "peak velocity", result.swing_label, ""), left=False),
+        table(special, ("special", words, "period"), caption="Where the branch turns, ends or changes its kind."),
+        table(listed, (words, "period", "peak velocity", result.swing_label, ""), False, "Cycles along the branch."),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
     question = f"Which stick-slip cycles does this rig have as {words} varies?"
@@ -384,7 +389,12 @@ def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
 def _map(result: MapResult) -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     about, found = sentence(first).rstrip(".").replace(" x ", " × "), _status_shares(result)
-    body = [*rig_section(rig), heading("The map"), text_html(worded(rig, rest)), *_map_figures(result)]
+    body = [
+        *rig_section(rig),
+        heading("The map"),
+        text_html(worded(rig, rest), "What the map found."),
+        *_map_figures(result),
+    ]
     question = "How does the answer depend on the numbers that vary here?"
     return Parts(found or about, f"{about}." if found else "", question, body, rig)
 

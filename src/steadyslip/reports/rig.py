@@ -25,6 +25,7 @@ from steadyslip.machine.letters import MEMBERS, letter_of, said, worded, words_o
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
+from steadyslip.model import Model
 from steadyslip.model.build import build_model
 from steadyslip.model.legend import states_of_laws
 from steadyslip.model.numeric import by_matrices
@@ -232,10 +233,21 @@ def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> It
     yield paragraph("The equations of motion:")
     for equation in told:
         yield equation_html(equation)
+    if axial := list(_along_axis(rig, model)):
+        yield paragraph("The stiffness along the sliding direction, of that along the axis:")
+        yield from map(equation_html, axial)
     if states := list(states_of_laws(model)):
         yield paragraph("The state of friction in the descriptions of its laws, which are named below:")
         yield from map(equation_html, states)
-    yield letters(rig, [*printed, *told, *states])
+    yield letters(rig, [*printed, *told, *axial, *states])
+
+
+def _along_axis(rig: Slider | Machine, model: Model) -> Iterator[sp.Eq]:
+    """Stiffness along the sliding direction of a rig whose file gives that along its axis."""
+    if model.axial_share is not None:
+        axial = sp.Symbol(rig.parameters()["slider.axial_stiffness"].role.letter)
+        stiffness, share = (model.written(one) for one in (model.parameters["slider.stiffness"], model.axial_share))
+        yield sp.Eq(stiffness, share * axial, evaluate=False)
 
 
 def _is_used(equation: sp.Eq, others: Sequence[sp.Eq]) -> bool:
@@ -249,7 +261,7 @@ def _confidence_section(prediction: Prediction | None) -> Iterator[str]:
     if prediction is None:
         return
     yield heading("How sure is that?")
-    yield text_html(worded(prediction.rig, str(prediction)))
+    yield text_html(worded(prediction.rig, str(prediction)), "What the fit leaves open.")
     yield figure(
         figure_html(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig."
     )
@@ -260,7 +272,7 @@ def tolerance_section(found: Tolerated | None) -> Iterator[str]:
     if found is None:
         return
     yield heading("How sure is that, within the tolerances?")
-    yield text_html(worded(found.rig, str(found)))
+    yield text_html(worded(found.rig, str(found)), "The verdict within the tolerances.")
     left = "right of 0 disturbances grow"
     if found.along:
         left = "left of 1 the stiffness is less than critical" if found.along == STIFFNESS else "1 is the edge"

@@ -126,9 +126,7 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
             "disturbances, of which this one is the same for all rigs."
         )
     over = "Motion after this disturbance, over time."
-    words = "The same motion in the phase plane: what it circles is the cycle, if it settles on one."
-    if run.status == BLOWN_UP:
-        words = "The same motion in the phase plane, which it leaves to the right."
+    words = f"The same motion in the phase plane{_course(run)}."
     drawn = (
         (column_html(lambda: figures.history(run), over), over),
         (
@@ -137,6 +135,15 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
         ),
     )
     yield beside(figure(*one) for one in drawn)
+
+
+def _course(run: History) -> str:
+    """What a motion does in the phase plane, behind its name."""
+    if run.status == BLOWN_UP:
+        return ", which it leaves to the right"
+    if run.status not in ("done", CUT_SHORT):
+        return ", as far as it goes"
+    return ": what it circles is the cycle, if it settles on one" if run.sentence else ": it returns to steady sliding"
 
 
 def _by_eigenvalues(analysis: Analysis) -> str:

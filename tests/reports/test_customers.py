@@ -352,11 +352,11 @@ def test_a_held_axis_has_a_report_on_its_hunting():
     assert ss.hunt(ss.read_rig(path)).sentence.capitalize() in text
     assert "explorer" not in text
     assert "displacement step at 0 s, by 1 m" in text
-    assert "smaller strokes 0 m ends it" in text
+    assert "smaller strokes 0 m in the end ends it" in text
     assert "rtol" not in text
     assert "does it hunt" in text
     assert "Make this change: friction at rest no larger than in sliding (static friction μ_S from 1.5 to 1)" in text
-    assert "The axis then rests, on the target" in text
+    assert "The axis then rests, in the end on the target" in text
     rests = "no cure: it rests, but farther off than that"
     assert re.search(
         rf"a dead band of 127.8 mm of the integral .2 amplitudes. Settles .* 127.8 mm, 2 times as far as now {rests}",

@@ -7,6 +7,7 @@ Warnings of Sphinx are errors. Nothing is fetched from elsewhere, by the build o
 from __future__ import annotations
 
 import argparse
+import contextlib
 import inspect
 import json
 import os
@@ -38,6 +39,8 @@ CONTENTS = {
 """Titles of the site's folders, in the order of its navigation."""
 SOUGHT = dict.fromkeys(("hunting", "judder", "squeal", "stick-slip", "slow slip"), "start/data-sheet")
 """Pages that the search must find for words of users."""
+GALLERY = ("examples", "examples/machines", "examples/structures")
+"""Folders of the rigs that the gallery shows."""
 API_HEAD = """Every example begins with `import steadyslip as ss`, in a folder beside the examples, where
 `steadyslip examples -o examples` copies them. Each runs with the tests.
 """
@@ -77,7 +80,13 @@ def notebook_text(path: Path) -> str:
         source = "".join(cell["source"])
         lines += [source, ""] if cell["cell_type"] == "markdown" else ["```python", source, "```", ""]
         for output in cell.get("outputs", ()):
-            lines += ["```text", "".join(output["text"]).rstrip(), "```", ""]
+            if "data" in output:
+                lines += [
+                    f'<img alt="What the cell draws" src="data:image/png;base64,{output["data"]["image/png"]}">',
+                    "",
+                ]
+            else:
+                lines += ["```text", "".join(output["text"]).rstrip(), "```", ""]
     return "\n".join(lines)
 
 
@@ -135,16 +144,17 @@ def write_gallery(source: Path, extra: Path, quick: bool) -> None:
     folder, live = source / "gallery", extra / "live"
     folder.mkdir()
     live.mkdir(parents=True)
-    for path in sorted((ROOT / "examples").glob("*.toml")) + sorted((ROOT / "examples/machines").glob("*.toml")):
+    for path in (one for place in GALLERY for one in sorted((ROOT / place).glob("*.toml"))):
         rig = ss.read_rig(path)
-        lines = [f"# {path.stem.replace('-', ' ').capitalize()}", ""]
+        lines = [f"# {title_of(path.stem)}", ""]
         command, answer = ("hunt", ss.hunt(rig)) if rig.holds else ("analyze", ss.analyze(rig))
         if not quick and not rig.holds:
-            ss.explore(rig, title=path.stem).save(live / f"{path.stem}.html")
+            with contextlib.suppress(ss.NotAvailable):  # of machines given by matrices
+                ss.explore(rig, title=path.stem).save(live / f"{path.stem}.html")
+                lines += [f'<a href="../live/{path.stem}.html">Open it as a page with sliders</a>', ""]
             figure = np.ravel(answer.plot())[0].figure
             figure.savefig(folder / f"{path.stem}.svg")
             mpl.pyplot.close(figure)
-            lines += [f'<a href="../live/{path.stem}.html">Open it as a page with sliders</a>', ""]
             lines += [f"![Verdict on {path.stem}]({path.stem}.svg)", ""]
         name = path.relative_to(ROOT).as_posix()
         lines += [f"`{name}`", "", "```toml", path.read_text(encoding="utf-8").rstrip(), "```", ""]
@@ -158,11 +168,27 @@ def write_contents(source: Path) -> None:
     for folder, title in CONTENTS.items():
         pages = sorted(page.stem for page in (source / folder).glob("*.md"))
         if pages:
-            text = "\n".join([f"# {title}", "", "```{toctree}", *pages, "```", ""])
+            drawn = [page for page in pages if (source / folder / f"{page}.svg").exists()]
+            text = "\n".join([f"# {title}", "", *pictures(drawn), "```{toctree}", *pages, "```", ""])
             (source / folder / "index.md").write_text(text, encoding="utf-8")
             listed.append(f"{folder}/index")
     with open(source / "index.md", "a", encoding="utf-8") as index:
         index.write("\n".join(["", "```{toctree}", ":hidden:", "", *listed, "```", ""]))
+
+
+def pictures(pages: list[str]) -> list[str]:
+    """Lines of a table of two columns with the picture and the title of each page."""
+    if not pages:
+        return []
+    cells = [f"[![Verdict on {page}]({page}.svg)]({page}.md) [{title_of(page)}]({page}.md)" for page in pages]
+    cells += [""] * (len(cells) % 2)
+    rows = (f"| {left} | {right} |" for left, right in zip(cells[::2], cells[1::2], strict=True))
+    return ["| | |", "|---|---|", *rows, ""]
+
+
+def title_of(page: str) -> str:
+    """Title of a page of the gallery."""
+    return page.replace("-", " ").capitalize()
 
 
 def not_found(site: Path, sought: dict[str, str]) -> list[str]:
@@ -195,7 +221,7 @@ def main(arguments: list[str]) -> int:
     write_api(source)
     write_gallery(source, extra, chosen.quick)
     write_contents(source)
-    for name in ("conf.py", "docstrings.py"):
+    for name in ("conf.py", "docstrings.py", "style.css"):
         shutil.copyfile(HERE / name, source / name)
     from sphinx.cmd.build import main as sphinx  # here alone: all else works without it
 

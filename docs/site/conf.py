@@ -20,9 +20,10 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"steadyslip {RELEASE}"
 html_show_sphinx = False
 html_extra_path = ["../extra"]
+html_static_path = html_css_files = ["style.css"]
 html_theme_options = {
     "show_prev_next": False,
-    "header_links_before_dropdown": 9,
+    "header_links_before_dropdown": 7,
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],

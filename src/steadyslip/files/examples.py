@@ -25,7 +25,8 @@ def example_files() -> dict[str, str]:
         If the package was installed without them.
     """
     folder = _folder()
-    found = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")  # which pip compiles
+    found = sorted(path.relative_to(folder).as_posix() for path in files)
     return {name: _headline(folder / name) for name in sorted(found, key=lambda name: (name.count("/"), name))}
 
 

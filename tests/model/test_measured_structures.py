@@ -1,6 +1,7 @@
 """Structures given by measured responses: the reed of theory 13, random structures by QZ, files, what stays open."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -58,6 +59,16 @@ def test_with_noise_edges_and_root_lie_within_told_errors(rough):
     assert np.ptp(high.bracket) < 0.02 * high.value
     root, error = measured_machine(by_response(rough)).root()
     assert abs(root - (12.4673358145 + 4565.039870161j)) < error < 25
+
+
+def test_ranges_that_are_not_decided_are_told_where_they_lie(rough):
+    """Between the edges all is decided; around them and beyond a range is told by both ends, or by the one inside."""
+    for between, words in (((354, 355), "from 354 N to 355 N"), ((355, 1000), "below"), ((1000, 1100), "")):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", UndecidedWarning)
+            ss.boundary(by_response(rough), LOAD, between)
+        said = "".join(str(one.message) for one in told)
+        assert (f"{LOAD} {words}" in said) if words else not told, (between, said)
 
 
 @pytest.mark.campaign

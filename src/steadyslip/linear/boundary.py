@@ -160,13 +160,19 @@ def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: floa
     if search.hides:
         return f"{search.name} near some values"
     first, last = search.decided
-    sides = [(first > low, "below", first), (last < high, "above", last)]
-    parts = [
-        f"{side} {format_quantity(end, search.role.unit, area=rig.area_of(search.name))}"
-        for cut, side, end in sides
-        if cut
-    ]
+    gaps = search.gaps if isinstance(search, MeasuredSearch) else ((low, first), (last, high))
+    parts = [_where(rig, search, gap, low, high) for gap in gaps if gap[0] < gap[1]]
     return f"{search.name} {' and '.join(parts)}" if parts else ""
+
+
+def _where(
+    rig: Rig, search: Search | MatrixSearch | MeasuredSearch, gap: tuple[float, float], low: float, high: float
+) -> str:
+    """Words for a part of the range from `low` to `high`."""
+    first, last = (format_quantity(end, search.role.unit, area=rig.area_of(search.name)) for end in gap)
+    if gap[0] <= low and gap[1] < high:
+        return f"below {last}"
+    return f"above {first}" if gap[0] > low and gap[1] >= high else f"from {first} to {last}"
 
 
 def _require_answers(rig: Rig, branch: int) -> None:

@@ -34,8 +34,17 @@ class MeasuredSearch:
         address = machine.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
         self.own = measured_machine(machine)
-        self.decided = -np.inf, np.inf
+        self.gaps: tuple[tuple[float, float], ...] = ()
+        """Ranges of values in which edges may hide, rising; known after `boundaries`."""
+
+    @property
+    def decided(self) -> tuple[float, float]:
         """Values around the own one between which all is decided; known after `boundaries`."""
+        ends = [end for gap in self.gaps for end in gap]
+        return (
+            max((one for one in ends if one <= self.value), default=-np.inf),
+            min((one for one in ends if one >= self.value), default=np.inf),
+        )
 
     @property
     def searched(self) -> tuple[float, float]:
@@ -67,17 +76,16 @@ class MeasuredSearch:
         grid = self._grid(between)
         status = np.array([self._status(float(one)) for one in grid])
         sure = np.flatnonzero(status != UNKNOWN)
-        found, unknown = [], []
+        found: list[Boundary] = []
+        gaps: list[tuple[float, float]] = []
         for i, j in pairwise(sure):
             if status[i] != status[j]:
                 found.append(self._edge(float(grid[i]), float(grid[j]), int(status[i]), int(status[j])))
             elif j > i + 1:  # two edges, or none
-                unknown += [float(grid[i]), float(grid[j])]
-        ends = [*unknown, *((float(grid[sure[0]]), float(grid[sure[-1]])) if sure.size else ())]
-        self.decided = (
-            max((one for one in ends if one <= self.value), default=-np.inf),
-            min((one for one in ends if one >= self.value), default=np.inf),
-        )
+                gaps.append((float(grid[i]), float(grid[j])))
+        first, last = (sure[0], sure[-1]) if sure.size else (-1, -1)  # all is one gap where nothing is sure
+        gaps = [(float(grid[0]), float(grid[first])), *gaps, (float(grid[last]), float(grid[-1]))]
+        self.gaps = _joined([gap for gap in gaps if gap[0] < gap[1]])
         return tuple(found)
 
     def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
@@ -127,3 +135,14 @@ class MeasuredSearch:
             if abs(moved[0]) <= _LAST * abs(value):
                 return value, beta
         return middle, self._at(middle).count.omega
+
+
+def _joined(gaps: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Rising ranges, those as one that follow each other."""
+    found: list[tuple[float, float]] = []
+    for low, high in gaps:
+        if found and found[-1][1] == low:
+            found[-1] = found[-1][0], high
+        else:
+            found.append((low, high))
+    return tuple(found)

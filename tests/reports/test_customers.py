@@ -36,7 +36,7 @@ from steadyslip.reports.elements import _LINE, _PIECE, _lines, equation, math
 from steadyslip.reports.literature import PUBLICATIONS, cited
 from steadyslip.reports.recommendation import Order, recommendation
 from steadyslip.reports.rig import edge_table, input_table, motion_equations
-from steadyslip.reports.sections import letters, motion, notes_of, references
+from steadyslip.reports.sections import SWINGS_DRAWN, _last_swings, letters, motion, notes_of, references
 from steadyslip.verdict.whole_text import meaning
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
@@ -546,3 +546,22 @@ def test_figures_and_tables_are_numbered_and_a_protocol_is_not_passed_over(name)
     assert ("has a protocol of its own" in page) == ("[protocol" in path.read_text())
     assert "Solid blue" not in page
     assert not re.search(r"is the edge of [^:.]*,", page)
+
+
+def test_a_motion_of_many_swings_shows_its_last_ones():
+    """Five hundred swings filled the figure, and the cycle could not be seen in the phase plane."""
+    rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
+    few, many = (
+        ss.simulate(rig, ss.protocol.VelocityStep(at=1, to="1.1 um/s"), until=until) for until in (200.0, 3000.0)
+    )
+    assert _last_swings(few) is few
+    shown = _last_swings(many)
+    assert len(shown.slip_events) == SWINGS_DRAWN
+    assert shown["t"][-1] == many["t"][-1]
+    assert len(shown["t"]) == len(shown["v"]) < len(many["t"])
+
+
+def test_less_friction_is_not_recommended_where_it_is_no_help():
+    """Two modes "meet where friction exceeds 0.417", and the machine stays unstable with a friction of 0.1."""
+    text = words("".join(recommendation(ss.analyze(ss.read_rig("examples/machines/brake-pad.toml")))))
+    assert "Less friction at disc alone does not make it stable: it has no edge within range." in text

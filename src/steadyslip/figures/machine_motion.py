@@ -129,10 +129,11 @@ def leaves(run: History, rates: np.ndarray, steady: float) -> np.ndarray:
 
 def end_title(run: History, left: np.ndarray) -> str:
     """Title of a run that ended early: how, at which contact and when, and what is left out of the figure."""
-    how = "cut short" if run.status == "too many steps" else run.status
+    how = "simulated" if run.status == "too many steps" else run.status
     where = f" ({run.contact})" if run.contact else ""
     limit = f",\ndrawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
-    return f"{how}{where} at {format_quantity(run.end, 's')}{limit}"
+    until = "to" if how == "simulated" else "at"
+    return f"{how}{where} {until} {format_quantity(run.end, 's')}{limit}"
 
 
 def mark_end(run: History, ax: Axes, x: np.ndarray, y: np.ndarray, left: np.ndarray) -> None:

@@ -99,6 +99,7 @@ def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str,
     """HTML of the changes that make a rig stable, the first in words, all in a table."""
     first, wanted = rows[0], format_percent(BEYOND_EDGE)
     origin = "" if analysis.origin is None else f" Why it is unstable: {analysis.origin.words}."
+    origin += _friction_is_not_all(analysis)
     near = f" No edge is then nearer than {wanted}."
     if first.distance < BEYOND_EDGE:
         near = f" One edge is even then nearer than the {wanted} that are recommended: that of {first.nearest}."
@@ -112,6 +113,17 @@ def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str,
     )
     cells = ((*one.cells, begun[one.parameter].words, one.nearest or "none within range", one.far) for one in rows)
     yield table(cells, head, caption=caption)
+
+
+def _friction_is_not_all(analysis: Analysis) -> str:
+    """Sentence of a machine whose modes friction couples, where less friction alone does not make it stable."""
+    origin, levels = analysis.origin, set(analysis.rig.of_kind("friction level"))
+    if origin is None or origin.kind != "coupling":
+        return ""
+    own = [one for one in analysis.margins if one.parameter in levels and f".{origin.name}." in one.parameter]
+    if not own or any(edge.stable == "below" for one in own for edge in one.edges):
+        return ""
+    return f" Less friction at {origin.name} alone does not make it stable: it has no edge within range."
 
 
 def _made_certain(

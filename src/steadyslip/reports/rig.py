@@ -199,7 +199,7 @@ def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig = analysis.rig
     drawn = list(charts_over(analysis, order))
     if analysis.stable is not None:
-        varied = said(rig, rig.stiffness_name())
+        varied = "stiffness k along the slide" if rig.axial_stiffness else said(rig, rig.stiffness_name())
         words = f"Eigenvalues of small disturbances as {varied} varies; to the right of the axis they grow."
         drawn.append(figure(column_html(lambda: figures.root_locus(rig), "root locus"), words))
     if charts := beside(drawn):

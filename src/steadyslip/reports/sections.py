@@ -8,8 +8,10 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from steadyslip import figures
@@ -38,6 +40,7 @@ from steadyslip.verdict.judder import STEP, grown, motion_after
 from steadyslip.verdict.words import PACE, told_range
 
 CUT_SHORT = "too many steps"
+SWINGS_DRAWN = 30  # swings in a figure 100 mm wide, 3 mm each: of more than twice as many only the last are drawn
 _LONGEST_UNIT = 12  # characters of a comment that may be a unit: N m s/rad has 9
 
 
@@ -126,15 +129,39 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
             "disturbances, of which this one is the same for all rigs."
         )
     over = "Motion after this disturbance, over time."
+    shown = _last_swings(run) if unstable else run
+    if shown is not run:
+        over = f"Motion after this disturbance, over time: the last {SWINGS_DRAWN} swings of many."
     words = f"The same motion in the phase plane{_course(run)}."
     drawn = (
-        (column_html(lambda: figures.history(run), over), over),
+        (column_html(lambda: figures.history(shown), over), over),
         (
-            column_html(lambda: figures.phase_plane(run), words),
+            column_html(lambda: figures.phase_plane(shown), words),
             words,
         ),
     )
     yield beside(figure(*one) for one in drawn)
+
+
+def _last_swings(run: History) -> History:
+    """A motion without what came before its last swings, if there are so many that they would fill a figure.
+
+    Swings are slip events, or without any the times at which a slip rate rises through its median.
+    """
+    times = [one.begin for one in run.slip_events]
+    if not times:
+        rates = [run[f"{name}.slip_rate"] for name in run.rig.contacts] or [run["v"]]
+        above = [one > np.median(one) for one in rates]
+        times = max((run["t"][1:][one[1:] & ~one[:-1]] for one in above), key=len)
+    if len(times) <= 2 * SWINGS_DRAWN:
+        return run
+    begin = times[-SWINGS_DRAWN]
+    late = run["t"] >= begin
+    return replace(
+        run,
+        data={name: values[late] for name, values in run.data.items()},
+        events=tuple(one for one in run.events if one.time >= begin),
+    )
 
 
 def _course(run: History) -> str:

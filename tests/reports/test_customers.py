@@ -552,7 +552,7 @@ def test_a_motion_of_many_swings_shows_its_last_ones():
     """Five hundred swings filled the figure, and the cycle could not be seen in the phase plane."""
     rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
     few, many = (
-        ss.simulate(rig, ss.protocol.VelocityStep(at=1, to="1.1 um/s"), until=until) for until in (200.0, 3000.0)
+        ss.simulate(rig, ss.protocol.VelocityStep(at=1, to="1.1 um/s"), until=until) for until in (200.0, 6000.0)
     )
     assert _last_swings(few) is few
     shown = _last_swings(many)

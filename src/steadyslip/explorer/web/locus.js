@@ -65,6 +65,8 @@ export class Locus {
       axis(BOX, across, [-half, half], { unit: "1/s" }, "growth rate", false), axis(BOX, up, [up.at(0), up.at(1)], { unit: "rad/s", own: ["rad/s", 1, ""] }, "frequency", true),
       svg("line", { class: "zero", x1: BOX.left + BOX.width / 2, x2: BOX.left + BOX.width / 2, y1: BOX.top, y2: BOX.top + BOX.height }),
       svg("rect", { x: BOX.left, y: BOX.top, width: BOX.width, height: BOX.height, class: "frame" }),
+      svg("text", { class: "word", x: BOX.left + 8, y: BOX.top + 16, "text-anchor": "start" }, "decays"),
+      svg("text", { class: "word", x: BOX.left + BOX.width - 8, y: BOX.top + 16, "text-anchor": "end" }, "grows"),
       ...this.dots, this.crossings, this.decays, this.grows);
   }
 }

@@ -125,7 +125,7 @@ export function shed(value, contact, { area, phrases }, many = 4) {
 /** Sentence on the result of a motion. @param {any} course @param {any} data */
 export function outcome({ events, status, end, contacts, at }, { area, phrases, judders, ends, pulls }) {
   const cause = `${ends[status] ?? status}${status === "too many steps" ? "; ask for a shorter time, or steadyslip simulate, which takes more" : ""}`;
-  if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: ${cause}.`;
+  if (status === "blow-up") return `It runs away at ${shown(end, "s")} (last dashed line), ${shown(end - at, "s")} after the disturbance: ${cause}.`;
   const ended = status === "done" ? "" : ` It ends ${end === at ? "with the disturbance, " : ""}at ${shown(end, "s")}: ${cause}.`;
   if (!(end > 0) || !contacts[0].v.length) return `No motion: it ends as it begins: ${cause}.`;
   if (!events.length) {

@@ -73,3 +73,18 @@ def test_the_ratio_of_characteristic_functions_is_that_of_determinants(shape):
         sign, size = np.linalg.slogdet(s * e - a)
         before, smaller = np.linalg.slogdet(s * own.e - own.a)
         assert one == pytest.approx(sign / before * np.exp(size - smaller), rel=1e-7)
+
+
+@pytest.mark.parametrize("size", [3, 24])
+def test_the_response_at_an_undamped_mode_is_that_beside_it(size):
+    """Equal masses on equal springs, one of them damped: others ring at 100 rad/s exactly."""
+    one = np.eye(size)
+    damped = np.zeros((size, size))
+    damped[0, 0] = 3.0
+    pencil = StatePencil(la.block_diag(one, one), np.block([[0 * one, one], [-1e4 * one, -damped]]), size, True)
+    out = la.block_diag(one, one)[:, :2]
+    found = pencil.resolvent(out, out)(np.array([100j, 250j]))
+    assert np.all(np.isfinite(found))
+    assert abs(found[0, 1, 1]) > 1e6 * abs(found[1, 1, 1])
+    np.testing.assert_allclose(found[1], out.T @ la.solve(250j * pencil.e - pencil.a, out), rtol=1e-8)
+    assert found[0, 0, 0] == pytest.approx((100j + 3) / 300j, rel=1e-9)  # (s + c)/(s² + c s + k) of the damped one

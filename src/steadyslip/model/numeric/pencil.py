@@ -28,6 +28,7 @@ _SPOILT = 1e8  # condition of E from which dividing by it loses half of the digi
 _INVERSE_STEPS = 3  # of inverse iteration; one is enough where no other eigenvalue is near
 _MARGIN = 10.0  # rounding errors between a real part and zero that leave no doubt of its sign
 _SURE = 1e-9  # real part, relative to the largest eigenvalue, above which rounding cannot change its sign
+_ASIDE = 1e-12  # relative distance from an undamped mode at which its response is far larger than all others
 _PLAIN, _ADJOINT = 0, 2  # matrices of equations, as LAPACK counts them
 ILL_POSED, UNDECIDED = -1, -2  # in place of a number of growing eigenvalues
 _BATCH = 2**22  # complex numbers of matrices that are solved at once, 64 MiB
@@ -140,8 +141,8 @@ class StatePencil:
             return None
         right, rows = basis @ vectors, other @ left
         probe = np.linspace(-1.0, 1.0, len(state))
-        for s in (1j * np.median(np.abs(values)), 0.1j * np.max(np.abs(values))):
-            fast, slow = right @ ((rows @ probe) / (s - values)), np.linalg.solve(s * self.e - self.a, probe)
+        for s in (1.1j * np.median(np.abs(values)), 0.1j * np.max(np.abs(values))):  # the median itself is a mode
+            fast, slow = right @ ((rows @ probe) / (s - values)), self._solved(np.array([s]), probe[:, None])[0, :, 0]
             if not np.allclose(fast * 1, slow, rtol=0, atol=_TRUSTED * np.max(np.abs(slow))):
                 return None
         return values, right, rows
@@ -211,18 +212,33 @@ class StatePencil:
         if known is not None:
             values, right, rows = known
             left, tail = out.T @ right, rows @ into
-            return lambda s: np.asarray((left / (s[:, None, None] - values)) @ tail)
+
+            def by_modes(s: ComplexArray) -> ComplexArray:
+                apart = s[:, None, None] - values
+                if not np.all(apart):
+                    apart = np.where(apart == 0, _ASIDE * s[:, None, None], apart)
+                return np.asarray((left / apart) @ tail)
+
+            return by_modes
 
         def solved(s: ComplexArray) -> ComplexArray:
             found = np.empty((len(s), out.shape[1], into.shape[1]), dtype=complex)
             step = max(_BATCH // self.a.size, 1)
             for start in range(0, len(s), step):
-                part = s[start : start + step, None, None] * self.e - self.a
-                several = np.broadcast_to(into, (len(part), *into.shape))
-                found[start : start + step] = out.T @ np.linalg.solve(part, several)
+                found[start : start + step] = out.T @ self._solved(s[start : start + step], into)
             return found
 
         return solved
+
+    def _solved(self, s: ComplexArray, right: Array) -> ComplexArray:
+        """(s E − A)⁻¹ `right` at places s (p,), (p, N, m) for `right` (N, m); beside a place that is an eigenvalue."""
+        matrices = s[:, None, None] * self.e - self.a
+        try:
+            return np.asarray(np.linalg.solve(matrices, np.broadcast_to(right, (len(s), *right.shape))))
+        except np.linalg.LinAlgError:
+            sign, _ = np.linalg.slogdet(matrices)
+            matrices[sign == 0] += _ASIDE * s[sign == 0, None, None] * self.e
+            return np.asarray(np.linalg.solve(matrices, np.broadcast_to(right, (len(s), *right.shape))))
 
 
 def real_product(matrix: Array, vector: NDArray[Any]) -> ComplexArray:

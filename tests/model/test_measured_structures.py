@@ -9,6 +9,7 @@ from scipy import io
 
 import steadyslip as ss
 from responses_at_random import compared, noisy, reed_band, reed_response
+from steadyslip.core.errors import UnitWarning
 from steadyslip.linear import UndecidedWarning
 from steadyslip.machine import Machine, Pull, ResponseData, StructureBody, StructurePoint, Surface
 from steadyslip.model.numeric.measured import measured_machine
@@ -241,6 +242,22 @@ def test_errors_come_from_repeats_or_from_the_coherence(tmp_path):
     np.testing.assert_allclose(found.deviation, np.abs(found.receptance) * np.sqrt(0.04 / 0.96) / 4, rtol=1e-12)
 
 
+@pytest.mark.parametrize("wrong", ["conjugate", "sign"])
+def test_responses_that_feed_energy_are_asked_about(tmp_path, wrong):
+    """Of a measurement with other signs; the reed's own, with noise, is not."""
+    own = reed_response(reed_band()[::9], 0.02, np.random.default_rng(4))
+    repeats = [np.conj(own.receptance) if wrong == "conjugate" else -own.receptance]
+    to_csv(tmp_path / "tap.csv", own, [own.receptance])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UnitWarning)
+        read(tmp_path, "tap.csv")
+    to_csv(tmp_path / "tap.csv", own, repeats)
+    with pytest.warns(
+        UnitWarning, match="tip.y/tip.y of 'tap.csv' would feed energy at up to .* are signs, phase and unit right"
+    ):
+        read(tmp_path, "tap.csv")
+
+
 def test_matlab_files(tmp_path):
     own, repeats = small(3)
     stacked = np.moveaxis(repeats * (1j * own.omega[:, None, None]) ** 2, 0, -1)
@@ -282,6 +299,9 @@ def test_universal_files(tmp_path):
     ("tap.csv", "hertz,a\n1,2", "allowed: frequency and the responses"),
     ("tap.csv", "frequency,tip.x\n1,2", "is not like"),
     ("tap.csv", "frequency,tip.x/tip.x real [kg],tip.x/tip.x imag [kg]\n1,2,3", "no unit of a response to a force"),
+    ("tap.csv", "frequency,tip.x/tip.x real,tip.x/tip.x imag\n1,2,3", "a response has no unit; write it as in"),
+    ("tap.csv", "frequency;tip.x/tip.x real [m/N];tip.x/tip.x imag [m/N]\n" + "1,5;2;3\n" * 9,
+     "has 1.5 Hz after 1.5 Hz .number 2.; allowed: frequencies >= 0 that rise"),
     ("tap.csv", "frequency,tip.x/tip.x imag [m/N]\n1,2", "no real part before it"),
     ("tap.csv", "frequency,tip.x/tip.x real [m/N],tip.x/tip.x imag [m/N]\n1,x,3", "not only numbers"),
     ("tap.csv", "frequency,tip.x/tip.x real [m/N],tip.x/tip.x imag [m/N]\n1,2,3", "has 1 frequencies"),

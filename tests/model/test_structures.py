@@ -326,7 +326,7 @@ def test_matrices_that_are_half_or_in_the_wrong_place_are_refused(tmp_path, lett
 
 @pytest.mark.parametrize(("names", "ratio", "said"), [
     ("tip.x,tap.y", 0.01, "has tap.y and tip.x alone: is that one point"),
-    ("tip.x,tip.y", 2.0, "has damping ratios from 2; of structures .0001 to .1 are measured, and 2 % is 0.02"),
+    ("tip.x,tip.y", 0.2, "has damping ratios from 0.2; of structures .0001 to .1 are measured, and 2 % is 0.02"),
     ("way.x,tip.y", 0.01, "reed.tip has no displacement along the slide, so that friction moves nothing there"),
 ])  # fmt: skip
 def test_odd_modes_are_asked_about(tmp_path, names, ratio, said):
@@ -336,6 +336,41 @@ def test_odd_modes_are_asked_about(tmp_path, names, ratio, said):
         path.write_text(path.read_text().replace("60 deg", "0 deg"))
     with pytest.warns(UnitWarning, match=said):
         ss.read_rig(path)
+
+
+@pytest.mark.parametrize("between", [";", "\t"])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_tables_of_spreadsheets_have_other_separators(tmp_path, between, decimal):
+    text = "frequency,damping,tip.x,tip.y\n70,0.01,0.5,0.1\n90.5,0.012,0.1,0.6\n"
+    (tmp_path / "modes.csv").write_text(text)
+    right = ss.eigenvalues(ss.read_rig(written(tmp_path, "modes.csv", "", "modes")))
+    head, _, rows = text.replace(",", between).partition("\n")
+    (tmp_path / "modes.csv").write_text(f"{head}\n{rows.replace('.', decimal)}")
+    np.testing.assert_array_equal(ss.eigenvalues(ss.read_rig(written(tmp_path, "modes.csv", "", "modes"))), right)
+
+
+def test_columns_that_are_missing_or_not_known_are_told_with_those_allowed(tmp_path):
+    for head, said in (("frequency [kHz],damping", "no column frequency; .* allowed: frequency \\(Hz\\), damping"),
+                       ("frequency,damping,note", "'note' is none that is allowed: .* tip.x and tip.y")):  # fmt: skip
+        (tmp_path / "modes.csv").write_text(f"{head},tip.x\n{'1,' * head.count(',')}1,0.5\n")
+        with pytest.raises(ss.RigFileError, match=said):
+            ss.read_rig(written(tmp_path, "modes.csv", "", "modes"))
+
+
+def test_a_mode_that_no_point_shows_is_told(tmp_path):
+    (tmp_path / "modes.csv").write_text("frequency,damping,tip.x,tip.y\n50,0.01,0,0\n90,0.02,0.5,0.1\n")
+    machine = ss.read_rig(written(tmp_path, "modes.csv", "", "modes"))
+    mode = ss.analyze(machine).mode
+    assert mode.words().startswith("no named point moves; ")
+    assert set(mode.amplitudes.values()) == {0}
+
+
+def test_a_structure_that_nothing_presses_has_no_force_of_minus_zero():
+    contact = ss.laws.Compliant(normal_stiffness=4e6)
+    machine = reed()
+    surface = replace(machine.contacts["tip"], contact=contact)
+    found = ss.analyze(replace(machine, contacts={"tip": surface}))
+    assert "would be 0 N, must be > 0" in str(found)
 
 
 def test_a_point_needs_two_degrees_of_freedom(tmp_path):

@@ -30,9 +30,11 @@ WORDS = {
     "hardly_along": " and hardly along it", "hardly_away": " and hardly away from it",
     "share": "{name} with {share} of the largest amplitude",
     "energy": "; {share} of the energy is in the {name}", "most": " most, of {count} coordinates",
+    "unseen": "no named point moves",
 }  # fmt: skip
 """Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""
 MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body oscillates, below the second it hardly moves
+UNSEEN = 1e-9  # of the largest amplitude of a structure: points that move less stand still in a mode, to rounding
 MANY, NAMED = 8, 3  # coordinates above which a sentence names those that move most alone, and how many of them
 
 
@@ -100,7 +102,9 @@ class Mode(Displayed):
             leads, rest, still = sorted(sizes, key=lambda name: -sizes[name])[:NAMED], [], []
         movers = list(dict.fromkeys(name.removesuffix(NORMAL) for name in leads))
         moves = _does("oscillate" if self.eigenvalue.imag else "drift", movers)
-        if len(movers) == 1:
+        if not movers:
+            parts, still = [WORDS["unseen"]], []
+        elif len(movers) == 1:
             parts = [f"{_listed(movers)} {moves}{self._direction(movers[0], leads, still)}"]
             still = [name for name in still if name.removesuffix(NORMAL) != movers[0]]
         else:
@@ -227,7 +231,9 @@ def matrix_mode(point: MachinePoint, s: complex) -> Mode:
                 speed = float(speeds[end]) if name == end else 0.0
                 moved = sum(float(share) * places[one] for one, share in row.items())
                 scaled[name] = moved * (drive / speed if speed else 1.0)
-    largest = max(scaled.values(), key=abs, default=1.0) or 1.0
+    largest = max(scaled.values(), key=abs, default=0.0)
+    if abs(largest) <= UNSEEN * max(map(abs, places.values())):
+        scaled, largest = dict.fromkeys(scaled, 0.0), 1.0
     amplitudes = {name: complex(one / largest) for name, one in scaled.items()}
     return Mode(s, amplitudes, *_energies(machine, places, s), _number(s, point.pencil.eigenvalues))
 

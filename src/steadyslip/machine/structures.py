@@ -17,6 +17,7 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.domains import line, nonnegative, real
 from steadyslip.core.entries import Whole
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short
+from steadyslip.core.format import format_percent
 from steadyslip.core.names import Members
 from steadyslip.core.quantities import parse
 from steadyslip.core.records import FrozenRecord, members, parameter, setting
@@ -26,6 +27,8 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.machine.structure_data import StructureData, reduced_once
 
 _ONE = "give exactly one of matrices, modes and response"
+_DAMPED = 0.1  # damping ratio from which it is asked about: as percent most are above, as ratios nearly all below
+_FEEDING = 0.2  # share of frequencies at which a structure that loses energy may seem to feed it, by errors
 _SMALL = 1e-8  # share of the largest eigenvalue of a damping matrix that is taken for rounding of a file
 _UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
 
@@ -215,14 +218,14 @@ class StructureBody(Body, name="structure"):
     def doubts(self) -> Iterator[str]:
         """Yield what is unusual about allowed values, in sentences that begin with a name in the body's table."""
         small = "of structures .0001 to .1 are measured, and 2 % is 0.02"
-        if self.modal_damping is not None and self.modal_damping >= 1:
+        if self.modal_damping is not None and self.modal_damping >= _DAMPED:
             yield f"modal_damping = {self.modal_damping:g} is a damping ratio; {small}"
         if self.modes is not None:
             of_modes = self.modes
             critical = 2 * np.sqrt(np.diag(of_modes.mass) * np.diag(of_modes.stiffness))
             ratios = np.diag(of_modes.damping)[critical > 0] / critical[critical > 0]
-            if len(ratios) and np.min(ratios) >= 1:
-                yield f"modes: {of_modes.source!r} has damping ratios from {np.min(ratios):g}; {small}"
+            if len(ratios) and np.min(ratios) >= _DAMPED:
+                yield f"modes: {of_modes.source!r} has damping ratios from {np.min(ratios):.3g}; {small}"
             for (one, (_, y)), (other, (x, _)) in permutations(of_modes.points.items(), 2):
                 alone = of_modes.points[one][0] is None and of_modes.points[other][1] is None
                 if alone and y is not None and x is not None and SequenceMatcher(None, one, other).ratio() >= 0.5:
@@ -231,6 +234,13 @@ class StructureBody(Body, name="structure"):
             own = np.linalg.eigvalsh(0.5 * (self.matrices.damping + self.matrices.damping.T))
             if own[0] < -_SMALL * np.max(np.abs(own)):
                 yield "matrices: the damping C feeds some motions (it has negative eigenvalues): is its sign right?"
+        elif self.response is not None:
+            wrong = {name: share for name, share in self.response.feeding().items() if share > _FEEDING}
+            if wrong:
+                names, most = " and ".join(f"{name}/{name}" for name in wrong), format_percent(max(wrong.values()))
+                what = f"{names} of {self.response.source!r} would feed energy at up to {most} of the frequencies"
+                why = "are signs, phase and unit right? Motion is as exp(+i omega t), so that a structure lags"
+                yield f"response: {what}: {why}"
 
     @property
     def data(self) -> StructureData:

@@ -65,6 +65,8 @@ def read_matrices(path: str, folder: Path, units: tuple[float, float, float] = _
     missing = [letter for letter in ("M", "K") if letter not in found]
     if missing:
         raise UnreadableFile(path, f"it has no matrix {' and '.join(missing)}; allowed: M, K and perhaps C, G")
+    if oblong := [letter for letter, one in found.items() if one.shape[0] != one.shape[1]]:
+        raise UnreadableFile(path, f"{oblong[0]} has shape {found[oblong[0]].shape}; allowed: square")
     nothing = np.zeros(np.shape(found["M"]))
     length, mass, time = units
     turns = np.array([length if name.endswith(_ROTATIONS) else 1.0 for name in found.freedoms])

@@ -11,11 +11,13 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.names import unfit_name
-from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
+from steadyslip.files.inputs import MOST_TEXT, UnreadableFile
+from steadyslip.files.structures.table_text import table_text
 from steadyslip.machine.structure_data import StructureData
 
 FREQUENCY, DAMPING, MASS = "frequency", "damping", "mass"
 """Columns: Hz, damping ratio, and modal mass in kg, 1 unless given."""
+_COLUMNS = "frequency (Hz), damping (ratio), perhaps mass (kg), and of each point, as of tip, tip.x and tip.y"
 _AXES = ("x", "y")
 
 
@@ -25,7 +27,7 @@ def read_modes(path: str, folder: Path) -> StructureData:
     Parameters
     ----------
     path : str
-        Text file relative to `folder`, comma-separated, with a header: ``frequency`` (Hz), ``damping`` (ratio), perhaps
+        Text file relative to `folder` (`table_text`), with a header: ``frequency`` (Hz), ``damping`` (ratio), perhaps
         ``mass`` (kg), and for each point and direction a column such as ``pad.x`` and ``pad.y`` with the mode shapes.
     folder : Path
 
@@ -34,16 +36,14 @@ def read_modes(path: str, folder: Path) -> StructureData:
     UnreadableFile
         If the file cannot be read, or a column or number is not as described.
     """
-    try:
-        text = read_bytes(folder / path, MOST_TEXT).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise UnreadableFile(path, "it is not UTF-8 text") from error
+    text = table_text(path, folder, MOST_TEXT)
     table = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
     header = [cell.strip() for cell in table[0]] if table else []
     columns = _numbers(path, header, table[1:])
     if lost := [name for name in (FREQUENCY, DAMPING) if name not in columns]:
         raise UnreadableFile(
-            path, f"it has no column {' and '.join(lost)}; its first line is {','.join(header)[:80]!r}"
+            path,
+            f"it has no column {' and '.join(lost)}; its first line is {','.join(header)[:80]!r}; allowed: {_COLUMNS}",
         )
     frequency, damping = columns.pop(FREQUENCY), columns.pop(DAMPING)
     mass = columns.pop(MASS, np.ones(len(frequency)))
@@ -86,9 +86,6 @@ def _points(path: str, columns: dict[str, Array]) -> dict[str, tuple[Array | Non
     for name, shape in columns.items():
         point, _, axis = name.rpartition(".")
         if axis not in _AXES or unfit_name(point):
-            raise UnreadableFile(
-                path,
-                f"its column {name!r} is none of {FREQUENCY}, {DAMPING}, {MASS} and the name of a point with .x or .y",
-            )
+            raise UnreadableFile(path, f"its column {name!r} is none that is allowed: {_COLUMNS}")
         found.setdefault(point, [None, None])[_AXES.index(axis)] = shape
     return {name: (x, y) for name, (x, y) in found.items()}

@@ -19,6 +19,7 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import QuantityError
 from steadyslip.core.names import unfit_name
 from steadyslip.files.inputs import UnreadableFile, read_bytes
+from steadyslip.files.structures.table_text import table_text
 from steadyslip.machine.responses import MOST_LINES, ResponseData
 
 Complex = NDArray[np.complex128]
@@ -101,12 +102,15 @@ def _mean(path: str, one: _Measured, averages: int) -> tuple[Complex, Array]:
         gamma = np.mean(one.coherence, axis=0)
         if not np.all((gamma >= 0) & (gamma <= 1)):
             raise UnreadableFile(path, f"a coherence is {np.min(gamma):.3g} to {np.max(gamma):.3g}; allowed: 0 to 1")
-        return mean, np.abs(mean) * np.sqrt((1 - gamma) / (averages * np.maximum(gamma, 1e-12)))
+        return mean, np.abs(mean) * np.sqrt((1 - gamma) / (max(averages, 1) * np.maximum(gamma, 1e-12)))
     return mean, np.zeros(len(mean))
 
 
 def _receptance(path: str, hertz: Array, values: Complex, name: str) -> Complex:
     """Receptances (m/N) from responses in a unit; infinite where the frequency is zero and it was no displacement."""
+    if not name:
+        example = "tip.x/tip.y real [m/s^2/N]"
+        raise UnreadableFile(path, f"a response has no unit; write it as in {example!r}; allowed: {', '.join(_ORDERS)}")
     try:
         factor, dimension = unit(name)
     except QuantityError as error:
@@ -128,12 +132,10 @@ def _receptance(path: str, hertz: Array, values: Complex, name: str) -> Complex:
 
 
 def _from_table(path: str, folder: Path) -> tuple[Array, dict[tuple[str, str], _Measured]]:
+    text = table_text(path, folder, MOST_RESPONSES)
+    header = [cell.strip() for cell in next(csv.reader(io.StringIO(text)), [])]
     try:
-        text = read_bytes(folder / path, MOST_RESPONSES).decode("utf-8-sig")
-        header = [cell.strip() for cell in next(csv.reader(io.StringIO(text)), [])]
         rows = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2, max_rows=MOST_LINES + 1)
-    except UnicodeDecodeError as error:
-        raise UnreadableFile(path, "it is not UTF-8 text") from error
     except ValueError as error:
         raise UnreadableFile(path, f"below its first line are not only numbers between commas ({error})") from error
     if not header or header[0] != "frequency" or rows.shape[1:] != (len(header),):

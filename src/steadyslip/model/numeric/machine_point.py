@@ -153,7 +153,7 @@ def absence(point: MachinePoint | MeasuredMachine) -> NoSteadySliding:
         return NoSteadySliding(f"no steady sliding: {words}", "lock-up", float(1 - found.gain), name)
     least = int(np.argmin(found.wanted))
     site = point.matrices.sites[least]
-    force = float(site.area * found.wanted[least])
+    force = float(site.area * found.wanted[least]) + 0.0  # not -0
     words = ABSENT["lifted"].format(at=ABSENT["at"].format(name=site.name), left=format_quantity(force, "N"))
     return NoSteadySliding(f"no steady sliding: {words}", "lift-off", force, site.name)
 

@@ -156,6 +156,24 @@ def test_latex_and_methods(joint, table, tmp_path):
     assert "4 steps were fitted alone" in table.methods
 
 
+def test_the_first_column_is_a_less_b(joint, table, tmp_path):
+    """Stiffness, a, b and d_c took the width of a printed table, and long names of steps left two columns."""
+    table.to_csv(tmp_path / "t.csv")
+    head = (tmp_path / "t.csv").read_text().splitlines()[0].split(",")
+    assert head[head.index("rms (1)") + 1 :][:4] == ["a - b (1)", "a - b error (1)", "a (1)", "a error (1)"]
+    assert r" & rms & $a - b$ & $a$ & $b$ & $d_{c}$ (\textmu m) & $k$ " in table.latex_text()
+    first = ss.experiments.step_table(
+        ss.fit(joint.plan.rig, joint.plan.records[1], ["stiffness", "d_c", "a", "b"]), starts=9
+    )
+    for one in (table, first):
+        lines = str(one).splitlines()
+        assert lines[0].split()[:3] == ["a", "-", "b"]
+        assert "d_c" in lines[0].split()
+        for line, row in zip(one.lines, lines[1:], strict=False):
+            ratio = next(own for own in line.fit.derived if own.name == "a - b")
+            assert f" {ratio.shown()}  " in row
+
+
 def test_a_calibrated_stiffness_stands_beside_the_fitted_one(joint, tmp_path):
     ratio = next(one for one in joint.derived if one.name == "k/k_cal")
     assert ratio.value == pytest.approx(joint.values["slider.stiffness"] / 40e9, rel=1e-12)
@@ -199,7 +217,7 @@ def test_a_printed_table_fits_a_terminal_and_the_csv_has_all(tmp_path):
     text = str(table)
     lines = text.splitlines()
     assert max(map(len, lines)) <= 120
-    assert lines[0].split()[:3] == ["a", "b", "d_c"]
+    assert lines[0].split() == ["a", "-", "b", "a", "d_c"]
     for line, row in zip(table.lines, lines[1:], strict=False):
         assert f"{line.fit['a'].value:.4g} ± " in row
         assert " weakens" in row

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from os import PathLike
 from pathlib import Path
@@ -17,6 +17,7 @@ from steadyslip.core.format import enumerated, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.experiments.fitting.beginning import Beginning
+from steadyslip.experiments.fitting.derived import DERIVED
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.fitting.plan import Plan
@@ -43,6 +44,7 @@ DRIVEN = {
 }
 """What drives the model, by `drive` of a fit, where it is not found in the record."""
 PRINTED, LABEL = 120, 20  # characters of a line of a printed table, and of a file's name in it
+PLAIN = ("velocity step", "normal-stress step", "hold")  # kinds of steps that a printed change tells by its units
 TYPESET = {one: f"\\{one}" for one in "_%&#$"} | {
     "±": r"$\pm$", "−": "$-$", "×": r"$\times$", "²": "$^2$", "<": "$<$", ">": "$>$",
     "α": r"$\alpha$", "μ": r"$\mu$", "σ": r"$\sigma$", "Σ": r"$\Sigma$", "Θ": r"$\Theta$", "τ": r"$\tau$",
@@ -89,7 +91,9 @@ class FittedStep:
         """Name of the line in a printed table: file, time and change of the step; where too long, its end."""
         if self.step is None:
             return "all together"
-        when = str(self.step).removeprefix("velocity step at ")
+        when = str(self.step)
+        for kind in PLAIN:
+            when = when.removeprefix(f"{kind} at ")
         name = Path(self.record).name
         return f"{name if len(name) <= LABEL else '...' + name[3 - LABEL :]}, {when}"
 
@@ -138,8 +142,14 @@ class StepTable(Displayed):
         return tuple(line.fit for line in self.lines[:-1])
 
     def _estimated(self) -> dict[str, str]:
-        """Names of the estimates of any line, with SI units."""
-        return {name: one.unit for line in self.lines for name, one in line.estimates().items()}
+        """Names of the estimates of any line, with SI units, in order of columns.
+
+        a − b is read first; then come parameters of the law, stiffnesses, the level of friction, and what every record
+        has to itself.
+        """
+        found = {name: one.unit for line in self.lines for name, one in line.estimates().items()}
+        level = self.joint.plan.rig.of_kind("friction level")
+        return {name: found[name] for name in sorted(found, key=lambda name: _place(name, level))}
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units."""
@@ -274,19 +284,18 @@ class StepTable(Displayed):
         """Rows of the printed table, its head first, and names of estimates that do not fit beside each other."""
         notes, level = self.notes, self.joint.plan.rig.of_kind("friction level")
         own = [line.estimates() for line in self.lines]
-        order = sorted(self._estimated(), key=lambda name: ("@" in name, f"friction.{name}" in level))
         verdicts = [line.verdict(notes) for line in self.lines]
         rows = [["", *(line.label() for line in self.lines)]]
         room = PRINTED - max(map(len, rows[0])) - max(map(len, verdicts)) - 2
-        beside = []
-        for name in order:
-            cells = [name, *(_value(one[name]) if name in one else "" for one in own)]
-            if "@" not in name and max(map(len, cells)) + 2 <= room:
-                room -= max(map(len, cells)) + 2
-                rows.append(cells)
-            else:
-                beside.append(name)
-        return list(map(list, zip(*rows, ["", *verdicts], strict=True))), beside
+        cells = {name: [name, *(_value(one[name]) if name in one else "" for one in own)] for name in self._estimated()}
+        wide = {name: max(map(len, column)) + 2 for name, column in cells.items() if "@" not in name}
+        shown = set()
+        for name in sorted(wide, key=lambda name: (*_place(name, level), name == "b")):  # b follows from a and a − b
+            if wide[name] <= room:
+                room -= wide[name]
+                shown.add(name)
+        rows += [column for name, column in cells.items() if name in shown]
+        return list(map(list, zip(*rows, ["", *verdicts], strict=True))), [name for name in cells if name not in shown]
 
     def __str__(self) -> str:
         rows, beside = self._rows()
@@ -433,6 +442,13 @@ def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
     if step.unit == "Pa" and load is not None:
         rates = (float(load.at(np.array([step.time]))[0]),) * 2
     return FittedStep(record.source, step, alone, moved, normal, rates)
+
+
+def _place(name: str, level: Sequence[str]) -> tuple[bool, int]:
+    """Place of an estimate among the columns; `level` are names of the level of friction in the rig."""
+    bare = name.partition("@")[0]
+    stiffness = bare == "k" or bare in DERIVED
+    return bare != name, 0 if bare == "a - b" else 3 if f"friction.{bare}" in level else 2 if stiffness else 1
 
 
 def _value(one: Estimate) -> str:

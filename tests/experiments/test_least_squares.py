@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.least_squares import LOST, PROGRESS_ITERATIONS, minimise
 
 
 def test_every_lane_solves_its_own_problem():
@@ -101,3 +101,24 @@ def test_searches_that_do_not_get_to_a_wanted_sum_of_squares_end_early(known, ge
     found = minimise(decay, start, *wide, known=known)
     assert known < whole.ssq[0] if not gets_there else found.ssq[0] == whole.ssq[0]
     assert (len(asked) < most) is not gets_there
+
+
+def test_searches_far_above_a_wanted_sum_of_squares_end_after_some_iterations():
+    """A curve that bends as Rosenbrock's valley: it falls for long, and stays a hundred times above what is wanted."""
+    asked = []
+
+    def valley(z, _):
+        asked.append(len(z))
+        x, y = z.T
+        lines = 10 * (y - x**2), 1 - x, np.full_like(x, 10.0)
+        slopes = np.stack([np.stack([20 * x, np.ones_like(x), 0 * x], 1), np.stack([-10 + 0 * x, 0 * x, 0 * x], 1)], 1)
+        return np.stack(lines, 1), slopes
+
+    start, wide = np.array([[-6.0, 2.0]]), (np.array([-99.0, -999.0]), np.array([99.0, 999.0]))
+    whole = minimise(valley, start, *wide)
+    most = len(asked)
+    asked.clear()
+    lost = minimise(valley, start, *wide, known=1.0)
+    assert whole.ssq[0] == pytest.approx(100.0)
+    assert lost.ssq[0] > LOST
+    assert len(asked) == PROGRESS_ITERATIONS < most

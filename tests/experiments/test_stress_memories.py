@@ -5,19 +5,24 @@ from __future__ import annotations
 import pickle
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import fits_at_random
 import lab_records as lab
 import steadyslip as ss
 import stress_steps_at_random as random_steps
 from steadyslip.experiments.answers.laws import with_law
+from steadyslip.experiments.fitting import memories
+from steadyslip.experiments.fitting.effort import Budget
 from steadyslip.experiments.fitting.memories import Rival, opened
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.spec import spec_from_text
 
+fitting = import_module("steadyslip.experiments.fitting.fit")
 ALPHA = 0.3
 BY = 0.04 * lab.STRESS
 PRESSED = ss.Protocol(
@@ -245,6 +250,24 @@ def test_a_step_of_normal_stress_alone_leaves_open_what_no_memory_would_tell():
     found = ss.experiments.compare({"none": none, "free": free})
     assert found.best == "free"
     assert "the records do not tell friction.normal_memory.alpha: 'none' has" in found.verdict
+
+
+def test_memories_that_fit_far_worse_are_soon_given_up(monkeypatch):
+    """Their slip distance went down to nanometres, and each trial took 20 times the work of the fit itself."""
+    spent = {}
+    for module in (fitting, memories):
+
+        class Kept(Budget):
+            @classmethod
+            def of_fit(cls, *arguments, own=module, **options):
+                return spent.setdefault(own, []).append(made := Budget.of_fit(*arguments, **options)) or made
+
+        monkeypatch.setattr(module, "Budget", Kept)
+    for one in [*fits_at_random.drawn("pressed", 5, 7)][::4]:
+        spent.clear()
+        ss.fit(ss.lab_rig(one.law, normal_memory="linker-dieterich"), one.record)
+        own, tried = (sum(budget.spent for budget in spent[module]) for module in (fitting, memories))
+        assert tried < own
 
 
 def test_a_memory_of_equal_fit_widens_the_intervals_of_what_it_moves_by_some_errors():

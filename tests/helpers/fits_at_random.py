@@ -145,6 +145,18 @@ def stress(rng: np.random.Generator, kind: str) -> Drawn:
     return Drawn(rig, law, ss.record_from_arrays(**columns, source=kind))
 
 
+def pressed(rng: np.random.Generator, kind: str) -> Drawn:
+    """Steps of the normal stress up and down, at one rate."""
+    law = rng.choice(["slip", "aging"])
+    rig = rig_of(rng, law, rng.uniform(0.1, 0.5))
+    level, unit = ss.steady_state(rig).normal_stress, rig.value("friction.d_c") / SLOW
+    by = level * rng.uniform(0.03, 0.12) * rng.choice([-1, 1])
+    moments = np.array([15, 30, 45]) * unit * rng.uniform(0.98, 1.02, 3)
+    pieces = tuple(ss.protocol.NormalStressStep(at=at, by=own) for at, own in zip(moments, (by, -by), strict=False))
+    columns = simulated(rng, rig, ss.Protocol(pieces=pieces, until=moments[2]), 1200)
+    return Drawn(rig, law, ss.record_from_arrays(**columns, source=kind))
+
+
 def dirty(rng: np.random.Generator, kind: str) -> Drawn:
     """Steps with rows lost, a gap, wild samples, an uneven clock."""
     law = rng.choice(["slip", "aging"])
@@ -187,6 +199,7 @@ def holds(rng: np.random.Generator, kind: str) -> Drawn:
 DESIGNS: dict[str, Callable[[np.random.Generator, str], Drawn]] = {
     "steps": steps, "five": five, "stress": stress, "dirty": dirty, "holds": holds,
 } | {f"{law}, {cell}": servo_case for law in ("slip", "aging") for cell in (*SERVOS, *WAYS)}  # fmt: skip
+DESIGNS["pressed"] = pressed  # the place of a kind in the table seeds it
 
 
 def drawn(kind: str, count: int, seed: int) -> Iterator[Drawn]:

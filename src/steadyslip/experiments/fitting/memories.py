@@ -18,8 +18,10 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.estimates import LEAST_CHANGE, Combination, combination, is_time
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedy, with_words
+from steadyslip.experiments.fitting.search import ROUGH_PATIENCE
+from steadyslip.experiments.fitting.starts import features_of, search_bounds
 from steadyslip.experiments.fitting.unknowns import Space
-from steadyslip.experiments.numerics.least_squares import Minima, minimise
+from steadyslip.experiments.numerics.least_squares import LOST, Minima, minimise
 
 SIZES = (0.5, 1.0, 1.5, 2.5)  # natural sizes of a memory that are tried: α .1 to .5, as laboratories find
 AS_GOOD = 3.84  # rise of −2 log likelihood up to which a fit is as good: 95 %
@@ -97,7 +99,7 @@ def equal_memories(
         new = [own for own in _with_memory(plan, form) if own.rig.friction not in laws]
         laws += [own.rig.friction for own in new]
         near = [one for own in new for one in _rivals(plan, own, ssq, values, most)]
-        found += [one for one in near if one.remedy.ssq < most and np.any(one.far(space, deviations, NEAR))]
+        found += [one for one in near if np.any(one.far(space, deviations, NEAR))]
     return sorted(found, key=lambda one: -one.remedy.gain)
 
 
@@ -114,26 +116,30 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most
     space, addresses = own.space(), own.rig.parameters()
     remembers = tuple(f"friction.{field}." for field in own.rig.friction.decided_by_stress)
     here, idle, tried = (np.zeros(len(space)) for _ in range(3))
+    distances = np.zeros(len(space), dtype=bool)
     for i, one in enumerate(space.unknowns):
         known = values[one.name] if one.name in values else addresses[one.parameter].value
-        none = addresses[one.parameter].role.idle if one.parameter.startswith(remembers) else None
+        added = one.parameter.startswith(remembers)
+        none = addresses[one.parameter].role.idle if added else None
+        distances[i] = added and one.kind == "slip distance"
         if none is not None:
             known, tried[i] = values.get(one.name, none), 1.0 if none < one.high else -1.0
         here[i], idle[i] = (float(one.coordinate(known if value is None else value)) for value in (None, none))
     budget = Budget.of_fit(sum(map(len, own.records)), len(space))
-    comparison = own.comparison(Effort(budget=budget))
-    low, high = np.transpose([one.bounds for one in space.unknowns])
+    comparison = own.comparison(Effort(patience=ROUGH_PATIENCE, budget=budget))
+    low, high = search_bounds(comparison.parts, features_of(comparison.parts), space)
 
     def minima(begin: Array, held: Array | None) -> Minima:
         stop = budget.part(np.inf)
         return minimise(lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=stop, known=most)
 
     ends = minima(idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1)))
-    if most < np.min(ends.ssq) < np.inf:  # perhaps between two sizes
+    if most < np.min(ends.ssq) < LOST * most:  # perhaps between two sizes
         ends = minima(ends.sorted().coordinates[:1], None)
         if np.any(np.abs(ends.coordinates[0] - idle)[tried != 0] < SIZES[0]):
             return  # hardly any memory: noise, in which none is as good
-    for z in ends.coordinates[np.isfinite(ends.ssq)]:
+    instant = np.any(distances & (ends.coordinates <= low), axis=1)  # over before the next sample: no memory
+    for z in ends.coordinates[(ends.ssq < most) & ~instant]:
         yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - here)
 
 

@@ -31,6 +31,7 @@ LEAST_PROGRESS = (
     3e-7  # relative decrease in `PROGRESS_ITERATIONS` iterations below which a problem ends: it follows a flat valley
 )
 LEAST_PROMISE = 0.1  # share of the way to a known sum of squares; searches that got there predicted .4 or more
+LOST = 4.0  # multiple of a known sum of squares that searches which get there are below after `PROGRESS_ITERATIONS`
 MAX_SSQ = 1e100  # sums of squares above count as infinite; their products would overflow
 DAMPING_FAR, DAMPING_NEAR = 1e-2, 1e-6  # initial damping, relative to the curvature: far from a minimum, and near one
 MAX_STEP = 2.0  # largest step in any coordinate: a factor exp(2) of a logarithmic parameter
@@ -170,6 +171,7 @@ def minimise(
             over = over | (gone * PROGRESS_ITERATIONS <= LEAST_PROGRESS * before)
             if race or known < np.inf:
                 over = over | (before - gone * (most - iteration) > best)
+            over = over | (not race and before > LOST * known)
             earlier = found.ssq.copy()
         if not race and known < np.inf:
             over = over | (promise < LEAST_PROMISE * (before - known))

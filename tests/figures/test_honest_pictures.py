@@ -18,7 +18,7 @@ from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.hunting import hunting
 from steadyslip.figures.map_axes import Scale, is_geometric
-from steadyslip.figures.style import EDGES, fit_words, save_with_footer
+from steadyslip.figures.style import AREA_WORD, EDGES, fit_words, save_with_footer
 from steadyslip.maps.view.cut import _quantiles, _with_failures
 
 
@@ -140,11 +140,39 @@ def _of_column(kind):
     rig = ss.read_rig("examples/inclined-spring.toml")
     if kind == "mass":
         return figures.critical_stiffness_against_mass(rig), ss.analyze(rig)
+    if kind == "lock-up":
+        return figures.stability_chart(rig, "contact.angle", "stiffness", points=41), ss.analyze(rig)
+    if kind == "verdicts":
+        rig = ss.read_rig("examples/stick-slip.toml")
+        frozen = ss.frozen_verdicts(rig, ss.read_protocol("examples/stick-slip.toml"))
+        return frozen.plot(), frozen
+    if kind == "modes":
+        machine = ss.read_rig("examples/machines/brake-pad.toml")
+        chart = ss.linear.mode_chart(machine, "contacts.disc.friction.mu_ref")
+        return chart.plot(), chart
+    if kind == "response":
+        found = ss.response(rig.with_values({"stiffness": 4e10}), [1.0, 10.0, 100.0])
+        return found.plot(), found
     within = ss.tolerate(rig, {"friction.a": "10 %", "friction.b": "10 %"})
     return figures.tolerances(within), within
 
 
-@pytest.mark.parametrize("kind", ["machine verdict", "hunting", "chart", "locus", "mass", "tolerances"])
+COLUMN = [
+    "machine verdict",
+    "hunting",
+    "chart",
+    "locus",
+    "mass",
+    "tolerances",
+    "lock-up",
+    "verdicts",
+    "modes",
+    "response",
+]
+NAMED = {"verdicts": "no steady sliding", "modes": "this machine", "response": "resonance"}
+
+
+@pytest.mark.parametrize("kind", COLUMN)
 def test_a_column_of_a_journal_holds_all_words(tmp_path, kind):
     """Nothing is cut at the edge of a saved figure of 85 mm, numbers of an axis do not touch, and axes keep room."""
     with figures.journal():
@@ -153,7 +181,15 @@ def test_a_column_of_a_journal_holds_all_words(tmp_path, kind):
     figure = np.ravel(axes)[0].figure
     assert figure.get_figwidth() == pytest.approx(85 / 25.4)
     figure.draw_without_rendering()
+    assert not re.search(r"\d [a-zA-Zµ]", figure.texts[-1].get_text().partition("steadyslip")[0])  # 10 s
+    legends = [text.get_text() for ax in np.ravel(axes) if (known := ax.get_legend()) for text in known.get_texts()]
+    assert NAMED.get(kind, "") in " ".join(legends)
     for ax in np.ravel(axes):
+        frame = ax.get_window_extent()
+        for text in (one for one in ax.texts if one.get_gid() == AREA_WORD and one.get_visible()):
+            box = text.get_window_extent()
+            assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+            assert frame.y0 <= box.y0 < box.y1 <= frame.y1
         assert ax.get_window_extent().width > 0.25 * figure.bbox.width
         numbers = [one.get_window_extent() for one in ax.get_xticklabels() if one.get_text()]
         assert not any(a.x1 > b.x0 > a.x0 for a, b in pairwise(numbers))
@@ -180,3 +216,18 @@ def test_words_of_a_report_fit_their_axes():
     long = [one.yaxis.label for one in axes if "normal stress" in one.get_ylabel()]
     assert [label.get_text() for label in long] == ["normal stress\n(MPa)"]
     assert long[0].get_window_extent().height <= axes[-1].get_window_extent().height
+
+
+@pytest.mark.parametrize(("height", "seen"), [(1.6, True), (1.2, True), (0.5, False)])
+def test_words_of_areas_stay_inside_low_axes(height, seen):
+    """The upright "no steady sliding" ran through the lower axis of a map 85 mm wide."""
+    figure = plt.figure(figsize=(3, height))
+    ax = figure.add_axes((0.1, 0.05, 0.8, 0.9))
+    text = ax.text(0.1, 0.2, "no steady sliding", rotation=90, ha="center", va="center", gid=AREA_WORD)
+    fit_words(figure)
+    figure.draw_without_rendering()
+    frame, box = ax.get_window_extent(), text.get_window_extent()
+    assert text.get_visible() == seen
+    if seen:
+        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
+    plt.close(figure)

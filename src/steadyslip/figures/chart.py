@@ -17,6 +17,7 @@ from steadyslip.figures import regions
 from steadyslip.figures.axis import ChartAxis, chart_axis
 from steadyslip.figures.contours import SAFETY_LEVELS, draw_levels, extended, safety_fields
 from steadyslip.figures.style import (
+    AREA_WORD,
     AREAS,
     CONTOURS,
     EDGES,
@@ -241,7 +242,9 @@ def _write_in_area(ax: Axes, region: Any, words: str, place: Place, lines: Seque
             across, up, room = regions.widest_place(inside, size)
             if room >= 1:
                 x, y = (float(one[0]) for one in place(np.array([[across, up]])))
-                ax.text(x, y, words, ha="center", va="center", rotation=turned, path_effects=HALO, zorder=4)
+                ax.text(
+                    x, y, words, ha="center", va="center", rotation=turned, path_effects=HALO, zorder=4, gid=AREA_WORD
+                )  # fmt: skip
                 return True
     return False
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
-from steadyslip.figures.style import AREAS, axis_label, display_unit, new_panels
-from steadyslip.linear.status import UNSTABLE
+from steadyslip.figures.style import AREAS, add_legend_above, axis_label, display_unit, new_panels
+from steadyslip.linear.status import ABSENT, UNSTABLE
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import FrequencyResponse, FrozenVerdicts
@@ -54,7 +54,7 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
         draw(found, one)
         one.set_xscale("log")
         for period in found.resonances[:1, 0]:
-            one.axvline(period, color=GREY, linestyle=":", linewidth=1)
+            one.axvline(period, color=BLACK, linestyle=":", linewidth=1, label="resonance" if one is axes[0] else "")
     axes[-1].set_xlabel("period (s)")
     axes[0].set_title(found.title.replace("-", " "), fontsize="medium")
     axes[0].legend(fontsize="small")
@@ -146,7 +146,13 @@ def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
             t, 0, 1, where=found.growth_rate > 0, transform=one.get_xaxis_transform(), zorder=0,
             **AREAS[UNSTABLE][1],
         )  # fmt: skip
+        held = one.fill_between(
+            t, 0, 1, where=~np.isfinite(found.growth_rate), transform=one.get_xaxis_transform(), zorder=0,
+            **AREAS[ABSENT][1],
+        )  # fmt: skip
     unstable.set_label("steady sliding is unstable")
+    if not np.all(np.isfinite(found.growth_rate)):
+        held.set_label(AREAS[ABSENT][0])
     fastest = max(float(np.max(np.abs(own))) for own in found.slip_rates.values())
     speed, speed_unit = display_unit("m/s", fastest or 1.0)
     for (name, own), colour in zip(found.slip_rates.items(), cycle((BLUE, GREEN, ORANGE)), strict=False):
@@ -157,5 +163,5 @@ def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
     axes[0].set_ylabel("growth rate (1/s)")
     axes[1].set_ylabel(axis_label("slip rate", speed_unit))
     axes[1].set_xlabel(axis_label("time", unit))
-    axes[1].legend(fontsize="small")
+    add_legend_above(axes[1], 4, 1.0, fontsize="small")
     return axes

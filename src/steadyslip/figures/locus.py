@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.palette import BLACK, VERMILION
+from steadyslip.core.palette import BLACK, BLUE, VERMILION
 from steadyslip.figures.style import add_legend_above, axes_or_new, axis_label, display_unit, parameter_label
 from steadyslip.linear import eigenvalues, stable_stiffness, stable_values
 from steadyslip.machine.letters import words_of
@@ -93,7 +93,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         own_roots.real,
         own_roots.imag,
         "o",
-        color=VERMILION,
+        color=VERMILION if np.any(own_roots.real > 0) else BLUE,
         markeredgecolor=BLACK,
         markersize=7,
         zorder=4,

@@ -10,7 +10,14 @@ import numpy as np
 from steadyslip.core.format import typeset
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, LINES, ORANGE, PURPLE, SKY, VERMILION
 from steadyslip.core.written import told_as
-from steadyslip.figures.style import axis_label, display_unit, given_panels, new_panels, parameter_label
+from steadyslip.figures.style import (
+    add_legend_above,
+    axis_label,
+    display_unit,
+    given_panels,
+    new_panels,
+    parameter_label,
+)
 from steadyslip.linear import ModeChart
 
 _GROWING, _OTHERS = (VERMILION, ORANGE, PURPLE), (BLUE, GREEN, SKY)
@@ -92,8 +99,23 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
     axes[0].set_ylabel(axis_label("frequency", hertz))
     axes[1].set_ylabel(axis_label("damping ratio", ""))
     axes[1].set_xlabel(axis_label(parameter_label(found.rig, found.parameter), unit))
-    axes[0].legend(fontsize="small", loc="best")
+    _name_marks(axes)
+    add_legend_above(axes[0], 4, 1.0, fontsize="small")
     return axes
+
+
+def _name_marks(axes: Any) -> None:
+    """Name in the legend what is drawn of the marks: where a mode grows, an edge, this machine, other modes."""
+    marks = {
+        "_grows": ("grows", {"color": BLACK, "linewidth": 3.2}),
+        "_edge": ("edge of stability", {"color": BLACK, "linestyle": "--", "linewidth": 1}),
+        "_own": ("this machine", {"color": BLACK, "linestyle": ":", "linewidth": 1}),
+        "_other": ("other modes", {"color": GREY, "linewidth": 0.8}),
+    }
+    drawn = {line.get_label() for line in axes[0].lines}
+    for key, (words, style) in marks.items():
+        if key in drawn:
+            axes[0].plot([], [], label=words, **style)
 
 
 def _set_heights(axes: Any, frequencies: np.ndarray, ratios: np.ndarray) -> None:

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 _ROUNDING = 1e-6  # change of a normal force that is none, share of it: that of steps of integration, with room
 _MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
+_STEADY_POINTS = 161  # of the line of steady states: a bend of one decade is smooth in a figure 160 mm wide
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
@@ -254,7 +255,9 @@ def _draw_steady_states(run: History, rig: Slider, ax: Axes, x: np.ndarray, fact
     """Plot spring stress (Pa / factor) of steady sliding over drive velocity, with a dot at the last of the run."""
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     margin = 0.1 * (high - low) + 0.05
-    steps = np.linspace(low - margin, high + margin, 41)
+    steps = np.linspace(low - margin, high + margin, _STEADY_POINTS)
+    bottom, top = ax.get_ylim()  # of the motion, which is not to shrink beside its steady states
+    beside = bottom - 0.5 * (top - bottom), top + 0.5 * (top - bottom)
     stress = []
     for u in steps:
         try:
@@ -264,7 +267,9 @@ def _draw_steady_states(run: History, rig: Slider, ax: Axes, x: np.ndarray, fact
             stress.append(np.nan)
     pressed = any(piece.channel == NORMAL_STRESS for piece in Protocol.of(run.protocol).pieces)
     label = "steady states before the change of normal stress" if pressed else "steady states"
-    ax.plot(steps, np.array(stress) / factor, color=BLACK, linewidth=1, label=label)
+    told = np.array(stress) / factor
+    told[(told < beside[0]) | (told > beside[1])] = np.nan
+    ax.plot(steps, told, color=BLACK, linewidth=1, label=label)
     last = float(run["load_velocity"][-1])
     if not pressed and last > 0:
         with suppress(NoSteadySliding):

@@ -36,7 +36,7 @@ _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY,
 _OUTCOME_COLOURS = {"returns": STABLE, "oscillation": UNSTABLE, "blow-up": BLOW_UP, "contact lost": GREEN,
                     "no solution": GREY, "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
 _ENDS: dict[str, dict[str, Any]] = {
-    "range": {"marker": "|", "markersize": 12, "markeredgewidth": 1.5},
+    "range": {"marker": "|", "markersize": 8, "markeredgewidth": 1.5},
     "last cycle": {"marker": "x", "markersize": 7, "markeredgewidth": 1.5},
     "not located": {"marker": "x", "markersize": 7, "markeredgewidth": 1.5},
     "edge": {"marker": "o", "markerfacecolor": "white"},

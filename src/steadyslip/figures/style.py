@@ -66,6 +66,10 @@ Words of size "small", .83 of the first, have 6.5 points: 9.5 pixels on a teleph
 _SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are in the file
 _TITLE_GAP = 4.0  # points between a legend and the title above it
 _LEGEND_LETTERS = 42  # of a line beside its mark: .5 of 6.5 points each, in the 60 mm of Axes 85 mm wide with a scale
+_SMALLEST = 0.6  # share of their size to which words of areas are shrunk: to 4 points at 85 mm, the least that is read
+AREA_WORD = "word of an area"  # group of texts that name areas
+_FEW_DECADES = 5  # of a logarithmic axis that are all numbered
+_OF_UNIT = re.compile(r"(?<=\d) (?=[^\W\d])")  # space between a number and its unit
 _FOOTER = 6.0  # points, size of the letters below a saved figure
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
 """Outline of words that stand on an area."""
@@ -176,12 +180,41 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
         figure.savefig(path, dpi=200, facecolor="white")
 
 
+def _keep_inside(ax: Axes) -> None:
+    """Move words of areas into the frame of axes that are smaller than those they were placed for; shrink longer ones.
+
+    Words that would be smaller than a share of `_SMALLEST` are left out: the legend has them.
+    """
+    frame = ax.get_window_extent()
+    ends = np.array([[frame.x0, frame.y0], [frame.x1, frame.y1]])
+    for text in (one for one in ax.texts if one.get_gid() == AREA_WORD):
+        box = text.get_window_extent()
+        size, middle = np.array([box.width, box.height]), np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2
+        share = min(1.0, *(0.95 * (ends[1] - ends[0]) / size))  # with some room to the frame
+        text.set_visible(share >= _SMALLEST)
+        text.set_fontsize(share * float(text.get_fontsize()))
+        inside = np.clip(middle, ends[0] + share * size / 2, ends[1] - share * size / 2)
+        if not np.array_equal(inside, middle):
+            x, y = ax.transData.inverted().transform(inside)
+            text.set_position((float(x), float(y)))
+
+
+def _number_decades(axis: Axis) -> None:
+    """Number every decade of a logarithmic axis of few decades, which low axes would pass over."""
+    low, high = sorted(axis.get_view_interval())
+    few = axis.get_scale() == "log" and 0 < low < high <= low * 10**_FEW_DECADES
+    if few and list(axis.get_majorticklocs()) and axis.get_minor_locator() is not None:
+        axis.set_major_locator(LogLocator(numticks=_FEW_DECADES + 2))
+
+
 def fit_words(figure: Any) -> None:
     """Part ticks whose numbers touch, put powers of ten into units, and units of vertical axes below too long names."""
     figure.draw_without_rendering()
     for axis in (one for ax in figure.axes for one in (ax.xaxis, ax.yaxis)):
         _put_power_in_unit(axis)
+        _number_decades(axis)
     for ax in figure.axes:
+        _keep_inside(ax)
         label = ax.yaxis.label
         share = ax.get_window_extent().height / (label.get_window_extent().height or 1.0)
         if 0 < share < 1:
@@ -237,7 +270,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         fitted = {name.partition("@")[0] for name in estimates}
         labels = [text for ax in axes for text in (ax.get_xlabel(), ax.get_ylabel())]
         shown = [name for name in rig.parameters() if _on_an_axis(rig, name, labels)]
-        protocol = getattr(result, "protocol", None)
+        protocol = getattr(getattr(result, "run", result), "protocol", None)  # its own, or that of its run
         changed = changed_by(rig, protocol) if isinstance(protocol, Protocol) else []
         held = ", ".join(_values_of(rig, [one for one in rig.parameters() if one not in {*fitted, *shown, *changed}]))
         first = ", ".join(_values_of(rig, changed))
@@ -249,7 +282,8 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
         file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # that of a map
         parts = [*words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
-        parts += [f"at first: {first}" if first else "", f"protocol: {typeset(done)}" if done else ""]
+        done = _OF_UNIT.sub("\xa0", typeset(done))
+        parts += [f"at first: {first}" if first else "", f"protocol: {done}" if done else ""]
     parts.append(f"steadyslip\xa0{version()}, {datetime.now(UTC):%Y-%m-%d}")
     told = ". ".join(one for one in parts if one)
     return (file.replace(" ", "\xa0"), f". {told}") if file else ("", told)

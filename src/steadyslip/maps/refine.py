@@ -25,7 +25,6 @@ from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
 from steadyslip.files.output import write_columns
-from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.maps.plan.axes import SAMPLE
 from steadyslip.maps.plan.map import AnyMeasure, Map
@@ -305,7 +304,7 @@ class _Batches:
         self.found, self.lattice = found, lattice
         text = str(found.dataset.attrs["definition"])
         self.rig = found.rig
-        self.protocol = protocol_from_text(str(found.dataset.attrs["rig"]), str(found.path))
+        self.protocol = found.protocol
         self.compute = tuple(compute) if compute is not None else _measures_of(json.loads(text)["compute"])
         name = hashlib.sha256(f"{text} {of} {level}".encode()).hexdigest()[:8]
         self.folder = found.path.with_suffix(".refined") / f"{of}-{name}"

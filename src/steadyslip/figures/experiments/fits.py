@@ -21,7 +21,7 @@ from steadyslip.figures.experiments.panels import (
     title_name,
 )
 from steadyslip.figures.experiments.records import draw_normal_stress, draw_rates
-from steadyslip.figures.style import axis_label, display_unit
+from steadyslip.figures.style import add_legend_above, axis_label, display_unit
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Fit, Record
@@ -65,7 +65,7 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
     panels[2].plot(time, 1e3 * _running_mean(residuals), color=VERMILION, linewidth=1, label="running mean")
     panels[2].axhline(0, color=BLACK, linewidth=0.8)
     panels[2].set_ylabel("residual (10⁻³)")
-    panels[2].legend(loc="best", fontsize="small")
+    add_legend_above(panels[2], 1, 1.0, fontsize="small")
     panels[2].set_xlabel(time_label(data, unit))
     _draw_autocorrelation(panels[3], result, residuals, record)
     for panel in given:
@@ -105,7 +105,7 @@ def _draw_autocorrelation(ax: Axes, result: Fit, residuals: np.ndarray, record: 
     ax.axhspan(-chance, chance, color=GREY, alpha=0.5, linewidth=0, label="95 % of independent noise")
     ax.set_xlabel("lag (samples)")
     ax.set_ylabel("autocorrelation (1)")
-    ax.legend(loc="best", fontsize="x-small")
+    ax.legend(loc="upper right", fontsize="x-small")
 
 
 def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:

@@ -16,11 +16,13 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.version import of_another
+from steadyslip.files.specifications import protocol_from_text
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.measures import NO_EDGE, NOT_SLIDING
 from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.view import export
+from steadyslip.protocol import Protocol
 
 BLOCK = 2**22  # values read at a time: 32 MiB
 
@@ -48,6 +50,11 @@ class MapResult(Displayed):
     def rig(self) -> Slider | Machine:
         """Base rig; NotAvailable if it has a law that cannot be written to a file."""
         return self._store.rig()
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """Protocol of measures that simulate; None without any."""
+        return protocol_from_text(str(self.dataset.attrs["rig"]), str(self.path))
 
     @property
     def dims(self) -> tuple[str, ...]:

@@ -338,6 +338,22 @@ def test_odd_modes_are_asked_about(tmp_path, names, ratio, said):
         ss.read_rig(path)
 
 
+@pytest.mark.parametrize(("right", "wrong", "said"), [
+    ("matrices =", "matrix =", r"toml: line 4: bodies.reed.matrix: unknown key 'matrix'; did you mean 'matrices'\?"),
+    ('motion = "structure"\n', "", "toml: 2 problems\n.*motion: missing; matrices and points are of motion = 'struc"),
+    ('"structure"', '"struct"', "motion: unknown motion 'struct'; did you mean 'structure'"),
+])  # fmt: skip
+def test_of_a_misspelt_key_nothing_else_follows(tmp_path, right, wrong, said):
+    mass, damping, stiffness = reed_matrices()
+    np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
+    path = written(tmp_path, "reed.npz")
+    path.write_text(path.read_text().replace('kind = "str', 'motion = "str').replace(right, wrong))
+    with pytest.raises(ss.RigFileError, match=said) as error:
+        ss.read_rig(path)
+    assert "the name of a file" not in str(error.value)
+    assert "exactly one" not in str(error.value)
+
+
 @pytest.mark.parametrize("between", [";", "\t"])
 @pytest.mark.parametrize("decimal", [".", ","])
 def test_tables_of_spreadsheets_have_other_separators(tmp_path, between, decimal):

@@ -56,6 +56,7 @@ TOLD_IN = "# told in: "
 MAP = "map"
 READ_ELSEWHERE = {MAP: "computes maps"} | dict.fromkeys(("record", "fit", "population"), "fits records")
 """Names of tables that others ignore, and what reads them."""
+_OF_FAMILIES = ("law", "kind")  # keys whose words are told as those of the family; others say more, as motion does
 
 
 def sections() -> tuple[Section, ...]:
@@ -105,7 +106,9 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
                 raise ParameterError([Problem("", message)]) from error
             if isinstance(law, type) and issubclass(law, family):
                 return law
-    raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])
+    key, _ = selector(family)
+    what = family.family if key in _OF_FAMILIES else key
+    raise ParameterError([Problem("", unknown_name(what, name, family.registry))])
 
 
 def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]:

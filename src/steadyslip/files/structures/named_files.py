@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import fields
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -30,19 +32,31 @@ def with_structures(tables: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _loaded(body: Any, folder: Path) -> Any:
-    if not isinstance(body, dict) or StructureBody.name not in (body.get("motion"), body.get("kind")):
+    if not isinstance(body, dict):
         return body
-    found = {key: value for key, value in body.items() if key != "kind"} | {"motion": StructureBody.name}
-    for key, read in _READERS.items():
-        more: tuple[Any, ...] = (found.get("averages", 1),) if key == "response" else ()
-        if isinstance(path := found.get(key), str):
+    found, motion = dict(body), body.get("motion", body.get("kind"))
+    if motion == StructureBody.name:
+        found = {key: value for key, value in body.items() if key != "kind"} | {"motion": motion}
+    elif motion is not None or not _READERS.keys() & body.keys():
+        return body
+    for key, path in body.items():
+        meant = _meant(key)
+        more: tuple[Any, ...] = (found.get("averages", 1),) if meant == "response" else ()
+        if meant and isinstance(path, str):
             try:
-                if key == "matrices" and "units" in found:
+                if meant == "matrices" and "units" in found:
                     with suppress(ParameterError):  # the field of the units refuses them
                         more = (unit_sizes(found["units"]),)
-                found[key] = read(path, folder, *more)
+                found[key] = _READERS[meant](path, folder, *more)
             except UnreadableFile as error:
                 found[key] = Unread(str(error))
             except ParameterError as error:
                 found[key] = Unread(f"{path!r}: " + "; ".join(f"{p.name} {p.message}".strip() for p in error.problems))
     return found
+
+
+def _meant(key: str) -> str | None:
+    """Key that names a file, also of one that is misspelt: only that is told then, not what would follow from it."""
+    if key in {field.name for field in fields(StructureBody)}:
+        return key if key in _READERS else None
+    return next(iter(get_close_matches(key, _READERS, n=1)), None)

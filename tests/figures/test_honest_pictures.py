@@ -218,6 +218,18 @@ def test_words_of_a_report_fit_their_axes():
     assert long[0].get_window_extent().height <= axes[-1].get_window_extent().height
 
 
+def test_steady_sliding_of_a_branch_is_stable_on_one_side_of_its_onset():
+    rig = ss.read_rig("examples/inclined-spring.toml", ["radiation_damping=1 GPa s/m"])
+    branch = ss.cycles(rig)
+    ax = figures.cycle_branch(branch)
+    lines = {one.get_label(): one.get_xdata() for one in ax.lines if "steady sliding" in one.get_label()}
+    onset = branch.onset.value / 1e9
+    assert max(lines["steady sliding, unstable"]) == pytest.approx(onset)
+    assert min(lines["steady sliding, stable"]) == pytest.approx(onset)
+    assert not any("um/s" in one.get_text() for one in ax.get_legend().get_texts())
+    plt.close(ax.figure)
+
+
 @pytest.mark.parametrize(("height", "seen"), [(1.6, True), (1.2, True), (0.5, False)])
 def test_words_of_areas_stay_inside_low_axes(height, seen):
     """The upright "no steady sliding" ran through the lower axis of a map 85 mm wide."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import cycle
+from itertools import cycle, pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.format import format_quantity
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
 from steadyslip.figures.map_axes import is_geometric
 from steadyslip.figures.style import (
@@ -23,7 +23,8 @@ from steadyslip.figures.style import (
     parameter_label,
     with_subscripts,
 )
-from steadyslip.linear.status import ABSENT, UNKNOWN, UNSTABLE as UNSTABLE_CODE
+from steadyslip.linear.boundary import boundary
+from steadyslip.linear.status import ABSENT, UNKNOWN, UNSTABLE as UNSTABLE_CODE, stability
 from steadyslip.nonlinear.orbits.ranges import WORDS
 
 if TYPE_CHECKING:
@@ -43,8 +44,15 @@ _ENDS: dict[str, dict[str, Any]] = {
     "not followed": {"marker": "+", "markersize": 9, "markeredgewidth": 1.5},
 }
 """Marks of ends of a branch, by kind."""
+_STEADY: dict[str, dict[str, Any]] = {
+    "steady sliding": {"color": BLACK, "linewidth": 0.8, "linestyle": ":"},
+    "steady sliding, stable": {"color": BLACK, "linewidth": 1.4, "linestyle": "-"},
+    "steady sliding, unstable": {"color": BLACK, "linewidth": 0.8, "linestyle": "--"},
+}
+"""Lines of steady sliding, by whether it is stable; dotted where that is not known."""
 _UNDECIDED_HATCHES = ("++", "oo", "..")
 NARROW_RANGE = 1e-3  # relative range of a branch below which its axis is the distance from the onset (by trial)
+BEYOND = 1.5  # factor beyond the onset up to which steady sliding is drawn, or tenths of the branch (by trial)
 LEGEND_WIDTH = 36  # characters of a line of a legend in two columns
 
 
@@ -88,12 +96,11 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     _draw_velocities(branch, ax, (origin, factor), speed, 1.8, True)
     if branch.doubled is not None:
         _draw_velocities(branch.doubled, ax, (origin, factor), speed, 0.9, False)
-    line: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "linestyle": ":", "label": "steady sliding"}
-    if driven:
-        values = np.unique([branch.onset.value, *(one.value for one in branch.cycles)])
-        ax.plot((values - origin) / factor, onset_speed * values / branch.onset.value / speed, **line)
-    else:
-        ax.axhline(drive / speed, **line)
+    named: set[str] = set()
+    for values, words in _steady_stretches(branch):
+        steady = onset_speed * values / branch.onset.value if driven else np.full_like(values, drive)
+        ax.plot((values - origin) / factor, steady / speed, label="" if words in named else words, **_STEADY[words])
+        named.add(words)
     kind = branch.onset.kind
     mark: dict[str, Any] = {"color": _COLOURS[kind], "marker": "o", "linestyle": "none"}
     ax.plot([(branch.onset.value - origin) / factor], [onset_speed / speed], label=branch.onset.title, **mark)
@@ -119,6 +126,33 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     ax.grid(color=GREY, linewidth=0.3)
     add_legend_above(ax, 2, 1.0, fontsize="small")
     return ax
+
+
+def _steady_stretches(branch: CycleBranch) -> list[tuple[np.ndarray, str]]:
+    """Values of the parameter along the branch and a little beyond its onset, in stretches of equal stability."""
+    values = np.unique([branch.onset.value, *(one.value for one in branch.cycles)])
+    low, high = values[0], values[-1]
+    if low == high:
+        low, high = sorted((0.8 * low, 1.2 * low))
+    elif low > 0 and high > 10 * low:  # on a log axis
+        low, high = (low, BEYOND * high) if branch.onset.value**2 > low * high else (low / BEYOND, high)
+    else:
+        more = 0.1 * BEYOND * (high - low)
+        low, high = (low, high + more) if 2 * branch.onset.value > low + high else (max(low - more, min(low, 0)), high)
+    ends = float(low), float(high)
+    try:
+        edges = [one.value for one in boundary(branch.rig, branch.along, between=ends)]
+        bounds = [ends[0], *(one for one in edges if ends[0] < one < ends[1]), ends[1]]
+        found = []
+        for first, last in pairwise(bounds):
+            inside = values[(values > first) & (values < last)]
+            kind = stability(branch.rig.with_values({branch.along: 0.5 * (first + last)}))
+            found.append((np.array([first, *inside, last]), f"steady sliding, {kind}"))
+        if all(words in _STEADY for _, words in found):
+            return found
+    except (ParameterError, NotAvailable):
+        pass
+    return [(np.array([ends[0], *values, ends[1]]), "steady sliding")]
 
 
 def _draw_velocities(
@@ -160,7 +194,7 @@ def _draw_ends(branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: 
             continue
         velocities = np.array([one.peak_velocity, one.lowest_velocity] if one else [steady_speed])
         known = words in named or kind == "not followed" or words.startswith("end ")
-        label = "" if words in named else fill(words if known else f"end: {words}", LEGEND_WIDTH)
+        label = "" if words in named else fill(typeset(words if known else f"end: {words}"), LEGEND_WIDTH)
         named.add(words)
         ax.plot(
             len(velocities) * [(value - axis[0]) / axis[1]], np.where(velocities > 0, velocities, np.nan) / speed,

@@ -120,3 +120,18 @@ def test_every_slip_event_can_be_seen():
     for band, slip in zip(bands, run.slip_events, strict=True):
         assert band.get_width() >= 0.99 * 0.004 * 200
         assert band.get_x() <= 0.5 * (slip.begin + slip.end) <= band.get_x() + band.get_width()
+
+
+def test_friction_is_seen_where_contact_is_lost():
+    """It is a ratio of two forces that vanish: its axis ran to 4 where all but the last sample was at 0.5."""
+    rig = ss.read_rig("examples/machines/brake-pad.toml")
+    run = ss.simulate(rig, ss.protocol.VelocityStep(at=0.01, to=1.1), until=1.0)
+    assert run.status == "contact lost"
+    force, friction = run["disc.normal_force"], run["disc.friction"]
+    panels = run.plot(ax=Figure().subplots(3, 1))
+    low, high = panels[1].get_ylim()
+    early = friction[: len(friction) // 2]
+    assert low < early.min()
+    assert early.max() < high < 1.2 * friction[force > 0.5 * force.max()].max() < friction.max()
+    assert np.ptp(friction[force > 0.5 * force.max()]) > 0.3 * (high - low)
+    assert np.array_equal(panels[1].lines[0].get_ydata(), friction)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 
@@ -32,6 +34,8 @@ _CONTACTS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # line colours, in the or
 MAX_SHADED_EVENTS = 40  # slip events are shaded if they are fewer: more would run into each other (by trial)
 MIN_BAND_SHARE = 4e-3  # least width of a shaded slip event, as share of the time axis: about two pixels
 _MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
+_PRESSED = 0.1  # share of the largest normal force from which on friction sets its axis where contact is lost: below,
+# a ratio of two forces that vanish grows without bound, and presses all else into a line
 _LOG_RATIO = 3.0  # highest over lowest slip rate above which the axis is logarithmic (by trial)
 _MIN_STEADY_RATIO = 1e-3  # least slip rate of the line of steady states over the highest of the run
 _SHADE = 0.4  # opacity of shading: 10 steps of lightness L* (of 100) from white, and curves stay in sight (by trial)
@@ -57,6 +61,8 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
         for name in names:
             panel.plot(time, values[name] / scale, color=colors[name], linewidth=1, label=name)
         panel.set_ylabel(axis_label(label, own_unit))
+        if what == "friction":
+            limit_friction(run, panel, [(values[name], run[f"{name}.normal_force"]) for name in names])
         _limit_zoom(panel, largest / scale)
         panel.grid(color=GREY, linewidth=0.3)
     shade_let_go(run, panels, factor)
@@ -115,6 +121,17 @@ def phase_plane(
     ax.grid(color=GREY, linewidth=0.3)
     add_legend_above(ax, 3, 1.0, fontsize="small")
     return ax
+
+
+def limit_friction(run: History, ax: Axes, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+    """Fit the axis of friction to samples that press, in a run that ends because contact is lost.
+
+    `pairs` are friction and normal force, or normal stress, of every contact.
+    """
+    kept = np.concatenate([own[(load >= _PRESSED * np.max(load)) & np.isfinite(own)] for own, load in pairs])
+    if run.status == "contact lost" and len(kept) and np.ptp(kept):
+        margin = rcParams["axes.ymargin"] * float(np.ptp(kept))
+        ax.set_ylim(float(kept.min()) - margin, float(kept.max()) + margin)
 
 
 def steady_rate(rig: Any, name: str) -> float:

@@ -89,6 +89,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     _velocity_panel(run, v, panels[0], time)
     panels[1].plot(time, friction, color=BLUE)
     panels[1].set_ylabel("friction τ/σ (1)")
+    machine_motion.limit_friction(run, panels[1], [(friction, run["normal_stress"])])
     _limit_zoom(panels[1], friction)
     if not pressed:
         stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(normal), initial=1.0)), area)

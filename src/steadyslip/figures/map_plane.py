@@ -19,6 +19,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, VERMILION
 from steadyslip.figures import regions
+from steadyslip.figures.cells import mark_areas
 from steadyslip.figures.chart import SLIDING, absence_reasons, draw_edges, write_inside
 from steadyslip.figures.contours import SAFETY_LEVELS, draw_levels, extended, pieces_of, safety_fields
 from steadyslip.figures.map_axes import (
@@ -300,6 +301,8 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         ax.pcolormesh(x, y, kinds, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)
         for code in np.unique(values[values >= 0]):
             add_legend_entry(ax, Patch(facecolor=colours[int(code)], label=words[int(code)]))
+        if min(values.shape) > 1:
+            mark_areas(ax, x, y, values, dict(enumerate(words)))
         if (values < 0).any():
             add_legend_entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
         return

@@ -13,6 +13,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, BLOW_UP, BLUE, GREEN, GREY, ORANGE, SKY, STABLE, UNSTABLE, VERMILION, YELLOW
+from steadyslip.figures.cells import mark_areas
 from steadyslip.figures.map_axes import is_geometric
 from steadyslip.figures.style import (
     AREAS,
@@ -260,7 +261,7 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     """Plot the outcome of motion from every starting point: velocity over slip ahead of the load point.
 
     Pale blue: motion returns to steady sliding (the dot). Yellow: undecided, with the reason in the legend. Dashed
-    lines: unstable cycles.
+    lines: unstable cycles. Words stand in areas that have room for them; full lines are their edges.
 
     Parameters
     ----------
@@ -295,6 +296,7 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
         ax.set_yscale("log")
     ax.set_xlim(found.x.min() / length, found.x.max() / length)
     ax.set_ylim(found.v.min() / speed, found.v.max() / speed)
+    mark_areas(ax, found.x / length, found.v / speed, codes, dict(enumerate(names)))
     if np.all(found.outcome == "returns"):
         words = "every starting point in this picture returns to steady sliding"
         ax.text(0.5, 0.04, fill(words, LEGEND_WIDTH), transform=ax.transAxes, ha="center", va="bottom")

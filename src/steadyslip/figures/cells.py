@@ -1,0 +1,50 @@
+"""Words and edges of areas of one kind each, on grids whose kinds are known at their points only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.palette import BLACK
+from steadyslip.figures.chart import write_inside
+
+_FINE = 161  # points along each axis from which room for words is measured: half of a letter of 7 points in 85 mm
+
+
+def mark_areas(ax: Axes, x: Array, y: Array, kinds: Array, words: Mapping[int, str]) -> None:
+    """Draw a line between cells of different kinds, and write the word of each kind into its areas that have room.
+
+    Cells reach halfway to the next points, as those of ``pcolormesh(shading="nearest")``. Scales and limits of the axes
+    are set before. `kinds`, shape (len(y), len(x)), has integers; those without a word get none.
+    """
+    bounds = [0.5 * (one[1:] + one[:-1]) for one in (x, y)]
+    line = _borders(x, y, bounds, kinds)
+    if len(line):
+        ax.plot(*line.T, color=BLACK, linewidth=1, label="edge, to the nearest point of the grid")
+    share = np.linspace(0, 1, _FINE)
+    across, up = _in_data(ax, np.column_stack([share, share]))
+    fine = kinds[np.ix_(np.searchsorted(bounds[1], up), np.searchsorted(bounds[0], across))]
+    for kind, word in words.items():
+        if (fine == kind).any():
+            write_inside(ax, fine == kind, word, lambda shares: _in_data(ax, shares))
+
+
+def _in_data(ax: Axes, shares: Array) -> tuple[Array, Array]:
+    """Coordinates of points at fractions of the axes, shape (n, 2)."""
+    points = np.asarray(ax.transData.inverted().transform(ax.transAxes.transform(shares)))
+    return points[:, 0], points[:, 1]
+
+
+def _borders(x: Array, y: Array, bounds: list[Array], kinds: Array) -> Array:
+    """Sides of cells whose two kinds differ, as points (n, 2) with NaN between them."""
+    left, low = (np.concatenate([one[:1], mid]) for one, mid in zip((x, y), bounds, strict=True))
+    right, high = (np.concatenate([mid, one[-1:]]) for one, mid in zip((x, y), bounds, strict=True))
+    row, column = np.nonzero(kinds[:, 1:] != kinds[:, :-1])
+    upright = [bounds[0][column], low[row], bounds[0][column], high[row]]
+    row, column = np.nonzero(kinds[1:] != kinds[:-1])
+    flat = [left[column], bounds[1][row], right[column], bounds[1][row]]
+    ends = np.concatenate([np.stack(upright, -1), np.stack(flat, -1)]).reshape(-1, 2, 2)
+    return np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1).reshape(-1, 2)

@@ -380,7 +380,7 @@ def test_the_longest_report_and_that_of_a_structure_are_documents(name):
     found = ss.report(ss.read_rig(path), source=path).html
     text = words(found)
     assert len(found.encode()) <= 500_000
-    assert "Change preload" in text or "Change reed.tip angle φ" in text
+    assert "Change preload" in text or "Change tip normal stiffness k" in text
     assert ("structures move as their matrices say" in text) == ("reed" in name)
     assert ("tip oscillates: every" in text) == ("reed" in name)
     assert path.read_text() in html.unescape(found)  # with its comments, not as the program writes it

@@ -200,7 +200,7 @@ def _keep_inside(ax: Axes) -> None:
 
 
 def _number_decades(axis: Axis) -> None:
-    """Number every decade of a logarithmic axis of few decades, which low axes would pass over."""
+    """Number every decade of an upright logarithmic axis of few decades, which low axes would pass over."""
     low, high = sorted(axis.get_view_interval())
     few = axis.get_scale() == "log" and 0 < low < high <= low * 10**_FEW_DECADES
     if few and list(axis.get_majorticklocs()) and axis.get_minor_locator() is not None:
@@ -212,8 +212,8 @@ def fit_words(figure: Any) -> None:
     figure.draw_without_rendering()
     for axis in (one for ax in figure.axes for one in (ax.xaxis, ax.yaxis)):
         _put_power_in_unit(axis)
-        _number_decades(axis)
     for ax in figure.axes:
+        _number_decades(ax.yaxis)
         _keep_inside(ax)
         label = ax.yaxis.label
         share = ax.get_window_extent().height / (label.get_window_extent().height or 1.0)

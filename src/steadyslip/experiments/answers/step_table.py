@@ -341,9 +341,9 @@ def step_table(
     >>> record = ss.read_record("examples/data/made_velocity_step.csv")
     >>> fit = ss.fit(ss.lab_rig("slip"), record, starts=4)
     >>> print(ss.experiments.step_table(fit))
-                                                  a                  b                  d_c
-    ...velocity_step.csv, 20 s: 1 um/s to 3 um/s  0.01192 ± 8.5e-05  0.01495 ± 8.1e-05  10.06 ± 0.077 um  weakens
-    all together                                  0.01192 ± 8.5e-05  0.01495 ± 8.1e-05  10.06 ± 0.077 um  weakens
+                                                  a - b               a                  d_c
+    ...velocity_step.csv, 20 s: 1 um/s to 3 um/s  -0.00303 ± 2.2e-05  0.01192 ± 8.5e-05  10.06 ± 0.077 um  weakens
+    all together                                  -0.00303 ± 2.2e-05  0.01192 ± 8.5e-05  10.06 ± 0.077 um  weakens
     ...
     """
     plan = fit.plan

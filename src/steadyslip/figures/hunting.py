@@ -10,6 +10,8 @@ from steadyslip.core.palette import BLUE, GREY
 from steadyslip.figures.style import axis_label, display_unit, given_panels, new_panels
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 
+_LATER = 3.0  # times the time of the last strokes up to which an axis that then creeps to its target is drawn
+
 
 def hunting(result: Hunt, ax: Any = None) -> Any:
     """Plot error and force of the drive over time in two panels; grey: the target.
@@ -30,7 +32,9 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
     >>> axes[0].figure.savefig("hunting.svg")
     """
     panels = given_panels(new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0] if ax is None else ax, (2,), "two Axes")
-    across, seconds = display_unit("s", float(result.time[-1]) if len(result.time) else 1.0)
+    end = float(result.time[-1]) if len(result.time) else 1.0
+    until = min(end, _LATER * result.approached_at or end)  # the rest is a line on the target
+    across, seconds = display_unit("s", until)
     series = (
         (f"target less place{result.at_body}", result.error, result.unit),
         (result.force_label, result.force, result.force_unit),
@@ -41,5 +45,7 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
         axes.axhline(0.0, color=GREY, linewidth=0.8)
         axes.plot(result.time / across, values / factor, color=BLUE)
         axes.set_ylabel(axis_label(name, unit))
+    if until < end:
+        panels[1].set_xlim(0, until / across)
     panels[1].set_xlabel(axis_label("time", seconds))
     return panels

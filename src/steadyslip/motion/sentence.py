@@ -174,13 +174,17 @@ def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
 
 
 def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
-    """Last swing of each contact that swings more than half a run before, and goes on growing, by name."""
+    """Last swing of each contact that swings more than half a run before, and goes on growing, by name.
+
+    Beats that die out grow by turns, too, but not beyond those of the second quarter (the first has the disturbance).
+    """
     found = {}
     for name in dict.fromkeys(one.contact for one in events):
         peaks, troughs = _extremes(events, name, 0.5 * end)
         if min(len(peaks), len(troughs)) > 1 and not _settled(events, name, end):
             first, last = (peaks[i].velocity - troughs[i].velocity for i in (0, -1))
-            if last > first:
+            earlier = _sizes(*_extremes([one for one in events if one.time <= 0.5 * end], name, 0.25 * end))
+            if last > first and max(_sizes(peaks, troughs)) >= max(earlier, default=0.0):
                 period = peaks[-1].time - peaks[-2].time
                 found[name] = Swings(period, troughs[-1].velocity, peaks[-1].velocity, last / first - 1)
     return found

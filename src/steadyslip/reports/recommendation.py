@@ -100,7 +100,8 @@ def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str,
     first, wanted = rows[0], format_percent(BEYOND_EDGE)
     origin = "" if analysis.origin is None else f" Why it is unstable: {analysis.origin.words}."
     origin += _friction_is_not_all(analysis)
-    near = f" No edge is then nearer than {wanted}."
+    angles = any(one.unit == "rad" and one.edge for one in first.then.margins)
+    near = f" No edge is then nearer than {wanted}{', those of angles left aside' if angles else ''}."
     if first.distance < BEYOND_EDGE:
         near = f" One edge is even then nearer than the {wanted} that are recommended: that of {first.nearest}."
     alone = " Each row below is enough alone, the others unchanged." if len(rows) > 1 else ""
@@ -116,14 +117,15 @@ def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str,
 
 
 def _friction_is_not_all(analysis: Analysis) -> str:
-    """Sentence of a machine whose modes friction couples, where less friction alone does not make it stable."""
+    """Sentence of a machine that friction feeds by the normal force, where less of it does not make it stable."""
     origin, levels = analysis.origin, set(analysis.rig.of_kind("friction level"))
-    if origin is None or origin.kind != "coupling":
+    if origin is None or origin.kind not in ("coupling", "normal force"):
         return ""
     own = [one for one in analysis.margins if one.parameter in levels and f".{origin.name}." in one.parameter]
     if not own or any(edge.stable == "below" for one in own for edge in one.edges):
         return ""
-    return f" Less friction at {origin.name} alone does not make it stable: it has no edge within range."
+    why_not = "" if any(one.edges for one in own) else ": it has no edge within range"
+    return f" Less friction at {origin.name} alone does not make it stable{why_not}."
 
 
 def _made_certain(

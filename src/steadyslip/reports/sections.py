@@ -40,6 +40,7 @@ from steadyslip.verdict.judder import STEP, grown, motion_after
 from steadyslip.verdict.words import PACE, told_range
 
 CUT_SHORT = "too many steps"
+_NEARLY = 0.01  # share off steady sliding up to which a motion is told to slide steadily again
 SWINGS_DRAWN = 30  # swings in a figure 100 mm wide, 3 mm each: of more than twice as many only the last are drawn
 _LONGEST_UNIT = 12  # characters of a comment that may be a unit: N m s/rad has 9
 
@@ -132,7 +133,7 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
     shown = _last_swings(run) if unstable else run
     if shown is not run:
         over = f"Motion after this disturbance, over time: the last {SWINGS_DRAWN} swings of many."
-    words = f"The same motion in the phase plane{_course(run)}."
+    words = f"The same motion in the phase plane{_course(run, analysis.stable)}."
     drawn = (
         (column_html(lambda: figures.history(shown), over), over),
         (
@@ -164,13 +165,15 @@ def _last_swings(run: History) -> History:
     )
 
 
-def _course(run: History) -> str:
+def _course(run: History, stable: bool | None) -> str:
     """What a motion does in the phase plane, behind its name."""
     if run.status == BLOWN_UP:
         return ", which it leaves to the right"
     if run.status not in ("done", CUT_SHORT):
         return ", as far as it goes"
-    return ": what it circles is the cycle, if it settles on one" if run.sentence else ": it returns to steady sliding"
+    if run.sentence and (run.slip_events or not stable):
+        return ": what it circles is the cycle, if it settles on one"
+    return ": it returns to steady sliding"
 
 
 def _by_eigenvalues(analysis: Analysis) -> str:
@@ -205,13 +208,21 @@ def _told(run: History, analysis: Analysis) -> str:
         since = format_quantity(run.end - pieces[0].at, "s", DIGITS)
         before = run.sentence if run.slip_events else grown(run)
         return "; then ".join(filter(None, [before, f"{ended} ({since} after the disturbance began)"]))
-    if run.sentence:
+    if run.sentence and (run.slip_events or not analysis.stable):
         return run.sentence
     steady: Any = getattr(analysis, "steady", None)
     speeds = {f"{name}.slip_rate": one.slip_rate for name, one in steady.contacts.items()} if run.rig.contacts else {}
     off = max(abs(run[name][-1] / own - 1) for name, own in (speeds or {"v": run.rig.drive.velocity}).items())
     after = format_quantity(run.end, "s")
+    if off > _NEARLY:
+        left = f"no slip event; after {after} it is still {100 * off:.1g} % off steady sliding"
+        return f"{left}, and by its eigenvalues that {PACE['decays'].format(time=_half_time(analysis))}"
     return f"no slip event; after {after} it slides steadily again to within {max(100 * off, 1e-3):.1g} %"
+
+
+def _half_time(analysis: Analysis) -> str:
+    """Time in which the slowest small disturbance of a stable rig halves, in words."""
+    return format_quantity(math.log(2) / abs(max(one.real for one in analysis.eigenvalues)), "s")
 
 
 def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:

@@ -159,3 +159,13 @@ def test_a_step_of_the_target_does_not_kick_a_cascade_of_the_measurement(derivat
     found = ss.hunt(rig, ss.protocol.DisplacementStep(at=0.0, by=1e-4), until=2e-3)
     after = np.interp(1e-4, found.time, found.force)
     assert after == pytest.approx(2 * (30 + (1 / 0.02 if derivative == "error" else 0.0)) * 1e-4, rel=0.1)
+
+
+def test_an_axis_that_creeps_to_its_target_is_told_to_end_there():
+    """It "settles: within 13.93 mm of the target by 31.69 yr", and was there to 14 digits."""
+    found = ss.hunt(ss.read_rig("examples/hunting-axis.toml", ["friction.mu_static=1"]))
+    assert found.sentence.startswith("SETTLES on the target, within ")
+    late = np.abs(found.error[found.time >= found.approached_at])
+    assert late.max() <= max(abs(found.lowest), abs(found.highest)) * (1 + 1e-6)
+    assert found.approached_at < 1e3 < found.time[-1]
+    assert ss.figures.hunting(found)[0].get_xlim()[1] < 1e3

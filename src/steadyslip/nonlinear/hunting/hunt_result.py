@@ -127,7 +127,22 @@ class Hunt(ReadOnly):
             if not self.strokes and not there:
                 return f"DOES NOT MOVE: friction at rest holds it {size} from the target"
             return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
+        if self.approached_at < self._end:
+            after = format_quantity(self.approached_at, "s")
+            return f"SETTLES on the target{self._beside}, within {size} of it after {after}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
+
+    @property
+    def approached_at(self) -> float:
+        """Time (s) from which an axis that ends on its target is as near to it as in its last strokes.
+
+        Infinite for one that does not end there within the digits of a run.
+        """
+        away = np.abs(self.error)
+        if not len(away) or away[-1] > 2 * STILL * np.max(away):
+            return np.inf
+        farther = np.flatnonzero(away > max(abs(self.lowest), abs(self.highest)) * (1 + 1e-9))
+        return float(self.time[min(farther[-1] + 1, len(away) - 1)]) if len(farther) else 0.0
 
     @property
     def at_body(self) -> str:

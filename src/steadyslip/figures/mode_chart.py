@@ -89,8 +89,8 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
     for edge in found.edges:
         text = typeset(found.told(edge.value))
         axes[1].annotate(
-            text, (edge.value / factor, 1), xycoords=("data", "axes fraction"), xytext=(3, -3),
-            textcoords="offset points", va="top", fontsize="small",
+            text, (edge.value / factor, 1), xycoords=("data", "axes fraction"), xytext=(0, 2),
+            textcoords="offset points", ha="center", va="bottom", fontsize="small",
         )  # fmt: skip
     axes[1].axhline(0.0, color=BLACK, linewidth=1, label="_zero")
     if found.is_geometric:

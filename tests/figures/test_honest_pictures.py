@@ -18,7 +18,7 @@ from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.hunting import hunting
 from steadyslip.figures.map_axes import Scale, is_geometric
-from steadyslip.figures.style import AREA_WORD, EDGES, fit_words, save_with_footer
+from steadyslip.figures.style import AREA_WORD, EDGES, fit_words, plain_log_ticks, save_with_footer
 from steadyslip.maps.view.cut import _quantiles, _with_failures
 
 
@@ -242,4 +242,18 @@ def test_words_of_areas_stay_inside_low_axes(height, seen):
     assert text.get_visible() == seen
     if seen:
         assert frame.y0 - 1 <= box.y0 < box.y1 <= frame.y1 + 1  # pixels, as letters have whole sizes
+    plt.close(figure)
+
+
+@pytest.mark.parametrize(("high", "numbers"), [(30.0, {"1", "2", "5", "10", "20"}), (2e3, {1.0, 10.0, 100.0, 1000.0})])
+def test_upright_axes_of_few_decades_are_numbered(high, numbers):
+    figure, ax = plt.subplots(figsize=(3, 1.2))
+    ax.set_yscale("log")
+    ax.set_ylim(0.9, high)
+    if high < 100:
+        plain_log_ticks(ax.yaxis)
+    fit_words(figure)
+    figure.draw_without_rendering()
+    inside = [one for one in ax.yaxis.get_major_ticks() if 0.9 <= one.get_loc() <= high]
+    assert {one.label1.get_text() if high < 100 else one.get_loc() for one in inside} == numbers
     plt.close(figure)

@@ -200,10 +200,12 @@ def _keep_inside(ax: Axes) -> None:
 
 
 def _number_decades(axis: Axis) -> None:
-    """Number every decade of an upright logarithmic axis of few decades, which low axes would pass over."""
+    """Number every decade of an upright logarithmic axis of two to few decades, which low axes would pass over.
+
+    Shorter ones have numbers within their decades, by `plain_log_ticks`.
+    """
     low, high = sorted(axis.get_view_interval())
-    few = axis.get_scale() == "log" and 0 < low < high <= low * 10**_FEW_DECADES
-    if few and list(axis.get_majorticklocs()) and axis.get_minor_locator() is not None:
+    if axis.get_scale() == "log" and 0 < 100 * low <= high <= low * 10**_FEW_DECADES:
         axis.set_major_locator(LogLocator(numticks=_FEW_DECADES + 2))
 
 

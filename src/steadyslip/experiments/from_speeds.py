@@ -16,8 +16,8 @@ from steadyslip.core.records import role_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.fitting.speed_fit import fit_direction, fit_loop
 from steadyslip.experiments.fitting.speed_result import SpeedFit
+from steadyslip.experiments.measured.speed_headers import UNITS_OF_ROLES
 from steadyslip.experiments.measured.speeds import (
-    UNITS_OF_ROLES,
     SpeedTable,
     checked_option,
     is_loop,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -17,39 +16,26 @@ from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short
 from steadyslip.core.format import format_count
 from steadyslip.core.roles import Parameter
-from steadyslip.experiments.measured.columns import known_unit, listed, split_name
+from steadyslip.experiments.measured.columns import known_unit, listed
 from steadyslip.experiments.measured.formats import FORMATS, read_columns
 from steadyslip.experiments.measured.formats.table import Table
 from steadyslip.experiments.measured.formats.text import read_text
+from steadyslip.experiments.measured.speed_headers import (
+    SCATTER,
+    SPELLED,
+    UNITS_OF_ROLES,
+    direction_of,
+    misfit,
+    role_of,
+    roles_named,
+    split_bracket,
+    split_head,
+)
 from steadyslip.experiments.measured.table_questions import questions_of_table
-from steadyslip.experiments.measured.words_in_tables import BACKWARD, FORWARD, without_words
+from steadyslip.experiments.measured.words_in_tables import without_words
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
 FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
-UNITS_OF_ROLES = {
-    "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
-    "displacement": ("m", "rad"), "direction": ("1",),
-}  # fmt: skip
-"""Units of each role, the first where the file has none."""
-_WORDS = {
-    "direction": r"dir|direction|richtung|sense|sinn",
-    "load": r"load|normal|normalkraft|normalforce|last|preload|vorspann|vorspannung|fn|belastung|clamp|weight",
-    "torque": r"torque|moment|drehmoment|reibmoment|frictiontorque|tau|m|t|tf|mr",
-    "friction": r"mu|µ|μ|cof|reibwert|reibzahl|reibungszahl|coefficient|frictioncoefficient",
-    "force": r"force|kraft|reibkraft|reibungskraft|frictionforce|friction|f|ff|fr|fric|drag",
-    "speed": r"speed|velocity|vel|v|rate|geschw|geschwindigkeit|drehzahl|n|omega|ω|w|feed|vorschub|feedrate|qd|dq",
-    "displacement": r"displacement|disp|position|pos|x|s|weg|angle|winkel|deflection|presliding|q|phi|φ",
-}
-"""Words of headers by role."""
-_SPREAD = re.compile(
-    r"(?i)(?<![a-zäöü])(σ|sigma|std|stdev|sd|error|err|uncertainty|streuung|standardabweichung)(?![a-zäöü])"
-)
-"""Words of headers whose column is the scatter of another."""
-_SPELLED = {
-    "nm": "N m", "n·m": "N m", "n.m": "N m", "n*m": "N m", "mnm": "mN m", "nmm": "N mm", "ncm": "N cm", "knm": "kN m",
-    "u/min": "rpm", "min-1": "rpm", "1/min": "rpm", "r/min": "rpm", "rev/min": "rpm", "rps": "rev/s",
-    "min^-1": "rpm", "min⁻¹": "rpm",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -304,7 +290,7 @@ def read_loop(path: str | PathLike[str], **columns: Any) -> PreslidingLoop:
 def is_loop(path: str | PathLike[str]) -> bool:
     """True if a table has a column of displacement and none of speed."""
     table = _table(Path(path))
-    found = {_guess(*_head(name, apart)) for name, apart in zip(table.names, table.units, strict=True)}
+    found = {role_of(*split_head(name, apart)) for name, apart in zip(table.names, table.units, strict=True)}
     return "displacement" in found and "speed" not in found
 
 
@@ -318,7 +304,7 @@ def _table(path: Path) -> Table:
     notes: list[str] = []
 
     def plain(raw: bytes) -> bytes:
-        text, said = without_words(raw, lambda name: _needed(*_head(name, None)))
+        text, said = without_words(raw, lambda name: _needed(*split_head(name, None)))
         notes.extend(said)
         return text
 
@@ -332,16 +318,16 @@ def _table(path: Path) -> Table:
 
 def _needed(head: str, own: str | None) -> str | None:
     """Role of a column in a table of speeds or a loop; None of one that may be left out."""
-    role = _guess(head, own)
+    role = role_of(head, own)
     return None if role == "displacement" and own is None else role
 
 
 def _refuse_misfits(path: Path, role: str = "") -> None:
     """Refuse columns that are named like a speed, force, torque or load, or like one role, and have another unit."""
     table = _table(path)
-    heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
-    heads = [head if not role or role in _named(_bracketed(*head)[0]) else ("", None) for head in heads]
-    problems = [Problem(name, why) for name, head in zip(table.names, heads, strict=True) if (why := _misfit(*head))]
+    heads = [split_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
+    heads = [head if not role or role in roles_named(split_bracket(*head)[0]) else ("", None) for head in heads]
+    problems = [Problem(name, why) for name, head in zip(table.names, heads, strict=True) if (why := misfit(*head))]
     if problems:
         raise ParameterError(problems, title=str(path))
 
@@ -351,7 +337,7 @@ def _roles(
 ) -> tuple[dict[str, list[_Role]], list[str]]:
     """Columns of a file by role but those `without`, and notes; of friction there may be two, forward and backward."""
     table = _table(path)
-    heads = [_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
+    heads = [split_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
     chosen = {role: _asked(str(path), role, value, table.names, heads) for role, value in given.items()}
     taken = {place for place, _ in chosen.values() if place is not None}
     notes = list(table.notes)
@@ -359,16 +345,16 @@ def _roles(
     unused: list[str] = []
     for i, (name, (head, own)) in enumerate(zip(table.names, heads, strict=True)):
         asked = next((role for role, (place, _) in chosen.items() if place == i), None)
-        role = asked or (None if i in taken else _guess(head, own))
+        role = asked or (None if i in taken else role_of(head, own))
         role = None if role in without else role
-        if role is None and not _SPREAD.search(head) and np.any(np.isfinite(table.values[i])):
+        if role is None and not SCATTER.search(head) and np.any(np.isfinite(table.values[i])):
             unused.append(name)
         if role is None or (asked is None and chosen.get(role, (None, None))[0] is not None):
             continue
         stated = chosen.get(role, (None, None))[1] or own
         is_bare = stated is None
         if stated is None:
-            if wrong := _misfit(head, None):
+            if wrong := misfit(head, None):
                 raise _fault(str(path), name, wrong)
             stated = UNITS_OF_ROLES[role][0]
             if role not in ("friction", "direction"):
@@ -380,28 +366,14 @@ def _roles(
         if dimension == unit("kg")[1]:
             factor *= WEIGHT
             notes.append(f"load: kg press with {WEIGHT} N each")
-        found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, _side(head), is_bare))
+        found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, direction_of(head), is_bare))
     notes += [f"not used: column {name!r}" for name in unused]
     for role, several in found.items():
         if len(several) > 1 and not (role in ("force", "torque", "friction") and all(one.side for one in several)):
-            alike = [name for name, head in zip(table.names, heads, strict=True) if _guess(*head) == role]
+            alike = [name for name, head in zip(table.names, heads, strict=True) if role_of(*head) == role]
             message = f"several columns could be it: {listed(map(repr, alike))}; say which with {role}=NAME"
             raise _fault(str(path), role, message)
     return found, notes
-
-
-def _head(name: str, apart: str | None) -> tuple[str, str | None]:
-    """Name of a column without its unit, and its unit."""
-    head, own = split_name(name)
-    if own is None:
-        match = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name) or re.fullmatch(
-            r"(.+)[_ ,]([^_ ,]+)", name.strip()
-        )
-        spelled = match and (_SPELLED.get(match[2].strip().lower()) or known_unit(match[2]))
-        if match and spelled:
-            head, own = match[1].strip(), spelled
-    found = own or apart
-    return head.strip(), found and _SPELLED.get(found.lower(), found)
 
 
 def _asked(
@@ -418,102 +390,12 @@ def _asked(
         if known.count(text) == 1:
             return known.index(text), stated
     try:
-        spelled = _SPELLED.get(text.strip().lower()) or known_unit(text)
+        spelled = SPELLED.get(text.strip().lower()) or known_unit(text)
         if spelled and unit(spelled)[1] in [unit(one)[1] for one in UNITS_OF_ROLES[role]]:
             return None, spelled
     except QuantityError:
         pass
     raise _fault(source, role, f"got {value!r}; allowed: a column ({listed(map(repr, names))}) or a unit")
-
-
-def _guess(head: str, own: str | None) -> str | None:
-    """Role of a column by its name and unit; None if none is, or if they contradict each other."""
-    if _SPREAD.search(head):
-        return None
-    if _is_other(head, own):
-        return None
-    fits, named = list(UNITS_OF_ROLES), _named(head)
-    if own is not None and own != "1":
-        dimension = unit(own)[1]
-        fits = [role for role, allowed in UNITS_OF_ROLES.items() if dimension in [unit(one)[1] for one in allowed]]
-        fits = [role for role in fits if role != "direction" and (role != "friction" or role in named)]
-    if found := [role for role in named if role in fits]:
-        return found[0]
-    if own is not None and own != "1" and fits:
-        return "force" if "force" in fits else None if _misfit(head, own) else fits[0]
-    if _side(head):
-        return "force"
-    return None
-
-
-def _named(head: str) -> list[str]:
-    """Roles that the name of a column says, without its unit."""
-    words = {word for word in re.split(r"[^a-zµμφωäöüß]+", head.lower()) if word}
-    words.add(re.sub(r"[^a-zµμφωäöüß]", "", head.lower()))
-    return [role for role, pattern in _WORDS.items() if any(re.fullmatch(pattern, word) for word in words)]
-
-
-def _misfit(head: str, own: str | None) -> str:
-    """What is wrong with the unit of a column that is named like a speed, force, torque or load; empty if it fits.
-
-    Names of one letter say little: a mass may be m or t, a temperature T, a displacement s.
-    """
-    name, said = _bracketed(head, own)
-    kinds = [role for role in _named(name) if role in ("force", "torque", "speed", "load")]
-    if not said or said == "1" or not kinds or _is_letter(name) or _is_other(head, own):
-        return ""
-    lever = " cm" if "torque" in kinds else ""
-    good = " or ".join(one for role in kinds for one in UNITS_OF_ROLES[role])
-    instead = '; or give one load of all rows, --set load="3.2 kN"' if kinds == ["load"] else ""
-    try:
-        dimension = unit(said)[1]
-    except QuantityError:
-        return f"{said} is none of its units: write {good}{_MULTIPLIED.get(said[-1:], '')}{instead}"
-    if dimension in [unit(one)[1] for role in kinds for one in UNITS_OF_ROLES[role]]:
-        return ""
-    if dimension == unit("Pa")[1]:
-        return f"{said} is a pressure: multiply it by the area that it acts on, and write {good}{instead}"
-    if dimension.mass == 1 and not dimension.time:
-        return f"{said} is a mass: write kgf{lever} for the reading of a balance, which is 9.80665 N{lever}"
-    if dimension == unit("1")[1]:
-        return f"{said} is a share: multiply it by the rated value, and write {good}{instead}"
-    return f"{said} is none of its units: write {good}{instead}"
-
-
-_MULTIPLIED = {"A": "; multiply a current by the constant of the motor, N/A or N m/A",
-               "V": "; multiply a voltage by what the sensor has of it, such as N/V"}  # fmt: skip
-"""Advice by the last letter of a unit."""
-_TEMPERATURES = ("c", "k", "f", "degc", "degf", "celsius", "kelvin", "fahrenheit")
-
-
-def _bracketed(head: str, own: str | None) -> tuple[str, str]:
-    """Name of a column without a unit in brackets that is not known, and its unit or an empty text."""
-    bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", head)
-    return (bracket[1], own or bracket[2]) if bracket else (head, own or "")
-
-
-def _is_letter(name: str) -> bool:
-    """True for a name of one letter that may be of many things."""
-    return len(name) == 1 and name.lower() != "f"
-
-
-def _is_other(head: str, own: str | None) -> bool:
-    """True for a temperature, and for a name of one letter with a unit that no column of such tables has."""
-    name, said = _bracketed(head, own)
-    if said.lower().replace("°", "").replace("℃", "c") in _TEMPERATURES:
-        return True
-    if not said or said == "1" or not _is_letter(name):
-        return False
-    allowed = [unit(one)[1] for units in UNITS_OF_ROLES.values() for one in units]
-    return own is None or unit(own)[1] not in allowed
-
-
-def _side(head: str) -> int:
-    """1 for a name that says forward, -1 backward, 0 neither."""
-    words = [word for word in re.split(r"[\s_()\[\],.]+", head.lower()) if word]
-    words += [head[-1]] if head and head[-1] in "+-−–" else []
-    forward, backward = (any(re.fullmatch(side, word) for word in words) for side in (FORWARD, BACKWARD))
-    return int(forward) - int(backward)
 
 
 def _stacked(speed: Array, one: _Role, direction: list[_Role] | None) -> tuple[Array, Array]:

@@ -26,6 +26,7 @@ WANDERS = 1.3  # times its noise from sample to sample by which a displacement s
 MANY_SLIPS = 3  # slips and glitches of the sensor from which it is looked for too
 ROUNDS = 2  # of wave and lines in turn: lines without the wave have their changes where these are
 TURNS = 12  # of a place in terms of itself; each takes a share 2 pi amplitude / period of the error of the last
+STEPS = 20  # of a fit that starts from a linear one: a wave that is there takes 2 to 4, one that is not hundreds
 OUTLIER = 4.0  # standard deviations beyond which a sample counts for nothing
 AFTER, SETTLED = 0.05, 6.0
 """Share of a run, and lags of its servo, that its first samples last, in which the load point may still follow."""
@@ -48,7 +49,10 @@ def without_wave(record: Record) -> Record:
         return record
     course, parts = load, _first(record.time, moved, load, count)
     for _ in range(ROUNDS):
-        parts, place, error = _fitted(record.time, moved, course, parts)
+        fitted = _fitted(record.time, moved, course, parts)
+        if fitted is None:
+            return record
+        parts, place, error = fitted
         course = load_course(record.time, place)
         if course.curve is not None:
             return record
@@ -102,19 +106,27 @@ def _periods(time: Array, moved: Array, course: Course) -> float | None:
     return float(peak) if np.sum(near) > LEAST_SHARE * whole else None
 
 
-def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Array, Array, float]:
-    """Fit of a wave (parts with sine and cosine, m; period, m): parameters, place (n,), standard error of a part."""
+def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Array, Array, float] | None:
+    """Fit of a wave (parts with sine and cosine, m; period, m): parameters, place (n,), standard error of a part.
+
+    None where its period wanders off, as it does where there is no wave.
+    """
     lines, keep = _lines(time, course)
 
     for _ in range(2):  # the second without outliers of the first
         base = np.linalg.qr(lines[keep])[0]
 
         def left(parts: Array, base: Array = base, own: Array = moved[keep]) -> Array:
-            place = _place(own, parts)
-            return np.asarray(place - base @ (base.T @ place))
+            return _beside(_place(own, parts), base)
+
+        def slopes(parts: Array, base: Array = base, own: Array = moved[keep]) -> Array:
+            return _beside(_place_slopes(_place(own, parts), parts), base)
 
         scales = np.append(np.full(2, np.hypot(*start[:2])), start[2] ** 2 / np.ptp(moved))
-        start = least_squares(left, start, x_scale=scales, diff_step=1e-6, method="lm").x
+        found = least_squares(left, start, slopes, x_scale=scales, method="lm", max_nfev=STEPS)
+        if not found.success:
+            return None
+        start = found.x
         off = left(start)
         scale = MAD_TO_SIGMA * float(np.median(np.abs(off)))
         keep[keep] = np.abs(off) < OUTLIER * max(scale, 1e-300)
@@ -129,6 +141,21 @@ def _place(moved: Array, parts: Array) -> Array:
         angle = 2 * np.pi / period * place
         place = moved - sine * np.sin(angle) - cosine * np.cos(angle)
     return place
+
+
+def _place_slopes(place: Array, parts: Array) -> Array:
+    """Derivatives (n, 3) of the place by sine, cosine and period of the wave that is in what the sensor shows."""
+    sine, cosine, period = parts
+    angle = 2 * np.pi / period * place
+    own, other = np.sin(angle), np.cos(angle)
+    turned = 2 * np.pi / period * (sine * other - cosine * own)
+    found: Array = np.column_stack([-own, -other, turned * place / period]) / (1 + turned)[:, None]
+    return found
+
+
+def _beside(values: Array, base: Array) -> Array:
+    """What of `values` (n, ...) the orthonormal columns of `base` (n, k) do not have."""
+    return np.asarray(values - base @ (base.T @ values))
 
 
 def _first(time: Array, moved: Array, course: Course, count: float) -> Array:

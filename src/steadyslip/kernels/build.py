@@ -289,10 +289,7 @@ def driver_text(key: str, group: str) -> str:
 
 
 def _driver_modules(group: str) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for name in DRIVERS[group]:
-        found |= texts(ENTRIES[name][0].__name__)
-    return found
+    return texts(*(ENTRIES[name][0].__name__ for name in DRIVERS[group]))
 
 
 @lru_cache(maxsize=len(DRIVERS))

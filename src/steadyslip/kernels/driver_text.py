@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from importlib.resources import files
 from typing import Any, cast
 
@@ -29,6 +30,8 @@ _ENUMS = {
     enum.__name__: enum
     for enum in (Row, Setting, Cursor, Status, EventPlace, Kind, Sampled, Recorded, Final, Out, Held, Control, Turn)
 }
+_IMPORTED = re.compile(rf"^from ({re.escape(DRIVER)}\.\w+) import ", re.MULTILINE)
+"""Imports of a driver's module: parsing all of them for these would take a twentieth of a verdict's time."""
 _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 
@@ -38,18 +41,20 @@ def text_of(module: str) -> str:
     return files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
 
 
-def texts(module: str) -> dict[str, str]:
-    """Source text of a driver module and, before it, of those that it imports, by module name."""
+def texts(*modules: str) -> dict[str, str]:
+    """Source text of driver modules and, before each, of those that it imports, by module name."""
     found: dict[str, str] = {}
-    _gather(module, found)
+    for module in modules:
+        _gather(module, found)
     return found
 
 
 def _gather(module: str, found: dict[str, str]) -> None:
+    if module in found:
+        return
     text = text_of(module)
-    for node in ast.parse(text).body:
-        if isinstance(node, ast.ImportFrom) and is_driver(node.module) and node.module not in found:
-            _gather(str(node.module), found)
+    for imported in _IMPORTED.findall(text):
+        _gather(imported, found)
     found[module] = text
 
 

@@ -48,9 +48,7 @@ def transpiled(entries: Mapping[str, str]) -> str:
     NotAvailable
         If a module uses Python outside the subset; module and line are named.
     """
-    found: dict[str, str] = {}
-    for module in entries.values():
-        found |= texts(module)
+    found = texts(*entries.values())
     functions = {
         node.name
         for text in found.values()

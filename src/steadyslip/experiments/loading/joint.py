@@ -258,27 +258,33 @@ def _fitted(samples: SensorSamples, start: Array, responses: _Responses, extra: 
     """Robust nonlinear fit of times and, the last `extra` of `start`, of the response."""
     count, inside = len(start) - extra, samples.time[[1, -2]]  # beyond, a change would have no effect
     start = np.append(np.clip(start[:count], *inside), start[count:])
-    moved, _ = responses(samples.time, start)
-    linear, _, _ = _linear(samples, moved)
+    known: list[tuple[Array, Array, Array, Array]] = []  # slopes are asked for where residuals were
+
+    def response(own: Array) -> tuple[Array, Array, Array]:
+        if not known or not np.array_equal(own, known[0][0]):
+            moved, share = responses(samples.time, own)
+            known[:] = [(own.copy(), moved, share, joint_columns(samples, moved))]
+        return known[0][1:]
+
+    linear, _, _ = _linear(samples, response(start)[0])
     whole, fine = np.concatenate([start, linear]), samples.scale[:, None]
 
     def residuals(x: Array) -> Array:
         if np.any((x[:count] < inside[0]) | (x[:count] > inside[1])):
             return np.full(len(samples.time), OUTSIDE)
-        moved, _ = responses(samples.time, x[: len(start)])
-        return np.asarray((joint_columns(samples, moved) @ x[len(start) :] - samples.values) / samples.scale)
+        return np.asarray((response(x[: len(start)])[2] @ x[len(start) :] - samples.values) / samples.scale)
 
     def slopes(x: Array) -> Array:
         own, coefficients = x[: len(start)], x[len(start) :]
         jumps = coefficients[2 : 2 + count]
-        moved, share = responses(samples.time, own)
+        moved, share, columns = response(own)
         found = [-jumps * share]
         for k in range(count, count + extra):
             other = own.copy()
             other[k] += CHANGED
             ahead, _ = responses(samples.time, other)
             found.append(((ahead - moved) @ jumps / CHANGED)[:, None])
-        return np.asarray(np.hstack([*found, joint_columns(samples, moved)]) / fine)
+        return np.asarray(np.hstack([*found, columns]) / fine)
 
     done = least_squares(residuals, whole, slopes, x_scale="jac", loss="cauchy", f_scale=OUTLIER, max_nfev=EVALUATIONS)
     slope = slopes(done.x) / np.sqrt(1 + (done.fun / OUTLIER) ** 2)[:, None]

@@ -312,7 +312,7 @@ class _ChangeFit:
         fine = minimize_scalar(self._misfit, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
         duration, least = float(fine.x), float(fine.fun) / self.inflation
         inside = np.abs(self.time - self.meet) <= 0.5 * duration
-        unlike = self._misfit(duration, inside) > 0.5 * OUTLIER * max(int(np.sum(inside)), 1)
+        unlike = self._misfit(duration, outside=False) > 0.5 * OUTLIER * max(int(np.sum(inside)), 1)
         if misfits[0] - least <= RAMP_GAIN or unlike:
             beyond = int(np.argmax(misfits > misfits[0] + OUTLIER))
             return 0.0, 0.0, float(grid[beyond - 1]) if beyond else float(grid[-1])
@@ -320,23 +320,34 @@ class _ChangeFit:
         ends = (grid[near[0]], grid[near[-1]]) if len(near) else (low, high)
         return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)  # for safety
 
-    def _misfit(self, duration: float, rows: Array | slice = slice(None)) -> float:
-        """Chi squared of a ramp between the two lines, robust against glitches."""
-        lines = self._lines()
-        since = self.time - (self.meet - 0.5 * duration)
-        bend = lines[0] + 0.5 * (self.rates[1] - self.rates[0]) * since**2 / max(duration, 1e-300)
-        model = np.where(since <= 0, lines[0], np.where(since >= duration, lines[1], bend))
-        return self._robust(self.displacement - model, rows)
+    def _misfit(self, duration: float, outside: bool = True) -> float:
+        """Chi squared of a ramp between the two lines, or of the samples within it, robust against glitches."""
+        begin = self.meet - 0.5 * duration
+        first, last = np.searchsorted(self.time, begin, "right"), np.searchsorted(self.time, begin + duration)
+        own = slice(first, max(first, last))
+        since = self.time[own] - begin
+        bend = self._lines[0][own] + 0.5 * (self.rates[1] - self.rates[0]) * since**2 / max(duration, 1e-300)
+        inside = float(np.sum(self._costs(self.displacement[own] - bend)))
+        if not outside:
+            return inside
+        before, after = self._costs_of_lines
+        return inside + float(before[own.start] + after[-1] - after[own.stop])
 
+    @cached_property
     def _lines(self) -> list[Array]:
-        """Displacement on the lines before and after."""
+        """Displacement (n,) on the lines before and after."""
         t = self.time - self.origin
         return [level + rate * t for level, rate in zip(self.levels, self.rates, strict=True)]
 
-    def _robust(self, deviations: Array, rows: Array | slice = slice(None)) -> float:
+    @cached_property
+    def _costs_of_lines(self) -> list[Array]:
+        """Chi squared of the samples before each, (n + 1,), on the line before and on that after."""
+        return [np.append(0.0, np.cumsum(self._costs(self.displacement - line))) for line in self._lines]
+
+    def _costs(self, deviations: Array) -> Array:
+        """Chi squared of each deviation (n,), less than its square where that is large."""
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
-        squares = (deviations[rows] / scale) ** 2
-        return float(OUTLIER * np.sum(np.log1p(squares / OUTLIER)))
+        return np.asarray(OUTLIER * np.log1p((deviations / scale) ** 2 / OUTLIER))
 
 
 def _levels(run: Run, edge: int) -> list[float]:

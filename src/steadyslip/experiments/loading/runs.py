@@ -405,8 +405,8 @@ def fitted_run(run: Run, time: Array, displacement: Array, lasting: float = 0.0)
     Levels are told apart by the scatter of the samples, or by `lasting` (see `straight_runs`) if that is more.
     """
     groups = list(range(len(run.members)))
+    rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement, lasting)
     for _ in range(3):
-        rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement, lasting)
         merged = [0]
         for k in range(1, len(run.members)):
             one, other = groups[k - 1], groups[k]
@@ -416,7 +416,7 @@ def fitted_run(run: Run, time: Array, displacement: Array, lasting: float = 0.0)
         if merged == groups:
             break
         groups = merged
-    rate, levels, *_ = _robust_line(run, groups, time, displacement, lasting)
+        rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement, lasting)
     return Run(run.members, rate, groups, levels)
 
 

@@ -11,11 +11,12 @@ from scipy.signal import lfilter
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.commanded import CommandedInputs
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.loading import runs
-from steadyslip.experiments.loading.kinks import load_course, smooth_load
+from steadyslip.experiments.loading.kinks import _Lines, load_course, smooth_load
 from steadyslip.experiments.loading.loading import Loading, shifted
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
-from steadyslip.experiments.loading.runs import Run, _joined_across_flanks, fitted_run
+from steadyslip.experiments.loading.runs import Run, _joined_across_flanks, fitted_run, straight_runs
 
 STEPS = [(40.3, 1.0, 3.0), (80.1, 3.0, 10.0), (121.7, 10.0, 3.0), (160.2, 3.0, 1.0)]
 HOLDS = [(30.3, 1.0, 0.0), (40.3, 0.0, 1.0), (90.1, 1.0, 0.0), (120.2, 0.0, 1.0)]
@@ -294,6 +295,48 @@ def test_tables_say_how_they_change():
             rows = table.segments[0]
             k = np.flatnonzero((rows[:, 0] <= t) & (t < rows[:, 1]))[-1]
             assert table.input_rates[0, direction, k, 0] == pytest.approx(change, rel=0.05, abs=1e-12)
+
+
+def test_given_durations_change_no_motion():
+    """Without derivatives in durations tables have fewer rows; friction and all other derivatives are the same."""
+    ramp = ss.protocol.VelocityRamp(at=60.0, to=5e-6, duration=1.5)
+    found = lab.columns(lab.rig(), ss.Protocol(pieces=(ramp,), until=150.0), count=2000)
+    found["displacement"] = found["displacement"] + 5e-8 * np.random.default_rng(4).standard_normal(2000)
+    plan = make_plan(lab.rig(), ss.record_from_arrays(**found))
+    whole, given = plan.comparison(), plan.comparison(given=["step.1.duration"])
+    names = [one.name for one in whole.space.unknowns]
+    place, (part,) = names.index("step.1.duration"), whole.parts
+    z = whole.space.coordinates(
+        np.array([[part.rig.parameters()[n].value if "step" not in n else 60.0 for n in names]])
+    )
+    z = np.repeat(z, 3, axis=0)
+    z[:, place] = np.array([0.3, 1.5, 2.0]) / whole.space.unknowns[place].size
+    values = whole.space.values(z)
+    assert given.parts[0].table(values).segments.shape[1] < 0.1 * part.table(values).segments.shape[1]
+    (friction, slopes), (same, others) = whole.model(z), given.model(z)
+    assert np.ptp(friction, axis=0).max() > 1e-4
+    np.testing.assert_allclose(same, friction, atol=1e-7)
+    assert not np.any(others[:, place])
+    kept = np.arange(len(names)) != place
+    size = np.max(np.abs(slopes), axis=2, keepdims=True)
+    np.testing.assert_allclose((others / size)[:, kept], (slopes / size)[:, kept], atol=1e-3)
+
+
+def test_misfit_of_a_ramp_is_that_of_all_its_samples():
+    time = np.arange(0.0, 100.0, 0.02)
+    rng = np.random.default_rng(3)
+    x = measured(time, [(40.3, 1.0, 3.0)], 0.03, 2, 0, 3, ramp=1.0)
+    (change,) = _Lines(time, x, straight_runs(time, x)).kinks
+    for duration in rng.uniform(0.0, change.reach, 20):
+        begin = change.meet - 0.5 * duration
+        since = np.clip(change.time - begin, 0.0, duration)
+        later = np.maximum(change.time - begin - duration, 0.0)
+        line = change.levels[0] + change.rates[0] * (change.time - change.origin)
+        model = line + (change.rates[1] - change.rates[0]) * (0.5 * since**2 / duration + later)
+        costs = 9 * np.log1p(((change.displacement - model) / change.strays) ** 2 / 9)
+        inside = (change.time > begin) & (change.time < begin + duration)
+        assert change._misfit(duration) == pytest.approx(costs.sum(), rel=1e-9)
+        assert change._misfit(duration, outside=False) == pytest.approx(costs[inside].sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize(

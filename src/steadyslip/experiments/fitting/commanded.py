@@ -34,10 +34,16 @@ class CommandedInputs:
         True if the contact has pores into which the pressure drains; otherwise pore pressure columns_and_signs at once.
     lag : bool
         True to shift all changes by one free time.
+    given : sequence of int
+        Places in `free` of durations that are given: tables have no derivatives in them.
     """
 
-    def __init__(self, loading: Loading, time: Array, pressed: bool, pores: bool = False, lag: bool = False) -> None:
-        self.loading, self.time, self.lag, self.resting = loading, time, lag, resting_rate(loading)
+    def __init__(
+        self, loading: Loading, time: Array, pressed: bool, pores: bool = False, lag: bool = False,
+        given: Sequence[int] = (),
+    ) -> None:  # fmt: skip
+        self.loading, self.time, self.lag, self.given = loading, time, lag, given
+        self.resting = resting_rate(loading)
         self.courses: dict[str, Course] = {}
         if loading.load is not None:
             self.courses["load"] = loading.load
@@ -67,8 +73,9 @@ class CommandedInputs:
             return np.union1d(self.time, self._cuts())
         held = np.zeros(len(self.time), dtype=bool)
         held[[0, -1]] = True
-        for _, _, change in self.changes:
-            if change.stretches:  # derivatives in its duration are constant on each row
+        for _, i, what in self.moved:
+            if what == "duration":  # derivatives in it are constant on each row
+                change = self.changes[i][2]
                 held |= (self.time >= change.earliest) & (self.time <= change.latest + change.longest)
         return np.asarray(self.time[held])
 
@@ -115,22 +122,56 @@ class CommandedInputs:
     def _fixed_table(self) -> InputTable:
         return self._table(np.empty((1, 0)), 0, 0)
 
+    @cached_property
+    def moved(self) -> list[tuple[int, int, str]]:
+        """Free times in which tables have derivatives: index among the values, then as in `free`."""
+        return [(k, i, what) for k, (i, what) in enumerate(self.free) if k not in self.given]
+
+    @cached_property
+    def _times_of_ramps(self) -> Array:
+        """Begin (s) of each ramp at the time of its change, then after that, and its duration, (3, ramps)."""
+        return (
+            np.array([(self.changes[i][2].time, since, length) for i, (since, length, _) in self.ramps])
+            .reshape(-1, 3)
+            .T
+        )
+
+    @cached_property
+    def _ending(self) -> Array:
+        """Places of ramps that last, whose ends are nodes too."""
+        return np.flatnonzero(self._times_of_ramps[2] > 0)
+
+    @cached_property
+    def _moves(self) -> Array:
+        """Rates (moved, nodes) of nodes that are no samples: begins and ends of ramps, then of a rest."""
+        ending = self._ending
+        ramps = len(self.ramps) + len(ending)
+        found = np.zeros((len(self.moved), ramps + (2 if self.resting is not None else 0)))
+        for row, (_, i, what) in zip(found, self.moved, strict=True):
+            if what == "lag":
+                row[:ramps] = 1.0
+            elif what == "hold":
+                row[-1] = -1.0
+            else:
+                own = self._ramps_of(i)
+                row[own] = what == "at"
+                row[len(self.ramps) + np.flatnonzero(np.isin(ending, own))] = 1.0
+        return found
+
     def _table(self, times: Array, first: int, directions: int) -> InputTable:
         jobs = len(times)
-        since, ramped, _ = np.array([ramp for _, ramp in self.ramps]).reshape(-1, 3).T
-        begins = np.tile([self.changes[i][2].time for i, _ in self.ramps], (jobs, 1)) + since
-        lengths = np.tile(ramped, (jobs, 1))
+        at, since, lasts = self._times_of_ramps
+        begins, lengths = np.tile(at + since, (jobs, 1)), np.tile(lasts, (jobs, 1))
         for k, (i, what) in enumerate(self.free):
+            own = self._ramps_of(i)
             if what == "at":
-                begins[:, self._ramps_of(i)] = times[:, k : k + 1] + since[self._ramps_of(i)]
+                begins[:, own] = times[:, k : k + 1] + since[own]
             elif what == "duration":
-                lengths[:, self._ramps_of(i)] = times[:, k : k + 1]
+                lengths[:, own] = times[:, k : k + 1]
             elif what == "lag":
                 begins = begins + times[:, k : k + 1]
-        ramps = np.flatnonzero(ramped > 0)
         low, high = float(self.time[0]), float(self.time[-1])
-        events = np.hstack([begins, (begins + lengths)[:, ramps]])
-        inside = (events > low) & (events < high)
+        events = np.hstack([begins, (begins + lengths)[:, self._ending]])
         before = np.empty((jobs, 0))
         if self.resting is not None:  # steady sliding, then a hold that ends where the record begins
             before = low - times[:, -1:] - np.array([[SLIDING_SHARE * (high - low), 0.0]])
@@ -139,27 +180,18 @@ class CommandedInputs:
         moving = nodes[:, : nodes.shape[1] - len(self.nodes)]
         curves = {channel: self._curve_values(channel, moving, order) for channel in self._curves}
         nodes = np.take_along_axis(nodes, order, axis=1)
-        count = events.shape[1] + before.shape[1]
         rows = np.zeros((jobs, nodes.shape[1] - 1, 3 + 2 * self.inputs))
         rows[:, :, 0], rows[:, :, 1] = nodes[:, :-1] - low, nodes[:, 1:] - low
         self._fill(rows, nodes, begins, lengths, curves)
-        if not directions or not self.free:
+        if not directions or not self.moved:
             return InputTable(rows, self.times)
-        moves = np.zeros((jobs, directions, count))
-        for k, (i, what) in enumerate(self.free):
-            if what == "lag":
-                moves[:, first + k, : events.shape[1]] = 1.0
-            if what == "hold":
-                moves[:, first + k, -1] = -1.0
-            if what == "at":
-                moves[:, first + k, self._ramps_of(i)] = 1.0
-            if i >= 0:
-                moves[:, first + k, len(self.ramps) + np.flatnonzero(np.isin(ramps, self._ramps_of(i)))] = 1.0
-        moves[:, :, : events.shape[1]] *= inside[:, None, :]
+        count = moving.shape[1]
+        moves = np.tile(self._moves, (jobs, 1, 1))
+        moves[:, :, : events.shape[1]] *= ((events > low) & (events < high))[:, None, :]
         event = order[:, :-1]
         rates = np.zeros((jobs, directions, event.shape[1]))
         job, row = np.nonzero(event < count)
-        rates[job, :, row] = moves[job, :, event[job, row]]
+        rates[job, first : first + len(self.moved), row] = moves[job, :, event[job, row]]
         changing = self._input_rates(nodes, begins, lengths, first, directions)
         return InputTable(rows, self.times, rates, changing)
 
@@ -226,7 +258,7 @@ class CommandedInputs:
             return np.zeros((1, 0, 0, self.inputs))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
         rates = np.zeros((len(nodes), directions, middle.shape[1], self.inputs))
-        for k, (place, what) in enumerate(self.free):
+        for k, (_, place, what) in enumerate(self.moved):
             for j in range(len(self.ramps)) if what == "lag" else self._ramps_of(place):
                 i, (_, ramped, part) = self.ramps[j]
                 channel, _, change = self.changes[i]

@@ -45,6 +45,8 @@ class RecordPart:
         One over the standard deviation of each sample, up to a common factor.
     rig_indices, time_indices, begin_indices, trend_indices : tuple of int
         Indices among the unknowns of the rig's parameters, free times, initial state and trend coefficients.
+    given_indices : tuple of int
+        Of the free times, those that are given for each motion: the model has no derivatives in them.
     trend : ndarray (terms, n)
         Factors of the trend coefficients.
     known_begin : tuple of float
@@ -63,6 +65,12 @@ class RecordPart:
     trend_indices: tuple[int, ...]
     trend: Array
     known_begin: tuple[float, ...] = ()
+    given_indices: tuple[int, ...] = ()
+
+    @cached_property
+    def moved_indices(self) -> tuple[int, ...]:
+        """Indices among the unknowns of the free times in which the model has derivatives."""
+        return tuple(place for place in self.time_indices if place not in self.given_indices)
 
     def begin(self, values: Array) -> Array:
         """Initial differences from steady sliding (m, k) at values (m, p) of the unknowns: known, or free."""
@@ -72,7 +80,7 @@ class RecordPart:
 
     def table(self, values: Array, sensitive: bool = True) -> InputTable:
         first = len(self.rig_indices)
-        directions = first + len(self.time_indices) if sensitive else 0
+        directions = first + len(self.moved_indices) if sensitive else 0
         return self.inputs.table(values[:, list(self.time_indices)], first, directions)
 
     @cached_property
@@ -206,7 +214,7 @@ class Comparison(DataComparison):
             found = part.forward.run(part.table(values), values[:, places], slopes[:, places], part.begin(values))
             predicted[:, where] = found[:, 0]
             jacobian[:, places, where] = found[:, 1 : 1 + len(places)]
-            for k, place in enumerate((*part.time_indices, *begin), start=1 + len(places)):
+            for k, place in enumerate((*part.moved_indices, *begin), start=1 + len(places)):
                 jacobian[:, place, where] = found[:, k] * slopes[:, place, None]
             for row, place in zip(part.trend, part.trend_indices, strict=True):
                 predicted[:, where] += values[:, place, None] * row

@@ -126,7 +126,7 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most
             known, tried[i] = values.get(one.name, none), 1.0 if none < one.high else -1.0
         here[i], idle[i] = (float(one.coordinate(known if value is None else value)) for value in (None, none))
     budget = Budget.of_fit(sum(map(len, own.records)), len(space))
-    comparison = own.comparison(Effort(patience=ROUGH_PATIENCE, budget=budget))
+    comparison = own.for_trial().comparison(Effort(patience=ROUGH_PATIENCE, budget=budget))
     low, high = search_bounds(comparison.parts, features_of(comparison.parts), space)
 
     def minima(begin: Array, held: Array | None) -> Minima:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -39,6 +40,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
 FRICTION_SIZE = 0.01  # natural size of an initial difference of friction from steady sliding
+TRIAL_RTOL = 1e-6  # relative error per step in trials: of friction about 1e-8, far below the scatter of any record
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,10 @@ class Plan:
             found += trend_unknowns(i if several else None, self.trend, self.offset)
         return Space(tuple(found))
 
+    def for_trial(self) -> Plan:
+        """The same plan for short fits beside another."""
+        return replace(self, rtol=max(self.rtol, TRIAL_RTOL))
+
     def beginning(self, i: int) -> Beginning:
         """What is known of how record `i` begins, for the memories that the law has; nothing if it is not given."""
         return self.beginnings[i].of(self.initial_sizes) if self.beginnings else Beginning({})
@@ -159,13 +165,13 @@ class Plan:
             return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)
 
-    def comparison(self, effort: Effort | None = None) -> Comparison:
-        """Comparison of the records with the compiled model."""
+    def comparison(self, effort: Effort | None = None, given: Collection[str] = ()) -> Comparison:
+        """Comparison of the records with the compiled model, without derivatives in the durations named in `given`."""
         space, effort = self.space(), effort or Effort()
-        parts = tuple(self._part(i, record, space, effort) for i, record in enumerate(self.records))
+        parts = tuple(self._part(i, record, space, effort, given) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
 
-    def _part(self, i: int, record: Record, space: Space, effort: Effort) -> RecordPart:
+    def _part(self, i: int, record: Record, space: Space, effort: Effort, given: Collection[str]) -> RecordPart:
         rig, pressed = self.driven(record, i)
         places: dict[str, list[int]] = {"rig": [], "time": [], "initial": [], "trend": []}
         for place, one in enumerate(space.unknowns):
@@ -177,13 +183,16 @@ class Plan:
         times = [space.unknowns[place].parameter for place in places["time"]]
         begins = [space.unknowns[place].parameter.partition(".")[2] for place in places["initial"]]
         known = self.beginning(i).values
-        forward = Forward(rig, names, self.rtol, len(times), begins or [*known], effort=effort, begins_free=not known)
+        held = [k for k, place in enumerate(places["time"]) if space.unknowns[place].name in given]
+        forward = Forward(
+            rig, names, self.rtol, len(times) - len(held), begins or [*known], effort=effort, begins_free=not known
+        )
         inputs: Any
         moved: Array | None = None
         if self.follows:
             pressing = self.pressed and record.normal is not None
             pores = rig.contact.has_pores() and self.loading[i].pore is not None
-            inputs = CommandedInputs(self.loading[i], record.time, pressing, pores, self.lag)
+            inputs = CommandedInputs(self.loading[i], record.time, pressing, pores, self.lag, held)
             load = self.loading[i].load
             moved = load.integral(record.time) if load is not None and self.trend else None
         elif self.protocol is None:
@@ -198,6 +207,7 @@ class Plan:
             record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
             tuple(places["initial"]), tuple(places["trend"]),
             trend_rows(record, self.trend, self.offset, self.trend_axis, moved), tuple(known.values()),
+            tuple(places["time"][k] for k in held),
         )  # fmt: skip
 
     def driven(self, record: Record, i: int) -> tuple[Slider, Array | None]:

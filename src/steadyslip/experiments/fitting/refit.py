@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,11 +64,11 @@ def driven_as_measured(
     return dict(zip((u.name for u in space.unknowns), map(float, space.values(found.coordinates[0])), strict=True))
 
 
-def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) -> Minima:
-    """Minima from starting points z (m, p), within the work of one search."""
+def _minimised(plan: Plan, z: Array, low: Array, high: Array, given: Collection[str] = (), **options: Any) -> Minima:
+    """Minima from starting points z (m, p), with durations `given` in each, within the work of one search."""
     samples = sum(len(record) for record in plan.records)
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
-    comparison = plan.comparison(Effort(budget=budget))
+    comparison = plan.for_trial().comparison(Effort(budget=budget), given)
     return minimise(lambda x, _: comparison.residuals(x), z, low, high, stop=allowance, **options)
 
 
@@ -105,7 +105,8 @@ def with_ramps(
     lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
     near = {"damping": DAMPING_NEAR, "known": wanted}
     # with a larger tolerance searches end along flat valleys
-    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8, **near)
+    given = [space.unknowns[k].name for k in lengths]
+    found = _minimised(plan, z, lows, highs, given, most=40, held=held, tolerance=1e-8, **near)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
     return tuple(
         RampFit(share, float(ssq), dict(zip(names, map(float, row), strict=True)))

@@ -223,7 +223,7 @@ def _from_minimum(
 
     Searches end early that are not about to reach the sum of squares `wanted`.
     """
-    space, comparison = own.space(), own.comparison(effort)
+    space, comparison = own.space(), own.for_trial().comparison(effort)
     begin = space.coordinates(np.array([values.get(one.name, 0.0) for one in space.unknowns]))
     added = np.array([one.parameter == "lag" and one.name not in values for one in space.unknowns])
     z = begin + np.outer(lags if np.any(added) else [0.0], added)

@@ -322,6 +322,20 @@ def test_given_durations_change_no_motion():
     np.testing.assert_allclose((others / size)[:, kept], (slopes / size)[:, kept], atol=1e-3)
 
 
+@pytest.mark.parametrize("seed", range(1, 8))
+def test_a_brief_hold_is_seen_though_the_sensor_wanders_in_another(seed):
+    """Each stretch has its own noise; that of the other hides a hold of a second."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 300.0, 0.04)
+    changes = [(60.0, 10.0, 0.0), (60.9, 0.0, 10.0), (150.0, 10.0, 0.0), (200.0, 0.0, 10.0)]
+    x = 1e-6 * moved(time, changes) + 4e-8 * rng.standard_normal(len(time))
+    other = (time > 150) & (time < 200)
+    x[other] += 3e-7 * lfilter([np.sqrt(1 - 0.99**2)], [1, -0.99], rng.standard_normal(np.sum(other)))
+    found = load_course(time, x).changes
+    assert [one.time for one in found] == pytest.approx([at for at, *_ in changes], abs=0.1)
+    assert [one.after for one in found] == pytest.approx([0.0, 1e-5, 0.0, 1e-5], abs=1e-7)
+
+
 def test_misfit_of_a_ramp_is_that_of_all_its_samples():
     time = np.arange(0.0, 100.0, 0.02)
     rng = np.random.default_rng(3)
@@ -388,7 +402,8 @@ def test_a_flank_of_a_glitch_is_no_change_of_rate(offset):
     places = np.searchsorted(time, [0.0, 48.0, 48.4, 49.0, 100.0]).tolist()
     pieces = list(pairwise(places))
     runs = [fitted_run(Run(members), time, x) for members in (pieces[:2], pieces[2:3], pieces[3:])]
-    assert len(_joined_across_flanks(runs, time, x, 3e-8)) == (1 if offset == 0.0 else 3)
+    noise = np.full(len(time), 3e-8)
+    assert len(_joined_across_flanks(runs, time, x, noise)) == (1 if offset == 0.0 else 3)
 
 
 def test_a_brief_fast_run_among_very_many_samples_is_one(monkeypatch):

@@ -51,8 +51,7 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
         return smooth_load(time, displacement)
     lines = _Lines(time, displacement, runs)
     if max(lines.inflation) > LASTING:  # noise that looks like slips and glitches of the sensor
-        lasting = max(size * float(np.sqrt(many)) for size, many in zip(lines.strays, lines.inflation, strict=True))
-        others = straight_runs(time, displacement, lasting)
+        others = straight_runs(time, displacement, lines.lasting)
         same = [one.members for one in others] == [one.members for one in lines.runs]
         if not same and _piecewise_linear(others, time):
             lines = _Lines(time, displacement, others)
@@ -81,6 +80,17 @@ class _Lines:
             _ChangeFit(time, displacement, before, after, pair, max(scales), max(worths))
             for (before, after), pair, scales, worths in zip(*beside, strict=True)
         ]
+
+    @property
+    def lasting(self) -> Array:
+        """Standard deviation (n,), m, of independent noise that hides as much as that around each sample does.
+
+        The most of its run and the two beside it: where friction moves the sensor, the noise of one has none.
+        """
+        own = np.array(self.strays) * np.sqrt(self.inflation)
+        around = np.max([np.pad(own, 1)[k : k + len(own)] for k in range(3)], axis=0)
+        middles = [0.5 * (self.time[a.last - 1] + self.time[b.first]) for a, b in pairwise(self.runs)]
+        return np.asarray(around[np.searchsorted(middles, self.time)])
 
     def course(self, joint: JointFit | None, blurred: bool) -> Course:
         """Course of steps and ramps, or of changes that a joint fit found to be followed late."""

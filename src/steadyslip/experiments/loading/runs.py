@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import reversed_column, run_at_start
-from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, ranges_of_means, split
+from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, ranges_of_means, split, typical
 
 RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
 LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
@@ -80,7 +80,7 @@ class Run:
 class _Pieces:
     """Lines through ranges of samples, with their errors."""
 
-    def __init__(self, time: Array, values: Array, ends: list[tuple[int, int]], noise: float) -> None:
+    def __init__(self, time: Array, values: Array, ends: list[tuple[int, int]], noise: Array) -> None:
         self.ends = ends
         count = len(ends)
         self.begin = np.array([time[i] for i, _ in ends])
@@ -94,7 +94,8 @@ class _Pieces:
             spreads[k] = max(float(np.sum((t - t.mean()) ** 2)), 1e-300)
             self.slope[k] = float(np.sum((t - t.mean()) * (x - x.mean()))) / spreads[k]
             strays[k] = float(np.std(x - x.mean() - self.slope[k] * (t - t.mean())))
-        self.usual = max(noise, float(np.average(strays, weights=self.size)))
+        usual = float(np.average(strays, weights=self.size))
+        self.usual = np.maximum([typical(noise[i:j]) for i, j in ends], usual)
         self.slope_error = self.usual / np.sqrt(spreads)
         self.level_error = self.usual / np.sqrt(self.size)
         self.duration = self.end - self.begin
@@ -103,24 +104,25 @@ class _Pieces:
         self.lengths = np.maximum(self.duration / self.span, np.abs(self.slope) * self.duration / self.extent)
 
 
-def straight_runs(time: Array, displacement: Array, lasting: float = 0.0) -> list[Run]:
+def straight_runs(time: Array, displacement: Array, lasting: Array | None = None) -> list[Run]:
     """Runs of a displacement, in order of time; neighbours differ in rate.
 
     Parameters
     ----------
     time, displacement : ndarray (n,)
         s, m.
-    lasting : float
+    lasting : ndarray (n,), optional
         Standard deviation (m) of independent noise of each sample that hides as much as that of the sensor does, where
         it is correlated and the difference of neighbours shows a part of it only.
     """
+    lasting = np.zeros(len(time)) if lasting is None else lasting
     step = -(-len(time) // COARSE)
     if step > 1:
         starts, brief = ranges_of_means(displacement, step, COARSE)
         counts = np.diff(starts, append=len(time))
         own = displacement_noise(time, displacement) if brief else 0.0
-        rough, means = (np.add.reduceat(values, starts) / counts for values in (time, displacement))
-        runs = _runs_of(rough, means, max(lasting / np.sqrt(step), own))
+        rough, means, hidden = (np.add.reduceat(values, starts) / counts for values in (time, displacement, lasting))
+        runs = _runs_of(rough, means, np.maximum(hidden / np.sqrt(step), own))
         ends = np.append(starts, len(time)).tolist()
         for run in runs:
             run.members = [(ends[i], ends[j]) for i, j in run.members]
@@ -128,9 +130,9 @@ def straight_runs(time: Array, displacement: Array, lasting: float = 0.0) -> lis
     return _runs_of(time, displacement, lasting)
 
 
-def _runs_of(time: Array, displacement: Array, lasting: float) -> list[Run]:
+def _runs_of(time: Array, displacement: Array, lasting: Array) -> list[Run]:
     """Runs of a displacement of few samples."""
-    noise = max(displacement_noise(time, displacement), lasting)
+    noise = np.maximum(displacement_noise(time, displacement), lasting)
     pieces = _Pieces(time, displacement, split(time, displacement, noise, linear=True), noise)
     groups = _with_holds(_segmented(pieces), pieces)
     count = len(groups) + 1
@@ -138,12 +140,13 @@ def _runs_of(time: Array, displacement: Array, lasting: float) -> list[Run]:
         count = len(groups)
         groups = _joined_across_wander(_without_glitches(_joined_by_rate(groups, pieces), pieces), pieces)
     runs = [fitted_run(Run([pieces.ends[k] for k in members]), time, displacement, lasting) for members in groups]
-    runs = [part for run in runs for part in _parted_by_holds(run, time, displacement, pieces.usual, lasting)]
-    runs = _joined_across_flanks(runs, time, displacement, pieces.usual, lasting)
-    return _with_ends(runs, time, displacement, pieces.usual, lasting)
+    noise = np.maximum(noise, np.min(pieces.usual))
+    runs = [part for run in runs for part in _parted_by_holds(run, time, displacement, noise, lasting)]
+    runs = _joined_across_flanks(runs, time, displacement, noise, lasting)
+    return _with_ends(runs, time, displacement, noise, lasting)
 
 
-def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float, lasting: float) -> list[Run]:
+def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: Array, lasting: Array) -> list[Run]:
     """Add runs of the few samples before the first run and after the last, where they determine a rate.
 
     A very short run at an end is examined again, because its ranges may contain a change of rate.
@@ -157,7 +160,8 @@ def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float, 
         (found[0], time, displacement),
         (found[-1].reversed(time), reversed_column(time), reversed_column(displacement)),
     )
-    own = [run_at_start(t, x, run, noise) for run, t, x in sides]
+    noises = typical(noise[found[0].rows]), typical(noise[found[-1].rows])
+    own = [run_at_start(t, x, run, size) for (run, t, x), size in zip(sides, noises, strict=True)]
     if own[0]:
         found.insert(0, fitted_run(Run([(0, own[0])]), time, displacement, lasting))
     if own[1]:
@@ -165,7 +169,7 @@ def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float, 
     return found
 
 
-def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement: Array, lasting: float) -> list[Run]:
+def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement: Array, lasting: Array) -> list[Run]:
     """Runs found on means of `step` samples, with each boundary moved to the sample where the lines meet."""
     runs = [fitted_run(run, time, displacement, lasting) for run in runs]
     for before, after in pairwise(runs):
@@ -179,12 +183,13 @@ def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement
     return [fitted_run(run, time, displacement, lasting) for run in runs]
 
 
-def _parted_by_holds(run: Run, time: Array, displacement: Array, noise: float, lasting: float) -> list[Run]:
+def _parted_by_holds(run: Run, time: Array, displacement: Array, noise: Array, lasting: Array) -> list[Run]:
     """Parts of a run before, within and after holds so brief that they seem to be slips of the sensor."""
     parts, own = [], [run.members[0]]
     for k, other in enumerate(run.members[1:]):
         lines = [run.levels[group] + run.rate * (time - time[0]) for group in run.groups[k : k + 2]]
-        held = _brief_hold(lines, run.rate, slice(own[-1][1] - 2, other[0] + 2), displacement, noise)
+        rows = slice(own[-1][1] - 2, other[0] + 2)
+        held = _brief_hold(lines, run.rate, rows, displacement, typical(noise[rows]))
         if held is None:
             own.append(other)
             continue
@@ -214,7 +219,7 @@ def _brief_hold(
 
 
 def _joined_across_flanks(
-    runs: list[Run], time: Array, displacement: Array, noise: float, lasting: float = 0.0
+    runs: list[Run], time: Array, displacement: Array, noise: Array, lasting: Array | None = None
 ) -> list[Run]:
     """Join runs across a short one after which the displacement continues as before: the flank of a glitch.
 
@@ -231,15 +236,16 @@ def _joined_across_flanks(
     return runs
 
 
-def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: float) -> bool:
+def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: Array) -> bool:
     """True if two runs are on one line, beyond a short run between them."""
     if time[middle.last - 1] - time[middle.first] > LONGEST_GLITCH * (time[-1] - time[0]):
         return False
     at, errors, lines = 0.5 * (time[middle.first] + time[middle.last - 1]), [], []
     for run in (before, after):
         t = time[run.rows]
-        slope = noise / np.sqrt(max(float(np.sum((t - t.mean()) ** 2)), 1e-300))
-        errors.append((slope, float(np.hypot(noise / np.sqrt(len(t)), slope * (at - t.mean())))))
+        size = typical(noise[run.rows])
+        slope = size / np.sqrt(max(float(np.sum((t - t.mean()) ** 2)), 1e-300))
+        errors.append((slope, float(np.hypot(size / np.sqrt(len(t)), slope * (at - t.mean())))))
         lines.append(run.levels + run.rate * (at - time[0]))
     if not _rates_agree((before.rate, errors[0][0]), (after.rate, errors[1][0])):
         return False
@@ -313,13 +319,14 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
     slope, error = float(pieces.slope[longest]), float(pieces.slope_error[longest])
     like = RATE_SIGMAS * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
     main = inner[np.abs(pieces.slope[inner] - slope) <= like]
-    lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))  # not back again
+    usual = typical(pieces.usual[inner])
+    lasting = abs(np.sum(away)) > max(LEAD * usual, 0.7 * float(np.sum(np.abs(away))))  # not back again
     whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= (
         RELIABLE if gap is not None else FEWEST
     )
     # at rest within its error, which must be small beside the rate
     still = abs(slope) < 0.02 * abs(rate) + RATE_SIGMAS * error and RATE_SIGMAS * error < 0.05 * abs(rate)
-    far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
+    far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * usual
     long = (gap is None or gap > SLIP * pieces.span or pieces.size[longest] >= STRAIGHT) and far
     return [int(k) for k in main] if lasting and whole and (still or long) else []
 
@@ -391,19 +398,22 @@ def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list
     while len(groups) > 1:
         slopes = np.array([_mean_slope(members, pieces)[0] for members in groups])
         lengths = np.array([pieces.end[m[-1]] - pieces.begin[m[0]] for m in groups])
-        leads = np.abs(np.diff(slopes)) * np.minimum(lengths[1:], lengths[:-1])
+        usual = np.array([typical(pieces.usual[m]) for m in groups])
+        shorter = np.where(lengths[1:] < lengths[:-1], usual[1:], usual[:-1])
+        leads = np.abs(np.diff(slopes)) * np.minimum(lengths[1:], lengths[:-1]) / shorter
         weakest = int(np.argmin(leads))
-        if leads[weakest] >= LEAD * pieces.usual:
+        if leads[weakest] >= LEAD:
             break
         groups[weakest : weakest + 2] = [groups[weakest] + groups[weakest + 1]]
     return groups
 
 
-def fitted_run(run: Run, time: Array, displacement: Array, lasting: float = 0.0) -> Run:
+def fitted_run(run: Run, time: Array, displacement: Array, lasting: Array | None = None) -> Run:
     """Run with its rate and sensor levels from a robust line; members on one level share it.
 
     Levels are told apart by the scatter of the samples, or by `lasting` (see `straight_runs`) if that is more.
     """
+    lasting = np.zeros(1) if lasting is None else lasting[run.rows]
     groups = list(range(len(run.members)))
     rate, levels, centres, errors, own = _robust_line(run, groups, time, displacement, lasting)
     for _ in range(3):
@@ -421,7 +431,7 @@ def fitted_run(run: Run, time: Array, displacement: Array, lasting: float = 0.0)
 
 
 def _robust_line(
-    run: Run, groups: list[int], time: Array, displacement: Array, lasting: float
+    run: Run, groups: list[int], time: Array, displacement: Array, lasting: Array
 ) -> tuple[float, Array, Array, Array, float]:
     """Rate, levels, their mean times and errors, error of the rate; outliers have low weight."""
     rows = run.rows
@@ -441,5 +451,5 @@ def _robust_line(
         if not scale > 0:
             break
         weight = 1.0 / (1.0 + (r / (2 * scale)) ** 2)
-    inside, scale = np.bincount(own, minlength=count), max(scale, lasting)
+    inside, scale = np.bincount(own, minlength=count), max(scale, typical(lasting))
     return rate, levels, mean_t, scale / np.sqrt(inside), scale / np.sqrt(size)

@@ -75,25 +75,32 @@ def ranges_of_means(displacement: Array, step: int, most: int) -> tuple[Array, b
     return np.flatnonzero(single | (np.arange(len(displacement)) % step == 0)), True
 
 
-def split(time: Array, values: Array, noise: float, linear: bool) -> list[tuple[int, int]]:
+def typical(noise: Array) -> float:
+    """Root mean square of standard deviations (n,)."""
+    return float(np.sqrt(np.mean(noise * noise)))
+
+
+def split(time: Array, values: Array, noise: Array | float, linear: bool) -> list[tuple[int, int]]:
     """Ranges of samples, first and one past the last, in which a line (or a constant) fits to within the noise.
 
-    Ranges are split in two, where that reduces the misfit most, as long as it is reduced by more than noise explains.
+    Ranges are split in two, where that reduces the misfit most, as long as it is reduced by more than noise explains,
+    whose standard deviation may be each sample's own (n,).
     """
+    noise = np.broadcast_to(noise, len(time))
     waiting = [(0, len(time))]
     done: list[tuple[int, int]] = []
     while waiting:
         i, j = waiting.pop()
         cut, gain = _best_cut(time[i:j], values[i:j], linear)
-        if cut and gain > EVIDENCE * noise**2 and len(done) + len(waiting) < MAX_RANGES:
+        if cut and gain > EVIDENCE * typical(noise[i:j]) ** 2 and len(done) + len(waiting) < MAX_RANGES:
             waiting += [(i, i + cut), (i + cut, j)]
         else:
             done.append((i, j))
-    return _with_ends_adjusted(sorted(done), time, values, EVIDENCE * noise**2, linear)
+    return _with_ends_adjusted(sorted(done), time, values, noise, linear)
 
 
 def _with_ends_adjusted(
-    ends: list[tuple[int, int]], time: Array, values: Array, least: float, linear: bool
+    ends: list[tuple[int, int]], time: Array, values: Array, noise: Array, linear: bool
 ) -> list[tuple[int, int]]:
     """Ranges with common ends moved to where they fit best; the first splits were made without knowing later ones."""
     for _ in range(MAX_SWEEPS):
@@ -101,7 +108,8 @@ def _with_ends_adjusted(
         for _, j in ends[1:]:
             i = found.pop()[0]
             cut, gain = _best_cut(time[i:j], values[i:j], linear)
-            found += [(i, i + cut), (i + cut, j)] if cut and gain > least else [(i, j)]
+            likely = cut and gain > EVIDENCE * typical(noise[i:j]) ** 2
+            found += [(i, i + cut), (i + cut, j)] if likely else [(i, j)]
         if found == ends:
             break
         ends = found
